@@ -190,3 +190,12 @@ def test_levels_differ_from_run_to_run_on_cells_and_not_on_a_tachometer() -> Non
         block = found[np.ix_(channel == k, channel == k)] / size**2
         assert block == pytest.approx(np.kron(np.eye(2), np.ones((2, 2))), abs=1e-12)
     assert np.all(found[np.ix_(channel == 0, channel == 1)] == 0.0)
+
+
+def test_a_stated_repeatability_is_the_one_that_is_weighed() -> None:
+    records = [replace(from_series(recording(case(), points("static"), seed=k), case()), reference=k == 1)
+               for k in (0, 1)]  # fmt: skip
+    open_ = {h.session for h in noise.hypers(build(records, [case()]))}
+    stated = noise.hypers(build([replace(r, repeatability=0.004) for r in records], [case()]))
+    assert len(open_) > 1 and {h.session for h in stated} == {0.004}
+    assert sum(h.weight for h in stated) == pytest.approx(1.0)

@@ -22,11 +22,11 @@ def of(series: Dataset, reference: bool = False, findings: tuple[str, ...] = ())
     return replace(from_series(series, case()), reference=reference, findings=findings)
 
 
-def told(*records: Record) -> chain.Diagnosis:
+def told(*records: Record) -> chain.Answer:
     return chain.diagnose(records, [case()])
 
 
-def step(d: chain.Diagnosis) -> list[str]:
+def step(d: chain.Answer) -> list[str]:
     """Lines from "Next:" on that say what to do and what to type."""
     lines = text(d).split("\n")
     first = next(i for i, line in enumerate(lines) if line.strip().startswith("Next: "))
@@ -59,11 +59,11 @@ def test_beside_a_reference_at_other_speeds_it_is_none_either(grid: dict[str, np
 
 
 @pytest.fixture(scope="module")
-def compared(grid: dict[str, np.ndarray]) -> chain.Diagnosis:
+def compared(grid: dict[str, np.ndarray]) -> chain.Answer:
     return diagnose(recording(case(), grid), left_out("compressibility", case()))
 
 
-def test_a_named_effect_has_a_step_and_a_command(compared: chain.Diagnosis) -> None:
+def test_a_named_effect_has_a_step_and_a_command(compared: chain.Answer) -> None:
     assert compared.decision.verdict == "named"
     assert len(step(compared)) > 1
 
@@ -118,7 +118,7 @@ def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found:
      (2.5, 2.9, "look", "cross_talk"), (7.6, 9.0, "", "compressibility"), (7.6, 12.0, "run", "compressibility")],
 )  # fmt: skip
 def test_a_run_is_recommended_where_it_is_worth_its_time(
-    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis, now: float, after: float, kind: str, lead: str
+    monkeypatch: pytest.MonkeyPatch, compared: chain.Answer, now: float, after: float, kind: str, lead: str
 ) -> None:
     alone = len(compared.problem.parts[0].record)
     monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,12 +43,22 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rpm", type=float, default=[], metavar="N", help=speed, **_options.MANY)
     wind = "airspeed for files without one: one for all, or one per file [m/s] (default: from the case)"
     parser.add_argument("--airspeed", type=float, default=[], metavar="V", help=wind, **_options.MANY)
+    runs = "what runs of this stand differ by, standard deviation in percent (default: 0.2 to 2, from the readings)"
+    parser.add_argument("--repeatability", type=_percent, metavar="PERCENT", help=runs)
     parser.add_argument(
         "--out", metavar="DIR", help="write diagnosis.json, figures and the improved cases to this folder"
     )
     parser.add_argument("--no-figures", action="store_true", help="with --out: no figures")
     _options.add_json(parser, "bemt.diagnosis/1")
     _options.add_quiet(parser, "neither progress nor answer")
+
+
+def _percent(text: str) -> float:
+    """Share of a percentage above 0 and up to 20."""
+    value = float(text)
+    if not 0.0 < value <= 20.0:
+        raise argparse.ArgumentTypeError(f"got {text}; expected a percentage above 0 and up to 20")
+    return value / 100.0
 
 
 def run(args: argparse.Namespace) -> int:
@@ -63,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
                                  before=lambda found: folder.check(args.out, found), rpm=args.rpm,
                                  airspeed_m_s=args.airspeed)  # fmt: skip
+    if args.repeatability is not None:
+        recordings = [replace(r, repeatability=args.repeatability) for r in recordings]
     with _terminal.progress(args.quiet or args.json) as say:
         channels = [_CHANNELS[c] for c in args.channels or ()] or None
         try:
@@ -106,6 +119,8 @@ def _given(args: argparse.Namespace) -> Given:
     words = ["--case", *args.case]
     for option, values in (("--off", args.off), ("--only", args.only or ())):
         words += [w for v in values for w in (option, v)] if option == "--off" else [option, *values] if values else []
+    if args.repeatability is not None:
+        words += ["--repeatability", f"{100.0 * args.repeatability:g}"]
     if args.baseline != "bemt":
         words += ["--baseline", args.baseline]
     return Given(tuple(map(shlex.quote, args.recordings)), tuple(map(shlex.quote, args.reference)), shlex.join(words))

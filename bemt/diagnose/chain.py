@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.compare.scaling_laws import law
 from bemt.diagnose import (
     blocks,
     confusion,
@@ -26,9 +25,9 @@ from bemt.diagnose import (
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
+from bemt.diagnose.answer import Answer
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.problem import Problem
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
@@ -36,130 +35,9 @@ if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
     from bemt.diagnose.record import Record
 
-__all__ = ["Diagnosis", "diagnose"]
+__all__ = ["Answer", "diagnose"]
 
 Array = NDArray[np.float64]
-
-
-# Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
-_NEAR_ZERO, _FAR = 0.1, 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """Everything that was found.
-
-    Attributes
-    ----------
-    found : Evidence
-        Outcome of the weighing, with the problem in it.
-    decision : Decision
-        Verdict of the evidence in the case.
-    said : Decision
-        What is said in the end: the same, unless the ratios to the reference answer.
-    best : Fit
-        Leading explanation at its best setting.
-    parameters : dict
-        Effect to parameter to value and 90 % interval, of the leading explanation.
-    p_value : float
-        Of the gate [1].
-    where : Location
-        Of the mismatch; of the largest scatter when the verdict is none.
-    scores : dict
-        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
-        magnitude of the readings.
-    blocks : str
-        What was left out in turn for the held-out scores.
-    after, held : (M,) float
-        Readings as the improved model gives them: fitted, and each block from the others [units of the readings].
-    next : Suggestion
-        What would decide.
-    alike : Confusion
-        Distances of effects in this plan.
-    absent : dict of str to str
-        Effects that could not be tried, and why.
-    drive : Diagnosis or None
-        Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
-    loads : Diagnosis or None
-        Of thrust and torque, where they name nothing and the answer is that of the drive.
-    change : RunChange or None
-        Change from the references, where there is one recording beside them.
-    """
-
-    found: evidence.Evidence
-    decision: verdict.Decision
-    said: verdict.Decision
-    best: fitting.Fit
-    parameters: dict[str, dict[str, dict[str, Any]]]
-    p_value: float
-    where: location.Location
-    scores: dict[str, dict[str, float]]
-    blocks: str
-    after: Array
-    held: Array
-    next: suggestion.Suggestion
-    alike: confusion.Confusion
-    absent: dict[str, str]
-    drive: Diagnosis | None = None
-    loads: Diagnosis | None = None
-    change: RunChange | None = None
-
-    @property
-    def by_ratios(self) -> bool:
-        """Whether the ratios to the reference answer."""
-        return self.said.by == "ratios"
-
-    @property
-    def systems(self) -> dict[str, dict[str, Any]]:
-        """Verdict and effects of air, stand and drive, each for itself."""
-        said = self.said
-        listed = said.verdict in ("named", "class", "sensor")
-        kinds = {i: _kind(i) for i in said.effects}
-        out: dict[str, dict[str, Any]] = {}
-        for system in ("air", "stand", "drive"):
-            mine = [i for i, kind in kinds.items() if kind == system]
-            word = ("none" if not mine else said.verdict) if listed else said.verdict
-            if self.loads is not None and system != "drive":
-                word = self.loads.decision.verdict
-            out[system] = {"verdict": word, "effects": mine}
-        if self.drive is not None and self.drive is not self:
-            out["drive"] = {"verdict": self.drive.decision.verdict, "effects": list(self.drive.decision.effects)}
-        elif not any("rpm" in p.channels for p in self.problem.parts):
-            out["drive"] = {"verdict": "not recorded", "effects": []}
-        return out
-
-    @property
-    def problem(self) -> Problem:
-        """Readings, baseline, nuisances."""
-        return self.found.problem
-
-    @property
-    def off(self) -> dict[str, tuple[float, bool]]:
-        """How far each channel is from the case: median of the ratio, less 1 [1]; or how far most go, and True."""
-        p, out = self.problem, {}
-        for c, name in enumerate(CHANNELS):
-            here = (p.channel == c) & p.free
-            here &= np.abs(p.f0) > _NEAR_ZERO * np.max(np.abs(p.f0), where=here, initial=0.0)
-            if here.any():
-                change = p.y[here] / p.f0[here] - 1.0
-                order = np.argsort(np.abs(change))
-                median, far = float(np.median(change)), float(change[order[int(0.9 * (change.size - 1))]])
-                wide = abs(far) > _FAR and abs(median) < 0.5 * abs(far)
-                out[name] = (far if wide else median), wide
-        return out
-
-    @property
-    def marked(self) -> location.Location | None:
-        """Location of the mismatch; None without one."""
-        return None if self.decision.verdict == "none" else self.where
-
-
-def _kind(name: str) -> str:
-    """Sub-system of an effect; of a cause that only the comparison knows, that of its scaling law."""
-    if name in effects.catalogue():
-        return effects.catalogue()[name].kind
-    row = law(name)
-    return "air" if row is None else row.kind
 
 
 def diagnose(
@@ -172,7 +50,7 @@ def diagnose(
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
     change: RunChange | None = None,
-) -> Diagnosis:
+) -> Answer:
     """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
@@ -185,9 +63,9 @@ def diagnose(
     free = only is None and channels is None and baseline == "bemt"
 
     def chain(
-        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Diagnosis | None = None,
+        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Answer | None = None,
         compared: bool = False,
-    ) -> Diagnosis:  # fmt: skip
+    ) -> Answer:  # fmt: skip
         def ratios(absent: Collection[str]) -> RunChange | None:
             if not (compared and free):
                 return None
@@ -222,9 +100,9 @@ def _diagnose(
     nulls: int,
     baseline: str,
     given: suggestion.Given,
-    motor: Diagnosis | None,
+    motor: Answer | None,
     change: Callable[[Collection[str]], RunChange | None],
-) -> Diagnosis:
+) -> Answer:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
     if question := wrong_rotor_check.finding(problem):
@@ -256,7 +134,7 @@ def _diagnose(
         step = ratio_check.next_of(query.change, files) or step
     if said.by == "both" and motor is not None:
         decision, parameters = said, parameters | motor.parameters
-    return Diagnosis(
+    return Answer(
         found, decision, said, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
         step, confusion.confusion(found), absent, motor, None, query.change,
     )  # fmt: skip

@@ -112,7 +112,9 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
     if all(p.as_built is not None for p in problem.parts):
         model = {k: (1.0 - _REAL) * w for k, w in model.items()}
         model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
-    apart = _SESSIONS if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
+    stated = [p.record.repeatability for p in problem.parts if np.isfinite(p.record.repeatability)]
+    apart = {max(stated): 1.0} if stated else _SESSIONS
+    apart = apart if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
     return tuple(
         Hyper(s, a, m, f, each * w * v, d, real)
         for s in scales

@@ -84,6 +84,8 @@ class Record:
         What looks wrong in the file before any physics, the file named in front; nothing was corrected.
     contradictions : tuple of Finding
         Those of them that cannot be so.
+    repeatability : float
+        Standard deviation of what runs of this stand differ by, a share, as stated; NaN: not stated [1].
     """
 
     name: str
@@ -100,6 +102,7 @@ class Record:
     reference: bool = False
     findings: tuple[str, ...] = ()
     contradictions: tuple[Finding, ...] = ()
+    repeatability: float = np.nan
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -410,6 +413,7 @@ def merged(records: Sequence[Record]) -> Record:
         all(r.air_recorded for r in records), notes, records[0].reference,
         tuple(dict.fromkeys(f for r in records for f in r.findings)),
         tuple(dict.fromkeys(f for r in records for f in r.contradictions)),
+        max((r.repeatability for r in records if np.isfinite(r.repeatability)), default=np.nan),
     ))  # fmt: skip
 
 

@@ -1,0 +1,212 @@
+"""The answer of the judge: one object with named groups, of which text, JSON, figures and report are views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.compare.scaling_laws import law
+from bemt.diagnose import prior, verdict
+from bemt.diagnose.explanation import UNKNOWN, Explanation
+from bemt.diagnose.record import CHANNELS
+
+if TYPE_CHECKING:
+    from bemt.compare.recordings import RunChange
+    from bemt.diagnose import confusion, evidence
+    from bemt.diagnose import fit as fitting
+    from bemt.diagnose import locate as location
+    from bemt.diagnose import suggest as suggestion
+    from bemt.diagnose.problem import Problem
+    from bemt.diagnose.signatures import Candidate
+
+__all__ = ["Answer", "Baseline", "Posterior", "Readings"]
+
+Array = NDArray[np.float64]
+
+# Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
+_NEAR_ZERO, _FAR = 0.1, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of all recordings, stacked: (M,) values, with (P,) variables of the points that they belong to."""
+
+    channels: tuple[str, ...]
+    values: Array  # (M,) [units of the channel]
+    u: Array  # (M,) standard uncertainty [units of the channel]
+    channel: NDArray[np.intp]  # (M,) place in CHANNELS
+    point: NDArray[np.intp]  # (M,) place in the variables
+    tested: NDArray[np.bool_]  # (M,) False: of a reference
+    variables: dict[str, Array]  # (P,) each
+    notes: tuple[str, ...]
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Model of the case without any cause."""
+
+    effects: tuple[effects.Effect, ...]
+    values: Array  # (M,) [units of the channel]
+    level: dict[str, float]  # Median of each load over what the case gives, less 1 [1]
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the readings say of the explanations."""
+
+    probability: dict[Explanation, float]  # Adds up to 1 [1]
+    log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
+    inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
+    parameters: dict[str, dict[str, dict[str, Any]]]  # Of the leading explanation: value, low, high (90 %), unit
+    p_value: float  # Of the gate [1]
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is wrong, in named groups; text, JSON, figures and report are views of it.
+
+    Attributes
+    ----------
+    found : Evidence
+        Outcome of the weighing, with the problem in it.
+    decision : Decision
+        Verdict of the evidence in the case.
+    said : Decision
+        What is said in the end: the same, unless the ratios to the reference answer.
+    best : Fit
+        Leading explanation at its best setting.
+    parameters : dict
+        Effect to parameter to value and 90 % interval, of the leading explanation.
+    p_value : float
+        Of the gate [1].
+    where : Location
+        Of the mismatch; of the largest scatter when the verdict is none.
+    scores : dict
+        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
+        magnitude of the readings.
+    blocks : str
+        What was left out in turn for the held-out scores.
+    after, held : (M,) float
+        Readings as the improved model gives them: fitted, and each block from the others [units of the readings].
+    next : Suggestion
+        What would decide.
+    alike : Confusion
+        Distances of effects in this plan.
+    absent : dict of str to str
+        Effects that could not be tried, and why.
+    drive : Answer or None
+        Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
+    loads : Answer or None
+        Of thrust and torque, where they name nothing and the answer is that of the drive.
+    change : RunChange or None
+        Change from the references, where there is one recording beside them.
+    """
+
+    found: evidence.Evidence
+    decision: verdict.Decision
+    said: verdict.Decision
+    best: fitting.Fit
+    parameters: dict[str, dict[str, dict[str, Any]]]
+    p_value: float
+    where: location.Location
+    scores: dict[str, dict[str, float]]
+    blocks: str
+    after: Array
+    held: Array
+    next: suggestion.Suggestion
+    alike: confusion.Confusion
+    absent: dict[str, str]
+    drive: Answer | None = None
+    loads: Answer | None = None
+    change: RunChange | None = None
+
+    @property
+    def readings(self) -> Readings:
+        """What was measured."""
+        p = self.problem
+        channels = tuple(CHANNELS[c] for c in np.unique(p.channel))
+        return Readings(channels, p.y, p.u, p.channel, p.point, p.free, p.covariates, p.notes, p.findings)
+
+    @property
+    def baseline(self) -> Baseline:
+        """What the case gives there."""
+        return Baseline(self.problem.baseline, self.problem.f0, self.problem.level)
+
+    @property
+    def prior(self) -> dict[Explanation, float]:
+        """Probability of every explanation before a reading was looked at [1]."""
+        weights = prior.prior_weights(self.problem, list(self.found.spans))
+        return {k: float(np.exp(v)) for k, v in prior.log_priors(weights).items()}
+
+    @property
+    def explanations(self) -> tuple[Candidate, ...]:
+        """Effects that were tried, with what each changes in the readings."""
+        return self.found.candidates
+
+    @property
+    def posterior(self) -> Posterior:
+        """What the readings say of them."""
+        odds = {e: self.found.log_bayes(e) for e in (*map(Explanation.of, self.found.spans), UNKNOWN)}
+        return Posterior(self.found.probability, odds, verdict.inclusion(self.found), self.parameters, self.p_value)
+
+    @property
+    def by_ratios(self) -> bool:
+        """Whether the ratios to the reference answer."""
+        return self.said.by == "ratios"
+
+    @property
+    def systems(self) -> dict[str, dict[str, Any]]:
+        """Verdict and effects of air, stand and drive, each for itself."""
+        said = self.said
+        listed = said.verdict in ("named", "class", "sensor")
+        kinds = {i: _kind(i) for i in said.effects}
+        out: dict[str, dict[str, Any]] = {}
+        for system in ("air", "stand", "drive"):
+            mine = [i for i, kind in kinds.items() if kind == system]
+            word = ("none" if not mine else said.verdict) if listed else said.verdict
+            if self.loads is not None and system != "drive":
+                word = self.loads.decision.verdict
+            out[system] = {"verdict": word, "effects": mine}
+        if self.drive is not None and self.drive is not self:
+            out["drive"] = {"verdict": self.drive.decision.verdict, "effects": list(self.drive.decision.effects)}
+        elif not any("rpm" in p.channels for p in self.problem.parts):
+            out["drive"] = {"verdict": "not recorded", "effects": []}
+        return out
+
+    @property
+    def problem(self) -> Problem:
+        """Readings, baseline, nuisances."""
+        return self.found.problem
+
+    @property
+    def off(self) -> dict[str, tuple[float, bool]]:
+        """How far each channel is from the case: median of the ratio, less 1 [1]; or how far most go, and True."""
+        p, out = self.problem, {}
+        for c, name in enumerate(CHANNELS):
+            here = (p.channel == c) & p.free
+            here &= np.abs(p.f0) > _NEAR_ZERO * np.max(np.abs(p.f0), where=here, initial=0.0)
+            if here.any():
+                change = p.y[here] / p.f0[here] - 1.0
+                order = np.argsort(np.abs(change))
+                median, far = float(np.median(change)), float(change[order[int(0.9 * (change.size - 1))]])
+                wide = abs(far) > _FAR and abs(median) < 0.5 * abs(far)
+                out[name] = (far if wide else median), wide
+        return out
+
+    @property
+    def marked(self) -> location.Location | None:
+        """Location of the mismatch; None without one."""
+        return None if self.decision.verdict == "none" else self.where
+
+
+def _kind(name: str) -> str:
+    """Sub-system of an effect; of a cause that only the comparison knows, that of its scaling law."""
+    if name in effects.catalogue():
+        return effects.catalogue()[name].kind
+    row = law(name)
+    return "air" if row is None else row.kind
