@@ -275,7 +275,7 @@ def test_two_units_in_one_process_keep_their_own_tables(job: Job, tmp_path: Path
     for k, rpm in enumerate((10_000.0, 5_000.0)):
         (tmp_path / f"{k}.fmu").write_bytes(exports()["fmu"].write(Job(job.case, rpm))["prop_10x5.fmu"])  # type: ignore[arg-type]
         with zipfile.ZipFile(tmp_path / f"{k}.fmu") as archive:
-            names.append({n for n in archive.namelist() if n.startswith("resources/") and n.endswith(".py")})
+            names.append({n for n in archive.namelist() if n.startswith("resources/prop_10x5")})
     assert names[0] and names[0].isdisjoint(names[1])
 
 

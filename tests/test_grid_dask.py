@@ -163,12 +163,13 @@ def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
     from bemt.sweep.grid.dask_engine import _portable
 
     path = make_case(tmp_path / "cases", extra=GRID)
-    (path.parent / "down").mkdir()
-    for name in ("polar.csv", "absolute.csv"):
-        shutil.copy(path.parent / "polar.csv", path.parent / "down" / name)
-    text = path.read_text().replace('"polar.csv"', '"down/polar.csv"')
-    absolute = (path.parent / "down" / "absolute.csv").as_posix()
-    path.write_text(f'{text}[[polars]]\nfile = "{absolute}"\nr_over_R = 0.3\n')
+    (tmp_path / "shared").mkdir()
+    for name in ("up.csv", "absolute.csv"):
+        shutil.copy(path.parent / "polar.csv", tmp_path / "shared" / name)
+    text = path.read_text().replace('"polar.csv"', '"../../shared/up.csv"')
+    path.write_text(
+        text + f'[[polars]]\nfile = "{(tmp_path / "shared" / "absolute.csv").as_posix()}"\nr_over_R = 0.3\n'
+    )
     case = load_case(path)
     grid = Grid.of(case)
     assert grid is not None
@@ -176,6 +177,7 @@ def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
     here = GridSolver(case, grid).block(flat)
     moved, files = _portable(case)
     shutil.rmtree(tmp_path / "cases")
+    shutil.rmtree(tmp_path / "shared")
     for name, data in files.items():
         (tmp_path / "worker" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "worker" / name).write_bytes(data)

@@ -150,7 +150,7 @@ def _after_a_run(y: np.ndarray, at: Sensed, run: np.ndarray) -> tuple[Prediction
 
 def test_a_run_that_fits_narrows_and_one_that_no_rotor_could_make_does_not() -> None:
     p, run, held = population(), np.arange(5), []
-    for seed in range(20):
+    for seed in range(60):
         at = _sensed(seed=seed)
         fair = (at.f + p.bias(at))[:, run]
         before, after = _after_a_run(fair, at, run)
@@ -343,6 +343,15 @@ def test_a_real_rotor_says_the_same_by_covariance_and_by_prediction() -> None:
     mean = (here.f + p.bias(here)).reshape(-1) + rotor.tangents(here) @ prior.mean
     left = run.f.reshape(-1) - mean.reshape(2, -1)[:, :4].reshape(-1)
     assert after.expected(here).reshape(-1) == pytest.approx(mean + k @ np.linalg.solve(S, left), rel=1e-6)
+
+
+def test_a_run_tells_less_of_a_blade_that_was_turned() -> None:
+    p, at = population(), _sensed(10)
+    run = ReferenceRun(at, np.zeros(20), p.rest(at) + np.diag(p.noise_sd(at).reshape(-1) ** 2))
+    left = [np.diag(run.rest(p, replace(at, alpha_deg=at.alpha_deg + turn))) for turn in (0.0, 2.0, 5.0, 15.0)]
+    usual = p.rest_sd(at).reshape(-1) ** 2
+    assert np.all(np.diff(np.median(left / usual, axis=1)) > 0.0) and np.all(left[-1] < usual)
+    assert np.median(left[0] / usual) < 0.1
 
 
 def test_condition_is_exact_for_a_linear_solver() -> None:

@@ -95,7 +95,7 @@ def _check_files(out: Collector, document: Mapping[str, Any], folder: Path) -> N
         if not isinstance(value, str) or not value.strip():
             continue
         expected = "the name of a file in the folder of the case"
-        if not inside(folder, value):
+        if where == "references" and not inside(folder, value):  # what is printed and put into reports
             out.add(where, f"{value!r}, which lies outside it", expected, "Copy the file there")
         elif not (folder / value).is_file():
             out.add(where, f"{value!r}, which does not exist", expected, "Check the name")

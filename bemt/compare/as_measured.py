@@ -86,5 +86,6 @@ def as_measured(
         lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
     )
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
+    at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re, found.mean)  # as predictions will see it
     reference = ReferenceRun.given(at, noise, target, found)
     return AsMeasured(prior, posterior, reference, found, int(keep.size))

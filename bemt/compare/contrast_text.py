@@ -114,7 +114,7 @@ def headline(doc: Mapping[str, Any]) -> str:
             return f"These recordings cannot be compared: {doc['rule']}."
         likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
         no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
-        guess = "" if no_guess else _families(likely, doc["ranking"])
+        guess = "" if no_guess else families(likely, doc["ranking"])
         size = f" ({moved})" if moved else ""
         return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
     if doc["rule"] == REVERSED:
@@ -122,11 +122,11 @@ def headline(doc: Mapping[str, Any]) -> str:
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
-    several = _families(effects, doc["ranking"])
+    several = families(effects, doc["ranking"])
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
 
-def _families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]]) -> str:
+def families(effects: Sequence[str], ranking: Sequence[Mapping[str, Any]] = ()) -> str:
     """What an engineer would look at, the likeliest first; "" where nothing is listed."""
     likely = {r["effect"]: r["probability"] for r in ranking}
     titles: dict[str, list[str]] = {}

@@ -297,6 +297,8 @@ def _next(
         commands = (given.command(),)
     elif chosen.kind == "air":
         commands = given.of_days()
+    elif chosen.kind == "rotor":
+        commands = (f"python -m bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE"))
     elif chosen.kind == "mend":
         commands = tuple(f"python -m bemt import {f}" for f in given.recordings)
     else:
@@ -312,6 +314,8 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
         return suggestion.nothing_called_for(found)
     if mend := wrong_rotor_check.to_mend(found.problem, decision):
         return suggestion.Suggestion(mend, (), (), 0.0, 0.0, "mend")
+    if decision.verdict in ("insufficient", "unknown") and wrong_rotor_check.another_label(found.problem):
+        return suggestion.Suggestion(suggestion.ROTOR, (), (), 0.0, 0.0, "rotor")
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):

@@ -11,6 +11,7 @@ import numpy as np
 from bemt import __version__, effects
 from bemt.base.tables import text_table
 from bemt.compare.change_document import document as change_document
+from bemt.compare.contrast_text import families
 from bemt.compare.contrast_text import headline as change_headline
 from bemt.compare.scaling_laws import law
 from bemt.diagnose import fit as fitting
@@ -45,6 +46,8 @@ _SHOWN = 8
 _FINDINGS = 3
 # All loads off the case by more than this share: first the question whether it is the rotor of the case.
 _ANOTHER_ROTOR = 0.25
+# Members from which on a class is said as a group.
+_A_GROUP = 5
 # Least probability of a guess.
 _GUESS = 0.3
 # Level that is said even where no cause shows.
@@ -214,12 +217,13 @@ def explanation(d: Diagnosis) -> list[str]:
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
     if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        lines.append(f"Before any physics: the case is off ({off}). Do diameter, pitch and blades match this rotor?")
+        lines.append(f"Before any physics: your rotor is not that of the case ({off}). Check diameter, pitch and blade "
+                     f"count first. Nearest: {wrong_rotor_check.nearest_rotors(d.problem)}.")  # fmt: skip
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if d.by_ratios:
-        members = ", ".join(f"{i} ({_title(i)})" for i in d.said.effects)
-        lines += [f"One of these ({d.said.probability:.2f}): {members}."] if d.said.verdict == "class" else []
+        if d.said.verdict == "class":
+            lines.append(f"One of these ({d.said.probability:.2f}): {_members(d.said.effects)}.")
         lines += [f"The ratios to the reference: {d.said.why}. The diagnosis with the case: {decision.verdict}: "
                   f"{decision.why}."]  # fmt: skip
         return [*lines, *_next(d), *_not_tried(d)]
@@ -243,8 +247,7 @@ def explanation(d: Diagnosis) -> list[str]:
         if len(decision.sets) > 1 and decision.rule != BESIDE_IT:
             sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
             lines.append(f"One of each set ({decision.probability:.2f}): {sets}.")
-        lines.append(f"{lead} ({decision.probability:.2f}): "
-                     + ", ".join(f"{i} ({_title(i)})" for i in decision.effects) + ".")  # fmt: skip
+        lines.append(f"{lead} ({decision.probability:.2f}): {_members(decision.effects)}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
         lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
@@ -327,6 +330,8 @@ def headline(d: Diagnosis) -> str:
             return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}."
         if len(said.sets) > 1:
             return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}."
+        if len(titles) > _A_GROUP:
+            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}."
         return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them."
     if said.verdict == "unknown":
         what = _from_reference(d) or f"Recording and model differ ({off})"
@@ -350,6 +355,11 @@ def _from_reference(d: Diagnosis) -> str:
     loads = [(c.name, d.change.ratios[c.channel]["ratio"]) for c in d.change.loads_by_name.values()]
     words = " and ".join(f"{name} by {_share(ratio - 1.0)}" for name, ratio in loads)
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
+
+
+def _members(ids: Sequence[str]) -> str:
+    """Members of a class; of a large one only their names."""
+    return ", ".join(i if len(ids) > _A_GROUP else f"{i} ({_title(i)})" for i in ids)
 
 
 def _one_of(ids: Sequence[str]) -> str:

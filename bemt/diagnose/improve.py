@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.chain import Diagnosis
 
-__all__ = ["beside", "improved_case", "is_improved"]
+__all__ = ["beside", "elsewhere", "improved_case", "is_improved"]
 
 _HEAD = "with what `python -m bemt diagnose` found: "
 
@@ -41,6 +41,7 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     model: Any = text["model"]
     model["effects_on"], model["effects_off"] = on, off
     text["name"] = _next_name(case.name)
+    elsewhere(text, case)
     head = f"# {case.name} {_HEAD}{', '.join(effects.to_text(e) for e in found)}"
     return f"{head}\n{tomlkit.dumps(text).rstrip()}\n"
 
@@ -58,8 +59,22 @@ def _next_name(name: str) -> str:
 
 
 def beside(case: Case) -> list[Path]:
-    """Files of a case but itself; they go with it."""
-    return [f for f in case.files() if f != case.path]
+    """Files of a case that lie in its folder, and so go with it."""
+    folder = case.folder.resolve()
+    return [f for f in case.files() if f != case.path and f.resolve().is_relative_to(folder)]
+
+
+def elsewhere(node: Any, case: Case) -> None:
+    """Name files that lie elsewhere by their whole path: the improved case stands in another folder."""
+    far = {f.resolve() for f in case.files()} - {case.path.resolve(), *(f.resolve() for f in beside(case))}
+    keys = range(len(node)) if isinstance(node, list) else list(node)
+    for key in keys:
+        value = node[key]
+        if isinstance(value, str):
+            if (case.folder / value).resolve() in far:
+                node[key] = (case.folder / value).resolve().as_posix()
+        elif isinstance(value, (dict, list)):
+            elsewhere(value, case)
 
 
 def is_improved(source: str) -> bool:

@@ -136,8 +136,8 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             add(f"pulse width^{k}{tag}", np.where(turning, 0.05 * at_pulse**k * top, 0.0))
         for i, part in drives.items():
             if part.drive is not None and not part.record.reference:
-                share = PRIORS["speed at a pulse width from run to run"]
-                add(f"supply of the run{tag}", np.where(turning & (problem.part == i), share * f0, 0.0))
+                varies = PRIORS["speed at a pulse width from run to run"]
+                add(f"supply of the run{tag}", np.where(turning & (problem.part == i), varies * f0, 0.0))
     for wake in {p.model.duct.wake_ratio for p in problem.parts if p.model.duct is not None}:
         wider = DuctEffect(wake_ratio=(1.0 + PRIORS["jet area of a duct"]) * wake)
         add("jet area of a duct", everywhere(wider) - f0, own=True)

@@ -20,7 +20,7 @@ from bemt.case import Case
 from bemt.case.as_built import MOVED, posterior_document
 from bemt.case.prepare import prepare_case
 from bemt.compare.as_measured import AsMeasured, as_measured
-from bemt.diagnose.improve import beside
+from bemt.diagnose.improve import beside, elsewhere
 from bemt.diagnose.load import cases_of, load
 from bemt.diagnose.wrong_rotor_check import FACTOR
 from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
@@ -147,6 +147,7 @@ def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Pat
         for item in kept:
             array.append(tomlkit.item(item))
         source["assumptions"] = array
+    elsewhere(source, case)
     names = ", ".join(Path(p).name for p in paths)
     head = f"# {case.name} with its rotor as `python -m bemt calibrate-rotor` found it from {names}"
     files = {file.relative_to(case.folder): file.read_bytes() for file in beside(case) if file.name != POSTERIOR}

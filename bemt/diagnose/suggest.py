@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
 __all__ = [
-    "LEVEL", "REFERENCE", "Given", "Suggestion", "correction", "nothing_called_for", "suggest", "weather",
+    "LEVEL", "REFERENCE", "ROTOR", "Given", "Suggestion", "correction", "nothing_called_for", "suggest", "weather",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -37,6 +37,12 @@ REFERENCE = (
     "rotor of this type that is known to be right)"
 )
 """The run that settles most: it shows how far model and stand differ anyway."""
+
+ROTOR = (
+    "measure diameter and pitch and count the blades; with a run that is known to be right, calibrate the rotor and "
+    "diagnose again with that run as reference"
+)
+"""What comes before any cause where all loads are off by a quarter."""
 
 # Loads of a run and its reference that differ by such a share may be of days of different density.
 _DAYS = 0.03, 0.15

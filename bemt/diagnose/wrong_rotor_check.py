@@ -18,6 +18,7 @@ from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
+from bemt.diagnose.thresholds import ANOTHER
 from bemt.effects.base import Baking, Effect
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
     from bemt.recordings.findings import Finding
 
 __all__ = [
-    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "contradiction", "exact_faults", "finding",
-    "foreign", "impossible", "levels", "odd_speed", "suspects", "to_mend", "unrepeatable",
+    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "another_label", "contradiction", "exact_faults",
+    "finding", "foreign", "impossible", "levels", "nearest_rotors", "odd_speed", "suspects", "to_mend", "unrepeatable",
 ]  # fmt: skip
 
 FACTOR = 3.0
@@ -40,6 +41,8 @@ _SHOWN = 3
 # A slip this much farther from the loads than the nearest one may still be it.
 _NEARLY = 1.0
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
+# Kinds of slips that are another rotor.
+_ROTORS = ("pitch", "diameter", "blades")
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
 CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
@@ -94,6 +97,17 @@ def suspects(problem: Problem) -> list[Suspect]:
         if kind not in out or square < out[kind].distance ** 2:
             out[kind] = Suspect(kind, words, math.sqrt(square))
     return sorted(out.values(), key=lambda s: s.distance)
+
+
+def another_label(problem: Problem) -> bool:
+    """Whether all loads are so far off the case that the rotor is rather another one, and no reference shows it."""
+    shown = any(p.record.reference for p in problem.parts)
+    return not shown and min((abs(v) for v in problem.level.values()), default=0.0) > ANOTHER
+
+
+def nearest_rotors(problem: Problem) -> str:
+    """Rotors that would fit the level of the loads, nearest first."""
+    return " or ".join(s.words for s in suspects(problem) if s.kind in _ROTORS)
 
 
 def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str, dict[str, float], float]]:

@@ -21,8 +21,8 @@ class BatterySag(Effect):
     Equivalent circuit of a battery with one resistance (Tremblay and Dessaint 2009, World Electric Vehicle J. 3:289,
     without its exponential zone; not checked). Recorded ``voltage_V`` is taken relative to its largest value. If that
     circuit fits it over a run, the fit is used, without the noise of the meter; otherwise the voltage as recorded.
-    Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else power of shaft and copper), in
-    proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run. The speed follows
+    Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else power of shaft and copper),
+    in proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run. The speed follows
     from (1 - lost) (1 + u) = y + u y^2, the motor at constant duty with torque as speed squared and copper drop u over
     back-EMF, ``copper`` at the largest Q / Omega. Loads at the measured speed are unchanged.
     """

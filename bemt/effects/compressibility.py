@@ -94,7 +94,7 @@ class Compressibility(Effect):
         sub = pg + (self.shock_stall - pg) * fall
         ackeret = np.minimum(1.0, 4.0 / (2.0 * np.pi * np.sqrt(np.maximum(M**2 - 1.0, 1e-6))))
         rise = np.clip((M - 1.0) / 0.1, 0.0, 1.0)
-        ratio = np.where(M < 1.0, sub, sub + (ackeret - sub) * rise)
+        ratio = np.where(M < 1.0, sub, sub + (ackeret - sub) * rise) if np.any(M >= 1.0) else sub
         return np.asarray(1.0 + self.amplitude * (ratio - 1.0))
 
     def variants(self) -> tuple[dict[str, str | float], ...]:

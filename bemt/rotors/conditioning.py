@@ -17,6 +17,8 @@ TOLERANCE = 0.25
 """Steps shorter than this share of a posterior standard deviation end the search [1]."""
 BIRGE = 1.5
 """Mean square of the residuals, over that of the roughest noise, beyond which the noise is taken for larger [1]."""
+RARE = 0.02
+"""Probability below which a size of the noise is too rare to be believed of a run [1]."""
 MOST_STEPS = 8
 """Tangents are taken so often at most [1]."""
 _SLACK = 1e-6
@@ -77,7 +79,7 @@ def condition(
     DIAGNOSIS section 7.  With L L^T = noise, A = L^-1 T and the prior whitened, z+ = (I + A^T A)^-1 A^T L^-1 (y - f0),
     f0 = f(c) - T (c - prior mean); a step is accepted by the misfit plus the log-determinant at every size of the heavy
     tail, else halved.  The heavy tail is a mixture of sizes: the posterior weights take the place of
-    s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's sizes bears are
+    s^2 = (nu s0^2 + x^2)/(nu + 1).  Readings that lie further off than the largest of the noise's usual sizes bears are
     believed less, by Birge's ratio (R. T. Birge, Physical Review 40, 1932, p. 207, not checked): a run that fits no
     rotor moves none.
     """
@@ -112,9 +114,10 @@ def condition(
             break
         z, f, T, here = at, f_new, T_new, there
         converged = bool(np.all(np.abs(here.mean - z) <= tolerance * np.sqrt(np.diag(here.cov))))
-    if noise_sizes is not None:
+    if noise_sizes is not None and noise_weights is not None:
+        largest = float(noise_sizes[noise_weights >= RARE].max())
         left = np.linalg.solve(white, target - f[kept] - T[kept] @ (here.mean - z))
-        excess = float(left @ left) / (left.size * float(noise_sizes.max()) ** 2)
+        excess = float(left @ left) / (left.size * largest**2)
         if excess > BIRGE:
             again = condition(solve, prior, y, excess * noise, noise_sizes, noise_weights, tolerance, most)
             return replace(again, excess=excess * again.excess)

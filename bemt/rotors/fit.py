@@ -180,7 +180,8 @@ def _pairs(p: Population) -> tuple[Array, Array, Array]:
 
 def _population(theta: Array) -> Population:
     """Population of the search's numbers."""
-    return Population(**{row[0]: _FROM[row[1]](x) for row, x in zip(_FREE, theta.tolist(), strict=True)})
+    found: dict[str, Any] = {row[0]: _FROM[row[1]](x) for row, x in zip(_FREE, theta.tolist(), strict=True)}
+    return Population(**found)
 
 
 def _gaps(p: Population, rotors: Sequence[MeasuredRotor]) -> float:

@@ -137,16 +137,21 @@ class Sensed:
     top: Array
     T: Array
 
+    @property
+    def beta75_deg(self) -> Array:
+        """Blade angle at 0.75 R with which each point was solved, (..., P) [deg]."""
+        return self.alpha_deg + inflow_angle_deg(self.J, self.f[..., 0, :])
+
     def part(self, points: NDArray[np.intp] | NDArray[np.bool_]) -> Sensed:
         """Some of the points."""
         return Sensed(self.diameter_m, *(getattr(self, f.name)[..., points] for f in fields(Sensed)[1:]))
 
 
-def angle_of_attack_deg(beta75_deg: float, J: Array, CT: Array) -> Array:
-    """Angle of attack at 0.75 R from the blade angle there and the induction of CT, CT = pi/2 (J + l) l, (P,) [deg].
+def inflow_angle_deg(J: Array, CT: Array) -> Array:
+    """Angle of the flow at 0.75 R to the disk, with the induction of CT, CT = pi/2 (J + l) l, (..., P) [deg].
 
     Thrust below zero induces none here: what is asked for is a place on the section's polar, no load.
     """
-    induced = -0.5 * J + np.sqrt(0.25 * J**2 + 2.0 / math.pi * np.maximum(np.nan_to_num(CT), 0.0))
-    induced = np.where(J >= 0.0, induced, np.sqrt(2.0 / math.pi * np.maximum(np.nan_to_num(CT), 0.0)))
-    return np.asarray(beta75_deg - np.degrees(np.arctan((J + induced) / (0.75 * math.pi))))
+    lifted = 2.0 / math.pi * np.maximum(np.nan_to_num(CT), 0.0)
+    induced = np.where(J >= 0.0, -0.5 * J + np.sqrt(0.25 * J**2 + lifted), np.sqrt(lifted))
+    return np.asarray(np.degrees(np.arctan((J + induced) / (0.75 * math.pi))))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.rotors.conditioning import tangents
-from bemt.rotors.latents import NAMES, Prior, Sensed, angle_of_attack_deg
+from bemt.rotors.latents import NAMES, Prior, Sensed, inflow_angle_deg
 from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun
@@ -93,7 +93,7 @@ def sense(
     top = solve(z, rpm, np.zeros_like(J), points)
     slopes = tangents(lambda at: solve(at, rpm, J, points).reshape(-1), z)
     T = slopes.reshape(2, rpm.size, -1).transpose(0, 2, 1)
-    alpha = angle_of_attack_deg(beta75_deg + z[NAMES.index("angle_deg")], J, f[0])
+    alpha = beta75_deg + z[NAMES.index("angle_deg")] - inflow_angle_deg(J, f[0])
     return Sensed(diameter_m, J, alpha, Re, f, top, T)
 
 
