@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import readers
-from bemt.base.averaging import Mean, keep_last, relation, revolution_average, steady_average
+from bemt.base.averaging import MIN_ROWS, Mean, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.dataset import Dataset
@@ -27,7 +27,19 @@ from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
 from bemt.recordings.cfd_setup import with_grid_floor
 from bemt.recordings.grid_study import COVERAGE
 
-__all__ = ["DUCT", "PROGRAMS", "assemble", "cfd_files", "document", "is_run", "run_at", "run_text", "settled"]
+__all__ = [
+    "DUCT",
+    "FIELDS",
+    "NO_LOAD",
+    "PROGRAMS",
+    "assemble",
+    "cfd_files",
+    "document",
+    "is_run",
+    "run_at",
+    "run_text",
+    "settled",
+]
 
 Array = NDArray[np.float64]
 PROGRAMS: Mapping[str, str] = {
@@ -36,6 +48,9 @@ PROGRAMS: Mapping[str, str] = {
     "star_monitor": "STAR-CCM+", "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
 }  # fmt: skip
 """Program by reader."""
+FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
+"""Readers whose files may hold values at points, and no loads."""
+NO_LOAD = "a thrust or a torque"
 MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
@@ -58,7 +73,7 @@ _WORDS: dict[str, str] = {
     "density": r"density|^rho\b|^rho_kg",
 }
 """Heading of a quantity."""
-_NOT = re.compile(r"coeff|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
+_NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
 
 
@@ -252,10 +267,18 @@ def settled(
 ) -> _Settled | str:
     """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
     clock = record.provenance.get("clock")
+    coarse = ""
     if clock == "time":
         time = record[record.provenance["time_channel"]]
         index, _ = keep_last(time)
         index = index[time[index] <= end * (1.0 + 1e-9)]
+        step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
+        if step > period / MIN_ROWS:
+            clock, coarse = (
+                "iteration",
+                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
+            )
+    if clock == "time":
         found = revolution_average(time[index], values[index], period, revolutions)
         if found.mean is None:
             return found.problem
@@ -271,13 +294,19 @@ def settled(
         if found.mean is None:
             return found.problem
         part = values[values.size - found.rows :]
-        over = f"last {found.rows} of {values.size} rows"
+        over = f"last {found.rows} of {values.size} rows{coarse}"
         return _Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
     mean = record.provenance.get("means", {})
     over = "as in the file"
     if values.size > 1 and mean and record.provenance["format"] == "fluent_transcript":
         values, over = values[np.isfinite(values)][-1:], "the last one computed"
     return _Settled(np.array(values, dtype=float), math.nan, 0.0, over)
+
+
+def _recorded(found: list[_Found]) -> list[_Found]:
+    """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
+    written = [c for c in found if c.record.provenance["format"] != "fluent_transcript"]
+    return written or found
 
 
 @dataclass
@@ -325,7 +354,7 @@ class _Run:
                 fits = c.part == part or re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
             if fits:
                 out.append(c)
-        return out
+        return _recorded(out)
 
     def si(self, quantity: str, c: _Found) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
@@ -428,7 +457,7 @@ def _axis(run: _Run, forces: Sequence[_Found], moments: Sequence[_Found]) -> str
 def _pool(run: _Run, quantity: str) -> dict[str, _Found]:
     """Columns of a load by their zone."""
     part = {"thrust": "force", "torque": "moment"}.get(quantity, "")
-    vectors = {p: [c for c in run.columns if c.part == p and c.axis] for p in ("force", "moment")}
+    vectors = {p: _recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
     found = run.named(quantity)
     if not found and part and vectors[part] and run.fact(quantity).column is None:
         zones = run.run.run.zones
@@ -567,11 +596,24 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     return _dataset(run, name, work, values, u, about, read)
 
 
+def _nothing(work: _Run) -> None:
+    """Say that no column is a load, unless a fault says already what one needs."""
+    if any(f.where != "rpm" for f in work.faults):
+        return
+    known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
+    first = next((c.name for c in work.columns if not c.unit), "NAME")
+    hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
+    work.faults.append(Fault(work.name, "", f"columns {known}", NO_LOAD, hint))
+
+
 def _ask_all(work: _Run) -> None:
     """Say with a missing speed which units are missing too."""
-    for quantity in ("thrust", "torque"):
-        for c in list(_pool(work, quantity).values())[:1]:
+    pools = {quantity: _pool(work, quantity) for quantity in ("thrust", "torque")}
+    for quantity, pool in pools.items():
+        for c in list(pool.values())[:1]:
             work.si(quantity, c)
+    if not any(pools.values()):
+        _nothing(work)
 
 
 def _applied(
@@ -631,11 +673,8 @@ def _applied(
         work.notes.append(f"one of {sector} sectors: loads times {sector}; holds for axisymmetric flow")
     if not {"thrust_N", "torque_Nm"} & values.keys():
         _coefficients(work, values, u, over)
-    if len(values) <= 3 and not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys() and not work.faults:
-        known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
-        first = next((c.name for c in work.columns if not c.unit), "NAME")
-        hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
-        work.faults.append(Fault(work.name, "", f"columns {known}", "a thrust or a torque", hint))
+    if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
+        _nothing(work)
     return values, u, {"averaged": over, "drift": drift}
 
 

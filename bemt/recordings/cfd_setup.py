@@ -97,11 +97,11 @@ def one_grid(run: Dataset) -> tuple[Dataset, dict[str, dict[str, float]]]:
 def floor_note(some_fly: bool, all_fly: bool) -> str:
     """What a run without a grid study is told."""
     states = [s for s, wanted in (("rest", not all_fly), ("flight", some_fly)) if wanted]
-    words = "; ".join(f"in {s}" if s == "flight" else "at rest" for s in states)
+    words = {"rest": "at rest", "flight": "in flight"}
     sizes = "; ".join(
-        f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%}" for s in states
+        f"thrust {GRID_FLOOR[s]['thrust_N']:.1%}, torque {GRID_FLOOR[s]['torque_Nm']:.1%} {words[s]}" for s in states
     )
-    return f"no grid study: at least {sizes} ({words}; {GRID_FLOOR_SOURCE})"
+    return f"no grid study: at least {sizes} ({GRID_FLOOR_SOURCE})"
 
 
 def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:

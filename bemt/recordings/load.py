@@ -237,7 +237,10 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
     except Exception as error:
         if insist:
             raise
-        return runs, str(error) if isinstance(error, InputError) else None  # the file's own entry says the other
+        if not isinstance(error, InputError):  # the file's own entry says it
+            return runs, None
+        fields = {importers.detect(e) for e in exports} <= cfd_run.FIELDS  # values at points are no run
+        return runs, None if fields and any(f.expected == cfd_run.NO_LOAD for f in error.faults) else str(error)
 
 
 def _refusal(error: Exception) -> str:
