@@ -108,7 +108,7 @@ class Propeller:
         Examples
         --------
         >>> propeller("10x5").unknowns["blade.max_chord_over_R"]
-        '0.14 .. 0.29'
+        '0.15 .. 0.26'
         """
         return {item.key: item.range_text for item in self.case.assumptions}
 
