@@ -335,7 +335,9 @@ def test_a_reference_that_the_run_agrees_with_is_the_first_word() -> None:
     values = {**series.values, "torque_Nm": 1.3 * series["torque_Nm"]}
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made, replace(made, reference=True)], [case()], nulls=20)
-    assert document.headline(answer).startswith("No cause: the recording differs from the reference by no more than")
+    first = document.headline(answer)
+    assert first.startswith("No cause: the recording differs from the reference") and "no more than runs do" in first
+    assert "thrust by" in first and "torque by" in first, "the figure stands beside it"
 
 
 def test_a_file_that_cannot_be_right_is_the_first_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -382,7 +384,7 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made], [case()], nulls=20)
     assert answer.decision.verdict in ("unknown", "insufficient")
-    first, second = document.explanation(answer)[1:3]
+    first, second = [line for line in document.explanation(answer) if not line.startswith("Model: ")][1:3]
     word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]
     told = re.match(rf"{word} is high by (\d+\.\d)% .* at tip Mach number (\d\.\d+) to (\d\.\d+)\.$", first)
     assert told is not None, first

@@ -93,13 +93,13 @@ def load(
         made = records.from_series(_points(imported, rows, path), case)
     else:
         points = reduce(imported, diameter_m=case.diameter_m)
-        shared = reduction(points).correlated
+        correlated = reduction(points).correlated
         if reduction(points).mode == "points" and imported.provenance["format"] == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
-        made = records.from_series(_turned(points) if hand else points, case, shared)
+        made = records.from_series(_turned(points) if hand else points, case, correlated)
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
