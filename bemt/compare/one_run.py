@@ -266,7 +266,7 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
         lines.append(f"  ... {len(document['points']) - len(shown)} more points (--details)")
     first = next(iter(document["points"][0]["loads"].values()))
     parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first["u_bemt_by"].items())
-    lines.append(f'  ± one standard uncertainty; BEMT\'s, first line: {parts}; "in u": over both bands together')
+    lines.append(f"  ±: one standard uncertainty; BEMT's in line 1: {parts}; in u: over both bands")
     for over in dict.fromkeys(document["averaged"].values()):
         lines.append(f"  averaged: {', '.join(k for k, v in document['averaged'].items() if v == over)}: {over}")
     if document["audit"]:

@@ -74,8 +74,8 @@ def load(
         _one_setup(imported, path)
         one_rotor(imported, path, "`compare A B --rows-b rotor={} --case CASE` takes one of them")
     if is_run(imported):
-        points, shared = one_grid(imported)
-        made = records.from_series(points, case, shared)
+        run, gains = one_grid(imported)
+        made = records.from_series(run, case, gains)
         return replace(made, notes=(*made.notes, *imported.notes))
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
