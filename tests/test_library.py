@@ -74,7 +74,7 @@ def test_a_curve_is_every_speed_with_every_advance_ratio() -> None:
         (lambda: bemt.propeller("10x5").solve(float("nan")), "finite"),
         (lambda: bemt.load("no/such/case"), "no/such/case"),
         (lambda: bemt.read("no/such/log.csv"), "no/such/log.csv"),
-        (lambda: bemt.drive("10x5", kv=1000, cells=3, mass_kg=1500), "Divide by 1000"),
+        (lambda: bemt.drive("10x5", kv=1000, cells=3, mass_kg=1500), "Write 1.5"),
         (lambda: bemt.diagnose("x.csv", "10x5", only=["tip_los"]), "Did you mean tip_loss"),
     ],
 )

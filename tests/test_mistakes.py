@@ -77,7 +77,7 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
                      ("thrust_N", "gram-force")),
     "empty file": (lambda put: ["import", put("e.csv", "")], 2, ("e.csv", "an empty file", "export")),
     "a unit of mass for a thrust": (lambda put: ["import", put("u.csv", "rpm,thrust_lb\n4000,1\n6000,2\n")], 0,
-                                    ("thrust_lb", "write lbf")),
+                                    ("thrust_lb", "pound-force")),
     "negative rpm": (lambda put: ["estimate", "8x5", "--rpm", "-5000"], 2, ("-5000", "rpm")),
     "unicode path": (lambda put: ["import", put("Mess ø/Prüf ü.csv", TABLE)], 0, ("Prüf ü.csv", "thrust_N")),
     "file for a folder": (lambda put: ["sweep", "mine", "--out", put("f", "x")], 2, ("--out", "a folder")),

@@ -389,7 +389,8 @@ def test_export_command_writes_a_case_beside_other_formats(project: Path, tmp_pa
     assert parse((out / "0.orig" / "U").read_text())["boundaryField"]["inlet"]["type"] == "fixedValue"
     assert main(["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "q"), "--format", "stl", "openfoam",
                  "--sector", "blade"]) == 2  # fmt: skip
-    assert not (tmp_path / "q").exists()
+    # one refused target refuses no other, and leaves nothing of its own
+    assert (tmp_path / "q" / "prop_8x5.stl").is_file() and not (tmp_path / "q" / "Allrun").exists()
 
 
 def test_oblique_wind_blows_from_ahead_and_aside() -> None:
