@@ -791,7 +791,7 @@ def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
         load(file, case)
     (fault,) = caught.value.faults
     assert fault.file == file and fault.where == f"column {heading}" and fault.got.startswith(words)
-    if surely_shaft_speed(heading):  # ten readings of the speed, whose unit alone is missing
+    if words == "a speed without a unit" and surely_shaft_speed(heading):  # ten readings that lack their unit alone
         with pytest.raises(InputError, match="one source of the speed"):
             load(file, case, rpm=6000.0)
     else:
