@@ -450,6 +450,7 @@ def test_every_imported_library_is_declared(project: Path) -> None:
         "psutil": "dask",
         "requests": "pooch",
         "pydantic_core": "pydantic",
+        "python_calamine": "python-calamine",  # its name when it is imported
     }
     assert set(comes_with.values()) <= declared
     ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}

@@ -17,8 +17,8 @@ from bemt.readers._split import decimal_mark, find_delimiter, split_line, split_
 Array = NDArray[np.float64]
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
-WIDEST = 0.6
-"""Largest chord over the tip radius that a blade has: wide paddles of ducted fans reach half of it [1]."""
+WIDEST = 0.8
+"""Largest chord over the tip radius that a blade has: that of the Kaplan propeller Ka 4-70 is 0.78 [1]."""
 _NAMES = {
     "r": r"r|radius|radial position|station|x",
     "chord": r"c|chord|chord length|width|blade width",

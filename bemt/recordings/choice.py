@@ -21,6 +21,7 @@ class Choice:
 def averaged(record: Dataset, period: float, revolutions: int | None = None) -> Dataset:
     """Replace the means of a history by those over its last whole revolutions.
 
+    >>> import numpy as np
     >>> t = np.arange(1, 401) * 0.01
     >>> r = Dataset("cfd", "x", {"time_s": t, "q": 2 + np.sin(2 * np.pi * t)}, units={"q": ""},
     ...             provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
