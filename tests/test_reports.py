@@ -35,12 +35,13 @@ def test_committed_sweep_is_what_the_cases_give(
                     assert a[key] == pytest.approx(b[key], rel=5 * TOLERANCE if key == "u" else TOLERANCE), key
 
 
-# UIUC volume 1 is what the rule was calibrated on, volume 2 what it is reported on. The bounds are what it reaches: the
-# targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT) are met on volume 1 at rest, missed on volume 2; see
-# reports/validation.
+# Both volumes are in the population; families left out whole are in reports/validation/left_out. The bounds are what
+# the solver reaches: of the targets of 6 % (CT), 10 % (CP) and 20 % (90th percentile of CT), volume 1 in flight misses
+# the first and volume 2 in flight the last. Families weigh alike, so volume 1 (half APC) lost half a point and volume 2
+# won two.
 @pytest.mark.parametrize(
     ("volume", "static", "forward"),
-    [(1, (0.040, 0.115, 0.055), (0.075, 0.25, 0.060)), (2, (0.085, 0.30, 0.125), (0.105, 0.42, 0.135))],
+    [(1, (0.045, 0.115, 0.060), (0.070, 0.20, 0.067)), (2, (0.065, 0.20, 0.085), (0.065, 0.25, 0.080))],
 )
 def test_committed_validation_is_what_the_data_give_and_within_its_bounds(
     project: Path, shared_data: Path, volume: int, static: tuple[float, ...], forward: tuple[float, ...]
