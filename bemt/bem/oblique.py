@@ -17,7 +17,7 @@ Helicopter Theory, sec. 4-1.1), with m the axial mass flow: abs(w), or in the tu
 the curve of :func:`bemt.bem.residual.mass_flow` (Buhl 2005).  Without in-plane wind that is the axial annulus.
 
 Prandtl's factor is that of the mean flow; where a blade meets more wind from the side than from its own rotation there
-are no helices, and 1 - F fades as 1 / (1 + (V_y / UT)^4) (own choice).
+are no helices, and 1 - F fades as 1 / (1 + (V_y / W)^4) (own choice).
 
 Gradient: K = 15 pi/32 tan(chi/2) (Pitt and Peters 1981, Vertica 5:21, in the form of Moriarty and Hansen 2005, AeroDyn
 Theory Manual, NREL/EL-500-36881, skewed wake correction; equation numbers not checked), per annulus, with
@@ -101,7 +101,7 @@ def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g,
     Ft, _ = loss(tip * root)
     Fh, _ = loss(hub * root)
     F = (Ft if Ft > 1e-6 else 1e-6) * (Fh if Fh > 1e-6 else 1e-6)
-    t = Vy / (UT if UT > 1e-9 else 1e-9)
+    t = Vy / W0
     t *= t
     t *= t
     F = 1.0 - (1.0 - F) / (1.0 + t)
