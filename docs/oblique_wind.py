@@ -43,6 +43,8 @@ def main() -> None:
     left.set_title(f"Thrust per area, wind 60 deg from the shaft\n{RPM:g} rev/min, {SPEED:g} m/s")
     left.set_xticks(np.radians([0, 90, 180, 270]), ["downstream", "advancing", "upstream", "retreating"])
     left.set_yticks([])
+    left.grid(False)
+    left.tick_params(axis="x", pad=12)
     fig.colorbar(drawn, ax=left, label="N/m2", shrink=0.8)
     angle = np.linspace(0.0, 180.0, 37)
     for speed, color in ((5.0, "C0"), (10.0, "C1")):
@@ -54,9 +56,9 @@ def main() -> None:
             rows = measured(folder, at)
             rows = rows[rows[:, 1] == speed]
             at_rpm = np.interp(RPM, rows[:, 0], rows[:, 2])
-            right.plot(at, at_rpm, "o", color=color, mec="k", label="measured" if at == 0 else None)
+            right.plot(at, at_rpm, "o", color=color, mec="k", label=f"measured, {speed:g} m/s" if at == 0 else None)
     right.set(xlabel="angle between wind and shaft [deg]", ylabel="thrust [N]", xlim=(0, 180))
-    right.set_title(f"APC 8x4.5MR at {RPM:g} rev/min, band: one standard deviation")
+    right.set_title(f"APC 8x4.5MR, {RPM:g} rev/min; band: 1 standard deviation")
     right.legend(fontsize=8)
     fig.savefig(HERE / "img" / "oblique.png", dpi=110)
 

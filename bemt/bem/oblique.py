@@ -72,12 +72,12 @@ Array = NDArray[np.float64]
 
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE = range(6)
 AZIMUTHS = 16
-"""Stations round the azimuth [1]."""
+"""Stations round the azimuth where loads are integrated; annuli are balanced at every second one [1]."""
 H_FORCE, Y_FORCE, ROLL, PITCH = range(4)
 """Columns of the hub loads: H downstream, Y to the advancing side [N]; roll lifts the advancing side, pitch the
 upstream side [N m]."""
 PITT_PETERS = 15.0 * math.pi / 32.0
-_TOL = 1e-10
+_TOL = 1e-7  # the last secant step [rad]
 _MAX = 120
 
 
@@ -182,15 +182,15 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
             new = 0.5 * (lo + hi)
             step = new - phi
         last = abs(step)
+        phi = new
         if last < _TOL:
             status = OK if abs(res) < 1e-5 * (UT + abs(UP) + Vy) else JUMP
             break
-        phi = new
     return phi, status
 
 
 @inlined
-def _point(lookup, point, st, tab, par, cs, sn, R, out, hub, disk):
+def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
     """Solve every annulus of one operating point and integrate over blade and azimuth."""
     wide()
     fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12])
@@ -201,6 +201,7 @@ def _point(lookup, point, st, tab, par, cs, sn, R, out, hub, disk):
     stride = par[o + 14]
     B = par[o + 15]
     n = cs.shape[0]
+    few = few_cs.shape[0]
     log_rho_mu = math.log(point[P_RHO] / point[P_MU])
     Vy = point[P_SIDE]
     out[:] = 0.0
@@ -216,7 +217,7 @@ def _point(lookup, point, st, tab, par, cs, sn, R, out, hub, disk):
         phi = atan2(UP, UT)
         status = OK
         if st[i, S_SIGMA] > 0.0:
-            phi, status = _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n)
+            phi, status = _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, few_cs, few_sn, few)
         if status != OK:
             if status > out[O_STATUS]:
                 out[O_STATUS] = status
@@ -224,7 +225,7 @@ def _point(lookup, point, st, tab, par, cs, sn, R, out, hub, disk):
             continue
         _, q, W, FM, s, c, grad, _, F, zone = _annulus(
             lookup, phi, UT, UP, Vy, x, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
-            tab, g, fx, cs, sn, n,
+            tab, g, fx, few_cs, few_sn, few,
         )  # fmt: skip
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
         out[O_BRIDGED] += 1.0 if (zone and Vy < abs(UP)) else 0.0
@@ -254,19 +255,21 @@ def _entries(stamp: int) -> dict[str, Any]:
     """Entry points; a closure over ``stamp`` renews numba's cache when functions of other files change."""
 
     @njit
-    def plain(points, st, tab, par, cs, sn, R, out, hub, disk):
+    def plain(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_plain, points[p], st, tab, par, cs, sn, R, out[p], hub[p], disk[p])
+            _point(residual.lookup_plain, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p])
 
     @njit
-    def full(points, st, tab, par, cs, sn, R, out, hub, disk):
+    def full(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_full, points[p], st, tab, par, cs, sn, R, out[p], hub[p], disk[p])
+            _point(residual.lookup_full, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p])
 
     @njit
-    def factored(points, st, tab, par, cs, sn, R, out, hub, disk):
+    def factored(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
         for p in range(points.shape[0] if stamp >= 0 else 0):
-            _point(residual.lookup_factored, points[p], st, tab, par, cs, sn, R, out[p], hub[p], disk[p])
+            _point(
+                residual.lookup_factored, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p]
+            )
 
     return {"plain": plain, "full": full, "factored": factored}
 
@@ -283,9 +286,10 @@ def run(
     layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, n: int = AZIMUTHS, disk: bool = False
 ) -> tuple[Array, Array, Array]:
     """Solve points (P, 6): columns of the kernel's (P, N_OUT), hub loads (P, 4), disk loading (P, N, n) [N/m2]."""
-    psi = azimuths(n)
+    psi, few = azimuths(n), azimuths(n // 2)
     out = np.empty((points.shape[0], K.N_OUT))
     hub = np.empty((points.shape[0], 4))
     maps = np.zeros((points.shape[0], st.shape[0] if disk else 0, n))
-    _ENTRIES[layout](np.ascontiguousarray(points), st, tab, par, np.cos(psi), np.sin(psi), R, out, hub, maps)
+    rounds = np.cos(psi), np.sin(psi), np.cos(few), np.sin(few)
+    _ENTRIES[layout](np.ascontiguousarray(points), st, tab, par, *rounds, R, out, hub, maps)
     return out, hub, maps
