@@ -149,7 +149,7 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
     k = sg4 * st[i, S_CLA]
     lift = beta - phi_in - st[i, S_ALPHA0]
     i_U = 1.0 / math.sqrt(UT * UT + UP * UP)
-    flow = math.sqrt(UP * UP + Vy * Vy) * i_U * (1.0 if UP >= 0.0 else -1.0)
+    flow = math.sqrt(UP * UP + Vy * Vy) * i_U * (1.0 if UP >= -Vy else -1.0)
     brake = lift < 0.0 and UP > 0.0
     b = k - flow if (lift < 0.0 and not brake) else k + flow
     e = 4.0 * abs(UT) * i_U * k * abs(lift)
@@ -157,8 +157,11 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
     psi = 2.0 * k * lift / (b + math.sqrt(disc if disc > 0.0 else 0.0) + 1e-12)
     psi = min(max(psi, -1.5), 1.5)
     middle = phi_in if fx[N_SWIRL] > 0.0 else 0.0
-    lo = middle - 0.5 * math.pi
-    hi = middle + 0.5 * math.pi
+    # towards W0 = 0 the load of the wind from the side, over W0^2, outgrows the momentum: no root belongs there
+    low = 3.0 * sg4 * Vy * i_U
+    half = math.acos(low if low < 0.7 else 0.7)
+    lo = middle - half
+    hi = middle + half
     phi = min(max(phi_in + psi, lo + 0.01), hi - 0.01)
     last = math.pi
     before = 0.0
