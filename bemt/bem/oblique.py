@@ -149,7 +149,7 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
     k = sg4 * st[i, S_CLA]
     lift = beta - phi_in - st[i, S_ALPHA0]
     i_U = 1.0 / math.sqrt(UT * UT + UP * UP)
-    flow = math.sqrt(UP * UP + Vy * Vy) * i_U * (1.0 if UP >= -Vy else -1.0)
+    flow = math.sqrt(UP * UP + Vy * Vy) * i_U * (1.0 if UP >= 0.0 else -1.0)
     brake = lift < 0.0 and UP > 0.0
     b = k - flow if (lift < 0.0 and not brake) else k + flow
     e = 4.0 * abs(UT) * i_U * k * abs(lift)
