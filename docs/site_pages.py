@@ -37,7 +37,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
     "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
-    "Theory": ("theory.md", "effects.md", "diagnosis.md"),
+    "Theory": ("theory.md", "oblique.md", "effects.md", "diagnosis.md"),
     "Project": ("reports/README.md", "reports/report.md", "CONTRIBUTING.md", "CHANGELOG.md"),
 }
 

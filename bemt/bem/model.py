@@ -45,6 +45,9 @@ _SLOWEST, _FASTEST = 0.4, 1.5
 # More points than these are not looked at one by one.
 _MANY = 64
 
+HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
+"""Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.bem.solver.Solution.hub`."""
+
 
 PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made.tab.nbytes)
 """Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to half a gigabyte."""
@@ -185,31 +188,42 @@ class Model:
             level=level, re_range=self.re_range,
         ))  # fmt: skip
 
-    def solve(self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1) -> Dataset:
-        """Solve operating points."""
+    def solve(
+        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0
+    ) -> Dataset:
+        """Solve operating points; ``V`` [m/s] along the shaft, ``side`` [m/s] in the plane of the disk.
+
+        With any ``side``, the airspeed of the result (and J) is that of the wind, ``sideslip_rad`` its angle to the
+        shaft, and the loads of the hub are added: ``H_force_N`` downstream, ``Y_force_N`` to the advancing side,
+        ``roll_moment_Nm`` lifting the advancing side, ``pitch_moment_Nm`` lifting the upstream side.
+        """
         air = Air.from_density() if air is None else air
-        s = solver.solve(self.prep, rpm, V, air, threads=threads)
+        s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side)
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
         T, Q, T_duct, T_rotor, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.flags
         if self._on_points:
             base = self.prepared([e for e in self.effects if not acts_on_points(e)])
-            loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air))
+            loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air, side=s.side))
             ok = ok & s.converged
             T, Q, T_duct = (np.where(ok, v, np.nan) for v in (loads.T, loads.Q, loads.T_duct))
             T_rotor = T - s.T_stator - T_duct
             more = ((), ("unconverged with the effects that act on points",))
             flags = tuple((*f, *more[int(not good)]) for f, good in zip(s.flags, ok, strict=True))
-        CT, CQ, J = co.CT(T, rho, n, D), co.CQ(Q, rho, n, D), s.J
+        wind = s.V if s.side is None else np.hypot(s.V, s.side)
+        CT, CQ, J = co.CT(T, rho, n, D), co.CQ(Q, rho, n, D), s.J if s.side is None else wind / (n * D)
         CP = 2.0 * np.pi * np.asarray(CQ)
         share = np.divide(T_duct, T, out=np.full_like(T, np.nan), where=T != 0.0)
         values = {
-            "rpm": s.rpm, "airspeed_m_s": s.V, "density_kg_m3": rho, "thrust_N": T, "torque_Nm": Q,
+            "rpm": s.rpm, "airspeed_m_s": wind, "density_kg_m3": rho, "thrust_N": T, "torque_Nm": Q,
             "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(J, CT, CP),
-            "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, s.V, rho, mu),
+            "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, wind, rho, mu),
             "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
             "exhaust_speed_m_s": s.V_exit, "mass_flow_kg_s": s.mass_flow, "duct_share": share,
         }  # fmt: skip
+        if s.side is not None and s.hub is not None:
+            values["sideslip_rad"] = np.arctan2(s.side, s.V)
+            values |= {key: s.hub[:, i] for i, key in enumerate(HUB_LOADS)}
         provenance = {"source": "bemt", "effects": self._texts, "stations": self.n_stations}
         name = self.rotor.name or "rotor"
         return Dataset("bemt", name, values, flags=flags, provenance=provenance, notes=self.notes)
@@ -272,12 +286,12 @@ def only_reads(effect: Effect) -> bool:
 
 def _solve(prep: solver.Prepared, flow: Flow) -> solver.Solution:
     air = cast("Air", SimpleNamespace(rho=flow.rho, mu=flow.mu, a_sound=flow.a_sound))
-    return solver.solve(prep, flow.rpm, flow.V, air)
+    return solver.solve(prep, flow.rpm, flow.V, air, side=0.0 if flow.side is None else flow.side)
 
 
 def flow_of(
     prep: solver.Prepared, rpm: ArrayLike, V: ArrayLike, air: Any, extra: Mapping[str, Array] | None = None,
-    chord: float | None = None,
+    chord: float | None = None, side: Array | None = None,
 ) -> Flow:  # fmt: skip
     """Conditions at points with the baseline's loads there; speeds [rev/min], [m/s], chord at 0.75 R [m]."""
     arrays = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
@@ -286,7 +300,7 @@ def flow_of(
     flow = Flow(
         rpm_, V_, rho, mu, a_sound, rotor.R, rotor.Rhub,
         float(rotor.blade.at(0.75 * rotor.R)[0]) if chord is None else chord, rotor.B, prep.duct is not None,
-        np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), dict(extra or {}),
+        np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), np.zeros_like(rpm_), dict(extra or {}), side,
     )  # fmt: skip
     base = _solve(prep, flow)
     step = _SPEED_STEP * flow.omega * flow.R

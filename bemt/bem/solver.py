@@ -148,6 +148,13 @@ class Solution:
         Words per point: reasons of failure, turbulent states, Mach number above the tables.
     radial : dict of (P, N) float, empty unless asked for
         r, phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, a, ap, Re, M.
+    side : (P,) float or None
+        In-plane onset speed [m/s], if any was given.
+    hub : (P, 4) float or None
+        In-plane forces H (downstream), Y (to the advancing side) [N], roll moment (lifts the advancing side) and pitch
+        moment (lifts the upstream side) [N m]; given with `side`.
+    disk : (P, N, azimuths) float or None
+        Thrust per area over blade and azimuth, if asked for with `radial` [N/m2]; 0 where `side` is 0.
     """
 
     rpm: Array
@@ -167,6 +174,9 @@ class Solution:
     converged: NDArray[np.bool_]
     flags: tuple[tuple[str, ...], ...]
     radial: dict[str, Array] = field(default_factory=dict)
+    side: Array | None = None
+    hub: Array | None = None
+    disk: Array | None = None
 
 
 def prepare(
@@ -328,6 +338,7 @@ def solve(
     *,
     radial: bool = False,
     threads: int = 1,
+    side: ArrayLike = 0.0,
 ) -> Solution:
     """Solve operating points.
 
@@ -343,6 +354,8 @@ def solve(
         Keep the radial distributions.
     threads : int
         The batch is cut into so many threads; the answer does not depend on it [1].
+    side : array_like
+        In-plane onset speed [m/s]; points that have some are solved by :mod:`bemt.bem.oblique`, open rotors only.
 
     Returns
     -------
@@ -365,15 +378,14 @@ def solve(
     (True, True)
     """
     air = Air.from_density() if air is None else air
+    if np.any(side):
+        return _solve_oblique(prep, rpm, V, air, side, radial)
     fields = [np.asarray(v, dtype=float) for v in (rpm, V, air.rho, air.mu, air.a_sound)]
     points = np.empty((*np.broadcast_shapes(*(f.shape for f in fields)), K.N_POINT))
     for i, values in enumerate(fields):
         points[..., i] = values
     points = points.reshape(-1, K.N_POINT)
-    if not (np.all(np.isfinite(points[:, 0])) and np.all(points[:, 0] > 0)):
-        raise ValueError("rpm: got a value that is not finite and positive; expected rev/min > 0")
-    if not (np.all(np.isfinite(points)) and np.all(points[:, 2:] > 0)):
-        raise ValueError("airspeed or air: got a value that is not finite or not positive")
+    _check(points)
     rpm_ = points[:, K.P_OMEGA].copy()
     points[:, K.P_OMEGA] *= _RAD_PER_RPM
     n = points.shape[0]
@@ -391,6 +403,43 @@ def solve(
     else:
         entry(points, *constant, out, rad)
     return _collect(prep, rpm_, points, out, rad)
+
+
+def _check(points: Array) -> None:
+    """Refuse speeds and air that no rotor runs in."""
+    if not (np.all(np.isfinite(points[:, 0])) and np.all(points[:, 0] > 0)):
+        raise ValueError("rpm: got a value that is not finite and positive; expected rev/min > 0")
+    if not (np.all(np.isfinite(points)) and np.all(points[:, 2 : K.N_POINT] > 0)):
+        raise ValueError("airspeed or air: got a value that is not finite or not positive")
+
+
+def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side: ArrayLike, radial: bool) -> Solution:
+    """Points of which some have in-plane wind: the others go through the axial kernel."""
+    from bemt.bem import oblique
+
+    if prep.duct is not None:
+        raise ValueError("side: got in-plane wind on a ducted rotor; expected an open rotor")
+    fields = np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, V, air.rho, air.mu, air.a_sound, side)))
+    points = np.stack([f.reshape(-1) for f in fields], axis=1)
+    if not np.all(np.isfinite(points[:, oblique.P_SIDE]) & (points[:, oblique.P_SIDE] >= 0.0)):
+        raise ValueError("side: got a value that is not finite or is negative; expected m/s >= 0")
+    _check(points)
+    n, skew = points.shape[0], points[:, oblique.P_SIDE] > 0.0
+    rpm_ = points[:, 0].copy()
+    points[:, K.P_OMEGA] *= _RAD_PER_RPM
+    entry, st, tab, par = prep.kernel
+    out, rad = np.empty((n, K.N_OUT)), np.empty((n, 0, K.N_RADIAL))
+    out[skew], hub_, disk_ = oblique.run(prep.layout, points[skew], st, tab, par, prep.rotor.R, disk=radial)
+    if not np.all(skew):
+        rest = np.ascontiguousarray(points[~skew, : K.N_POINT])
+        part = np.empty((rest.shape[0], K.N_OUT))
+        entry(rest, st, tab, par, part, np.empty((rest.shape[0], 0, K.N_RADIAL)))
+        out[~skew] = part
+    hub, disk = np.zeros((n, hub_.shape[1])), np.zeros((n, *disk_.shape[1:]))
+    hub[skew], disk[skew] = hub_, disk_
+    found = _collect(prep, rpm_, points, out, rad)
+    hub = np.where(found.converged[:, None], hub, np.nan)
+    return replace(found, side=points[:, oblique.P_SIDE].copy(), hub=hub, disk=disk if radial else None)
 
 
 def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) -> Solution:
@@ -421,7 +470,10 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
 def _flags(prep: Prepared, points: Array, out: Array, ok: NDArray[np.bool_]) -> tuple[tuple[str, ...], ...]:
     """Words per point: one set for each combination that occurs, so that a large batch costs no loop over points."""
     n = out.shape[0]
-    mach = np.hypot(points[:, K.P_OMEGA] * prep.rotor.R, points[:, K.P_V]) / points[:, K.P_SOUND]
+    tip = points[:, K.P_OMEGA] * prep.rotor.R
+    if points.shape[1] > K.N_POINT:
+        tip = tip + points[:, K.N_POINT]  # of the advancing blade
+    mach = np.hypot(tip, points[:, K.P_V]) / points[:, K.P_SOUND]
     behind = points[:, K.P_V] < 0.0
     # the columns of the words, each a small whole number
     status = np.where(ok | (out[:, K.O_STATUS] > 0), out[:, K.O_STATUS], K.NOT_FINITE)

@@ -32,8 +32,13 @@ _UNEVEN = 1.6  # largest over smallest band around a cell that is interpolated
 _POWERS = {"thrust_N": 2, "torque_Nm": 2, "power_W": 3, "exhaust_speed_m_s": 1}  # of the speed that bands grow with
 
 
-def solve(case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool = True) -> Dataset:
-    """Solve points [rev/min], [m/s], (P,), in one air [kg/m3], with bands and flags."""
+def solve(
+    case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool = True,
+    angle_deg: Array | float = 0.0,
+) -> Dataset:  # fmt: skip
+    """Solve points [rev/min], [m/s], [deg] between wind and shaft, (P,), in one air [kg/m3], with bands and flags."""
+    if np.any(angle_deg):
+        return propagate(case, rpm, airspeed_m_s, density_kg_m3, angle_deg=angle_deg, bands=bands).points
     own = any(item.key.startswith("operating.") for item in case.assumptions)
     if not bands or own or rpm.size <= FEW:
         return propagate(case, rpm, airspeed_m_s, density_kg_m3, bands=bands).points

@@ -39,6 +39,8 @@ Progress = Callable[[int, int, str], None]
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
 """Channels that get a band."""
 
+_UNMEASURED = "oblique flow: the model's own error is that of axial flow at the speed along the shaft"
+
 
 @dataclass(frozen=True, eq=False)
 class Points:
@@ -48,17 +50,29 @@ class Points:
     rpm: Array  # [rev/min]
     airspeed_m_s: Array  # [m/s]
     density_kg_m3: Array  # [kg/m3]
+    angle_deg: Array  # Between wind and shaft [deg]
 
     @staticmethod
     def of(
         case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
-        density_kg_m3: ArrayLike | None = None,
+        density_kg_m3: ArrayLike | None = None, angle_deg: ArrayLike = 0.0,
     ) -> Points:  # fmt: skip
         """Points that broadcast together; what is not given is the case's own."""
         own = (case.rpm, case.airspeed_m_s, case.air().rho)
         given = (own[i] if v is None else v for i, v in enumerate((rpm, airspeed_m_s, density_kg_m3)))
-        n, V, rho = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
-        return Points(case, n.ravel(), V.ravel(), rho.ravel())
+        n, V, rho, angle = np.broadcast_arrays(
+            *(np.atleast_1d(np.asarray(v, dtype=float)) for v in (*given, angle_deg))
+        )
+        return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
+
+    def solve(self, model: Model, changed: Case, threads: int) -> Dataset:
+        """A model of a changed case solved at the points."""
+        rpm, V, air = at = self.conditions(changed)
+        model = model.at_speeds(*at)
+        if not np.any(self.angle_deg):
+            return model.solve(rpm, V, air, threads)
+        along, side = parted(V, self.angle_deg)
+        return model.solve(rpm, along, air, threads, side)
 
     def conditions(self, changed: Case) -> tuple[Array, Array, Air]:
         """Speed, airspeed and air at the points in a changed case."""
@@ -70,6 +84,17 @@ class Points:
         states, which = np.unique(self.density_kg_m3, return_inverse=True)
         airs = [air if rho == own else changed.air({"air.density_kg_m3": float(rho)}) for rho in states]
         return rpm, V, air_arrays(airs, which.reshape(-1))
+
+
+def parted(airspeed_m_s: Array, angle_deg: Array) -> tuple[Array, Array]:
+    """Speeds along the shaft and in the plane of the disk [m/s] of a wind at an angle to the shaft.
+
+    >>> parted(np.array([10.0, 10.0]), np.array([0.0, 90.0]))[0].round(12)
+    array([10.,  0.])
+    """
+    side = np.where(angle_deg % 180.0 == 0.0, 0.0, np.abs(airspeed_m_s * np.sin(np.radians(angle_deg))))
+    along = np.where(angle_deg % 180.0 == 90.0, 0.0, airspeed_m_s * np.cos(np.radians(angle_deg)))
+    return along, side
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,17 +177,20 @@ def vary(
 
 def propagate(
     case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
-    density_kg_m3: ArrayLike | None = None, *, unknowns: Sequence[Assumption] | None = None, bands: bool = True,
-    threads: int = 1, progress: Progress | None = None,
+    density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike = 0.0,
+    unknowns: Sequence[Assumption] | None = None, bands: bool = True, threads: int = 1,
+    progress: Progress | None = None,
 ) -> Propagated:  # fmt: skip
     """Solve a case at points [rev/min], [m/s], [kg/m3], by default its own, with bands and flags.
 
+    ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. No measured rotor tells of the
+    solver's error in oblique flow: its band is that of axial flow at the speed along the shaft, and the point flagged.
     Whatever a point shares with the case - speed, airspeed, air - follows an unknown that is that quantity. ``bands``
     False leaves the uncertainties unknown; the flags stay.
     """
     from bemt.case.prepare import prepare_case
 
-    points = Points.of(case, rpm, airspeed_m_s, density_kg_m3)
+    points = Points.of(case, rpm, airspeed_m_s, density_kg_m3, angle_deg)
     # the motor's unknowns move no load at a given speed
     own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
     declared = own if unknowns is None else tuple(unknowns)
@@ -170,9 +198,8 @@ def propagate(
 
     def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
         nonlocal done
-        at = points.conditions(changed)
-        model = prepare_case(changed, None, stations).at_speeds(*at)
-        found = model.solve(*at, threads)
+        model = prepare_case(changed, None, stations).at_speeds(*points.conditions(changed))
+        found = points.solve(model, changed, threads)
         done += 1
         if progress is not None:
             progress(done, steps, what)
@@ -182,15 +209,20 @@ def propagate(
         return {key: np.asarray(found[key], dtype=float) for key in BANDED}
 
     model, found = solved(case, "nominal")
-    factor, words = validity_of(case, found.J, found.Re75, found.M_tip)
-    flags = tuple((*a, *b) for a, b in zip(found.flags, words, strict=True))
+    beside, skewed = found, points.angle_deg % 360.0 != 0.0
+    if np.any(skewed):  # axial flow at the speed along the shaft
+        at = points.conditions(case)
+        beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
+    factor, words = validity_of(case, beside.J, beside.Re75, beside.M_tip)
+    turned = (((_UNMEASURED,) if one else ()) for one in skewed)
+    flags = tuple((*a, *b, *c) for a, b, c in zip(found.flags, words, turned, strict=True))
     nominal = channels(found)
     if not bands:
         nothing = {key: np.full(len(found), np.nan) for key in nominal}
         return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
-    widths = _model_error(case, model, found, points.conditions(case)[2])
+    widths = _model_error(case, model, beside, points.conditions(case)[2])
     narrow, wide = (_loads(found, model.diameter_m, factor * u) for u in widths)
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},

@@ -258,6 +258,8 @@ class Flow:
     extra : mapping of str to (P,) float
         Other channels of the recording, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
         tip_gap_m, wall_distance_m, sideslip_rad, run.  Absent: not recorded.
+    side : (P,) float or None
+        In-plane onset speed [m/s]; None where there is none.
     """
 
     rpm: Array
@@ -275,6 +277,7 @@ class Flow:
     dT_dV: Array
     dQ_dV: Array
     extra: Mapping[str, Array] = field(default_factory=dict)
+    side: Array | None = None
 
     @property
     def n(self) -> Array:

@@ -15,12 +15,9 @@ class ObliqueInflow(Effect):
 
     Notes
     -----
-    Momentum in skewed flow: T = 2 rho A v sqrt((Vx + v)^2 + Vy^2), Vx = V cos, Vy = V sin (Glauert 1926, ARC R&M 1111;
-    Johnson 1980, Helicopter Theory, sec. 4-1.1). At the baseline's thrust it gives the flow w = Vx + v through the
-    disk; the rotor sees the axial onset speed that gives the same w, w - T / (2 rho A w). The mean square of the
-    tangential speed raises the thrust by 1 + 3/2 mu^2, mu = Vy / (Omega R) (blade-element thrust at constant pitch,
-    Johnson 1980, sec. 5-2; equation numbers not checked), modelled as a higher speed of rotation. A recorded
-    ``sideslip_rad`` replaces ``angle_deg``.
+    The rotor is solved in oblique flow (:mod:`bemt.bem.oblique`): skewed mass flow (Glauert 1926, ARC R&M 1111), linear
+    inflow gradient (Pitt and Peters 1981, Vertica 5:21), blade loads round the azimuth. A recorded ``sideslip_rad``
+    replaces ``angle_deg``. Open rotors only.
     """
 
     angle_deg: float = 20.0
@@ -39,26 +36,16 @@ class ObliqueInflow(Effect):
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:
-        """At rest there is no direction."""
+        """At rest there is no direction, and a ducted rotor is not solved in oblique flow."""
+        if flow.ducted:
+            return "oblique flow is solved for open rotors only"
         return "" if np.any(flow.V > 0.0) else "no point has airspeed"
 
     def flow(self, flow: Flow) -> None:
-        """Replace the airspeed by the axial one of the same flow through the disk."""
+        """Part the airspeed into its share along the shaft and in the plane of the disk."""
+        if flow.ducted:
+            return
         angle = (
             np.nan_to_num(flow.extra["sideslip_rad"]) if "sideslip_rad" in flow.extra else np.radians(self.angle_deg)
         )
-        angle = np.broadcast_to(angle, flow.V.shape)
-        Vx, Vy = flow.V * np.cos(angle), flow.V * np.sin(angle)
-        load = np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
-        # v falls from the hover value as the wind grows; the fixed point v = load / |W| is bracketed, so bisect
-        low, high = np.zeros_like(load), np.sqrt(load) + np.abs(flow.V)
-        for _ in range(60):
-            v = 0.5 * (low + high)
-            above = v * np.hypot(Vx + v, Vy) > load
-            low, high = np.where(above, low, v), np.where(above, v, high)
-        w = Vx + 0.5 * (low + high)
-        skewed = (angle != 0.0) & (flow.V > 0.0) & (load > 0.0)
-        axial = w - load / np.where(np.abs(w) > 1e-9, w, 1.0)
-        mu = Vy / (flow.omega * flow.R)
-        flow.V = np.where(skewed, axial, Vx)
-        flow.rpm = flow.rpm * np.sqrt(1.0 + 1.5 * mu**2)
+        flow.V, flow.side = flow.V * np.cos(angle), np.abs(flow.V * np.sin(angle))

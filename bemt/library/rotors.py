@@ -31,6 +31,7 @@ CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
+OBLIQUE = ("sideslip_rad", "H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
 
@@ -114,7 +115,7 @@ class Propeller:
 
     def solve(
         self, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None, *, J: ArrayLike | None = None,
-        density_kg_m3: float | None = None, bands: bool = True,
+        angle_deg: ArrayLike = 0.0, density_kg_m3: float | None = None, bands: bool = True,
     ) -> Dataset:  # fmt: skip
         """Solve operating points one by one.
 
@@ -123,9 +124,11 @@ class Propeller:
         rpm : array_like, optional
             Speed of rotation; from the case by default. [rev/min]
         airspeed_m_s : array_like, optional
-            Axial speed; from the case by default. Broadcast with `rpm`. [m/s]
+            Airspeed; from the case by default. Broadcast with `rpm`. [m/s]
         J : array_like, optional
             Advance ratio V/(n D) instead of `airspeed_m_s`. [-]
+        angle_deg : array_like
+            Angle between wind and shaft: 0 climb, 90 edgewise, 180 descent; open rotors only. [deg]
         density_kg_m3 : float, optional
             Air density; from the case by default. [kg/m3]
         bands : bool
@@ -136,25 +139,32 @@ class Propeller:
         -------
         Dataset
             Kind ``bemt``. A point without a solution is NaN and flagged, never zero. A point that no measured rotor
-            covers is flagged, and its band is wider.
+            covers is flagged, and its band is wider. With an angle it also has ``sideslip_rad``, ``H_force_N`` (in the
+            plane of the disk, downstream), ``Y_force_N`` (to the advancing side), ``roll_moment_Nm`` (lifts the
+            advancing side) and ``pitch_moment_Nm`` (lifts the upstream side), all without a band.
 
         Raises
         ------
         InputError
-            If both `airspeed_m_s` and `J` are given, or numbers are not finite.
+            If both `airspeed_m_s` and `J` are given, numbers are not finite, an angle is not within 0 to 180 deg, or
+            the rotor is ducted and the angle not 0.
 
         Examples
         --------
         >>> d = propeller("10x5").solve(rpm=[6000, 9000])
         >>> d.thrust_N.round(1), d.power_W.round(0)
         (array([ 4.8, 11. ]), array([ 46., 156.]))
+        >>> d = propeller("10x5").solve(6000, 10.0, angle_deg=[0, 90], bands=False)
+        >>> bool(d.thrust_N[1] > 2 * d.thrust_N[0]), bool(d.H_force_N[1] > 0)
+        (True, True)
         """
         from bemt.case import lattice
 
         n, V = self._conditions(rpm, airspeed_m_s, J)
+        n, V, angle = self._turned(n, V, angle_deg)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
-        found = lattice.solve(self.case, n, V, density, bands)
-        names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else ())) if key in found]
+        found = lattice.solve(self.case, n, V, density, bands, angle)
+        names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else OBLIQUE)) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
         notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "
                  "blade elements (numerics)",)  # fmt: skip
@@ -365,6 +375,21 @@ class Propeller:
         except OSError as error:
             raise InputError(system_fault(error)) from error
         return file
+
+    def _turned(self, n: Array, V: Array, angle_deg: Any) -> tuple[Array, Array, Array]:
+        """Points with their angle between wind and shaft [deg]."""
+        angle = np.atleast_1d(numbers("angle_deg", angle_deg)).astype(float)
+        if np.any((angle < 0.0) | (angle > 180.0)):
+            odd = float(angle[(angle < 0.0) | (angle > 180.0)][0])
+            raise InputError(Fault("", "angle_deg", f"{odd:g}", "0 (climb) to 180 deg (descent)"))
+        if self.case.ducted and np.any(angle):
+            raise InputError(Fault("", "angle_deg", f"{angle.max():g} deg on a ducted rotor", "0 deg"))
+        try:
+            n, V, angle = np.broadcast_arrays(n, V, angle.ravel())
+        except ValueError:
+            got = f"{angle.size} of angle_deg for {n.size} points"
+            raise InputError(Fault("", "angle_deg", got, "as many of each, or one")) from None
+        return n, V, angle
 
     def _conditions(self, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, Array]:
         faults = []

@@ -1,0 +1,298 @@
+"""Blade elements in oblique flow, compiled: annuli balanced with the loads averaged over the azimuth.
+
+SI, radians.  The axial kernel (:mod:`bemt.bem.kernel`) is not touched: points without in-plane wind go there.  ``UT``
+and ``UP`` are the mean tangential and axial onset speeds of an annulus, ``V_y`` the in-plane wind, ``psi`` the azimuth
+of a blade, 0 downstream and 90 deg on the advancing side.  Per azimuth::
+
+    u_t = W cos(phi) + V_y sin(psi)          w_psi = UP + v (1 + K r/R cos(psi)),   v = W sin(phi) - UP
+
+``phi`` and ``W`` belong to the mean flow of the annulus, as in :mod:`bemt.bem.residual`; with the averages over psi
+``a = sigma/4 <W_psi^2 cn> / W^2`` and ``b = sigma/4 <W_psi^2 ct> / W^2`` its residual keeps its form::
+
+    g(phi) = F M (UT sin(phi) - UP cos(phi)) - (a UT + b UP)
+    W      = (UT cos(phi) + UP sin(phi)) / (1 + sigma cd / (4 F M)),   cd at the mean flow
+
+Mass flow: M W = sqrt(m^2 + V_y^2) (Glauert 1926, ARC R&M 1111, the same v for a wing and a rotor; Johnson 1980,
+Helicopter Theory, sec. 4-1.1), with m the axial mass flow: abs(w), or in the turbulent windmill and vortex-ring states
+the curve of :func:`bemt.bem.residual.mass_flow` (Buhl 2005).  Without in-plane wind that is the axial annulus.
+
+Prandtl's factor is that of the mean flow; where a blade meets more wind from the side than from its own rotation there
+are no helices, and 1 - F fades as 1 / (1 + (V_y / W)^4) (own choice).
+
+Gradient: K = 15 pi/32 tan(chi/2) (Pitt and Peters 1981, Vertica 5:21, in the form of Moriarty and Hansen 2005, AeroDyn
+Theory Manual, NREL/EL-500-36881, skewed wake correction; equation numbers not checked), per annulus, with
+tan(chi/2) = V_y / (sqrt(w^2 + V_y^2) + abs(w)).  Left out: the gradient that hub moments induce themselves (moments
+come out too large on a stiff rotor), radial flow along the blade, flapping.
+"""
+
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, disable-error-code="attr-defined"
+# (numba erases signatures)
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.bem import kernel as K
+from bemt.bem import residual, vecmath
+from bemt.bem.kernel import (
+    JUMP,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    O_BRIDGED,
+    O_MASS,
+    O_Q,
+    O_STAGNANT,
+    O_STATUS,
+    O_T,
+    O_WHERE,
+    OK,
+    S_ALPHA0,
+    S_AXIAL,
+    S_AXIAL_FACTOR,
+    S_BETA,
+    S_CHORD,
+    S_CLA,
+    S_DR,
+    S_HUB,
+    S_LOGC,
+    S_R,
+    S_SIGMA,
+    S_TANG,
+    S_TANG_FACTOR,
+    S_TIP,
+)
+from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, loss, mass_flow
+from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
+
+Array = NDArray[np.float64]
+
+P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE = range(6)
+AZIMUTHS = 16
+"""Stations round the azimuth where loads are integrated; annuli are balanced at every second one [1]."""
+H_FORCE, Y_FORCE, ROLL, PITCH = range(4)
+"""Columns of the hub loads: H downstream, Y to the advancing side [N]; roll lifts the advancing side, pitch the
+upstream side [N m]."""
+PITT_PETERS = 15.0 * math.pi / 32.0
+_TOL = 1e-7  # the last secant step [rad]
+_MAX = 120
+
+
+@inlined
+def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g, fx, cs, sn, n):
+    """Residual [m/s] and the state of one annulus, loads averaged over n azimuths."""
+    s, c = sincos(phi)
+    swirl = fx[N_SWIRL]
+    W0 = UT * c + UP * s
+    W0 = W0 if W0 > 1e-9 else 1e-9
+    sa = abs(s)
+    ss = s if sa > 1e-9 else (1e-9 if s >= 0.0 else -1e-9)
+    w0 = ss * W0
+    # Prandtl's factor, as of the axial rotor
+    turn = 2.0 - UP / w0
+    turn = turn if turn < 3.0 else 3.0
+    turn = turn if turn > 0.3 else 0.3
+    p = turn * turn * turn * ss * ss if fx[N_FAR] > 0.0 else ss * ss
+    whole = c * c + p if fx[N_FAR] > 0.0 else 1.0
+    root = math.sqrt(math.sqrt(whole / p))
+    Ft, _ = loss(tip * root)
+    Fh, _ = loss(hub * root)
+    F = (Ft if Ft > 1e-6 else 1e-6) * (Fh if Fh > 1e-6 else 1e-6)
+    t = Vy / W0
+    t *= t
+    t *= t
+    F = 1.0 - (1.0 - F) / (1.0 + t)
+    y = w0 / UP if UP != 0.0 else 2.0
+    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y > -1.0 and y < 0.6
+    f, _ = mass_flow(y)
+    M = abs(UP) * f / W0 if zone else sa
+    across = Vy / W0
+    M = math.sqrt(M * M + across * across)
+    FM = F * M
+    _, cd, _, _, _, _ = lookup(beta - phi, lre, W0 * W0, base, tab, g)
+    q = sg4 * cd / FM if swirl > 0.0 else 0.0
+    W = W0 / (1.0 + q) if swirl > 0.0 else UT / (c if c > 1e-9 else 1e-9)
+    w = W * s
+    v = w - UP
+    grad = PITT_PETERS * Vy / (math.sqrt(w * w + Vy * Vy) + abs(w) + 1e-12) * x * v
+    u = W * c
+    an = 0.0
+    at = 0.0
+    for k in range(n):
+        ut = u + Vy * sn[k]
+        wk = w + grad * cs[k]
+        W2 = ut * ut + wk * wk
+        # Re and Mach number leave out the drag term, as in the axial kernel
+        along = (UT + Vy * sn[k]) * ut + UP * wk
+        ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
+        cl, cd, _, _, _, _ = lookup(beta - atan2(wk, ut), lre, ref, base, tab, g)
+        size = math.sqrt(W2)
+        an += size * (cl * ut - cd * wk)
+        at += size * (cl * wk + cd * ut)
+    scale = sg4 / (n * W * W)
+    a = an * scale
+    b = at * scale
+    res = FM * (UT * s - UP * c) - (a * UT + b * UP * swirl)
+    return res, q, W, FM, s, c, grad, FM * W0, F, zone
+
+
+@inlined
+def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
+    """Inflow angle of one annulus: bracketed secant steps; returns angle and status."""
+    sg4 = 0.25 * st[i, S_SIGMA]
+    beta = st[i, S_BETA]
+    phi_in = atan2(UP, UT)
+    # first guess as of the axial rotor, with the mass flow that the in-plane wind adds
+    k = sg4 * st[i, S_CLA]
+    lift = beta - phi_in - st[i, S_ALPHA0]
+    i_U = 1.0 / math.sqrt(UT * UT + UP * UP)
+    flow = math.sqrt(UP * UP + Vy * Vy) * i_U * (1.0 if UP >= 0.0 else -1.0)
+    brake = lift < 0.0 and UP > 0.0
+    b = k - flow if (lift < 0.0 and not brake) else k + flow
+    e = 4.0 * abs(UT) * i_U * k * abs(lift)
+    disc = b * b - e if brake else b * b + e
+    psi = 2.0 * k * lift / (b + math.sqrt(disc if disc > 0.0 else 0.0) + 1e-12)
+    psi = min(max(psi, -1.5), 1.5)
+    middle = phi_in if fx[N_SWIRL] > 0.0 else 0.0
+    # towards W0 = 0 the load of the wind from the side, over W0^2, outgrows the momentum: no root belongs there
+    low = 3.0 * sg4 * Vy * i_U
+    half = math.acos(low if low < 0.7 else 0.7)
+    lo = middle - half
+    hi = middle + half
+    phi = min(max(phi_in + psi, lo + 0.01), hi - 0.01)
+    last = math.pi
+    before = 0.0
+    before_phi = 0.0
+    status = NOT_CONVERGED
+    for it in range(_MAX):
+        res, _, _, _, _, _, _, stiff, _, _ = _annulus(
+            lookup, phi, UT, UP, Vy, x, beta, sg4, st[i, S_TIP], st[i, S_HUB], lre, base, tab, g, fx, cs, sn, n
+        )
+        if not (abs(res) < 1e300):
+            status = NOT_FINITE
+            break
+        lo = phi if res < 0.0 else lo
+        hi = phi if res > 0.0 else hi
+        slope = stiff + k * abs(UT) if it == 0 else (res - before) / (phi - before_phi)
+        before = res
+        before_phi = phi
+        step = -res / slope if slope > 0.0 else math.inf
+        new = phi + step
+        if not (new >= lo and new <= hi and (2.0 * abs(step) < last or it < 2)):
+            new = 0.5 * (lo + hi)
+            step = new - phi
+        last = abs(step)
+        phi = new
+        if last < _TOL:
+            status = OK if abs(res) < 1e-5 * (UT + abs(UP) + Vy) else JUMP
+            break
+    return phi, status
+
+
+@inlined
+def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
+    """Solve every annulus of one operating point and integrate over blade and azimuth."""
+    wide()
+    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12])
+    o = N_NUM
+    mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
+    g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
+         par[o + 9], mach2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
+    stride = par[o + 14]
+    B = par[o + 15]
+    n = cs.shape[0]
+    few = few_cs.shape[0]
+    log_rho_mu = math.log(point[P_RHO] / point[P_MU])
+    Vy = point[P_SIDE]
+    out[:] = 0.0
+    hub[:] = 0.0
+    out[O_WHERE] = -1.0
+    for i in range(st.shape[0]):
+        r = st[i, S_R]
+        UT = point[P_OMEGA] * r * st[i, S_TANG_FACTOR] + st[i, S_TANG]
+        UP = point[P_V] * st[i, S_AXIAL_FACTOR] + st[i, S_AXIAL]
+        lre = log_rho_mu + st[i, S_LOGC]
+        base = np.int32(stride * i)
+        x = r / R
+        phi = atan2(UP, UT)
+        status = OK
+        if st[i, S_SIGMA] > 0.0:
+            phi, status = _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, few_cs, few_sn, few)
+        if status != OK:
+            if status > out[O_STATUS]:
+                out[O_STATUS] = status
+                out[O_WHERE] = i
+            continue
+        _, q, W, FM, s, c, grad, _, F, zone = _annulus(
+            lookup, phi, UT, UP, Vy, x, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
+            tab, g, fx, few_cs, few_sn, few,
+        )  # fmt: skip
+        out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
+        out[O_BRIDGED] += 1.0 if (zone and Vy < abs(UP)) else 0.0
+        out[O_STAGNANT] += 1.0 if q * FM > F * math.sqrt(s * s + (Vy / W) ** 2) else 0.0
+        scale = 0.5 * point[P_RHO] * st[i, S_CHORD] * st[i, S_DR] * B / n
+        for k in range(n):
+            ut = W * c + Vy * sn[k]
+            wk = W * s + grad * cs[k]
+            W2 = ut * ut + wk * wk
+            along = (UT + Vy * sn[k]) * ut + UP * wk
+            ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
+            cl, cd, _, _, _, _ = lookup(st[i, S_BETA] - atan2(wk, ut), lre, ref, base, tab, g)
+            size = math.sqrt(W2) * scale
+            dT = size * (cl * ut - cd * wk)
+            dF = size * (cl * wk + cd * ut)
+            out[O_T] += dT
+            out[O_Q] += dF * r
+            hub[H_FORCE] += dF * sn[k]
+            hub[Y_FORCE] -= dF * cs[k]
+            hub[ROLL] += dT * r * sn[k]
+            hub[PITCH] -= dT * r * cs[k]
+            if disk.shape[0] > 0:
+                disk[i, k] = dT * n / (2.0 * math.pi * r * st[i, S_DR])
+
+
+def _entries(stamp: int) -> dict[str, Any]:
+    """Entry points; a closure over ``stamp`` renews numba's cache when functions of other files change."""
+
+    @njit
+    def plain(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
+        for p in range(points.shape[0] if stamp >= 0 else 0):
+            _point(residual.lookup_plain, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p])
+
+    @njit
+    def full(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
+        for p in range(points.shape[0] if stamp >= 0 else 0):
+            _point(residual.lookup_full, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p])
+
+    @njit
+    def factored(points, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, disk):
+        for p in range(points.shape[0] if stamp >= 0 else 0):
+            _point(
+                residual.lookup_factored, points[p], st, tab, par, cs, sn, few_cs, few_sn, R, out[p], hub[p], disk[p]
+            )
+
+    return {"plain": plain, "full": full, "factored": factored}
+
+
+_ENTRIES = _entries(fingerprint(residual, vecmath, K))
+
+
+def azimuths(n: int = AZIMUTHS) -> NDArray[np.float64]:
+    """Azimuths of the blades, 0 downstream, (n,) [rad]."""
+    return np.asarray(np.arange(n) * (2.0 * math.pi / n), dtype=float)
+
+
+def run(
+    layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, n: int = AZIMUTHS, disk: bool = False
+) -> tuple[Array, Array, Array]:
+    """Solve points (P, 6): columns of the kernel's (P, N_OUT), hub loads (P, 4), disk loading (P, N, n) [N/m2]."""
+    psi, few = azimuths(n), azimuths(n // 2)
+    out = np.empty((points.shape[0], K.N_OUT))
+    hub = np.empty((points.shape[0], 4))
+    maps = np.zeros((points.shape[0], st.shape[0] if disk else 0, n))
+    rounds = np.cos(psi), np.sin(psi), np.cos(few), np.sin(few)
+    _ENTRIES[layout](np.ascontiguousarray(points), st, tab, par, *rounds, R, out, hub, maps)
+    return out, hub, maps
