@@ -36,9 +36,16 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
     "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
-    "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
-    "Theory": ("theory.md", "effects.md", "diagnosis.md"),
-    "Project": ("reports/README.md", "reports/report.md", "CONTRIBUTING.md", "CHANGELOG.md"),
+    "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
+    "Theory": ("believe.md", "theory.md", "effects.md", "diagnosis.md"),
+    "Project": (
+        "structure.md",
+        "reports/README.md",
+        "reports/report.md",
+        "CONTRIBUTING.md",
+        "RELEASING.md",
+        "CHANGELOG.md",
+    ),
 }
 
 
@@ -135,7 +142,7 @@ def notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 def on_files(files: Any, config: Any) -> Any:
     """Add what is not a file of docs/, and what is made."""
     found: dict[str, Path] = {}
-    top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")]
+    top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "RELEASING.md")]
     for page in (*DOCS.glob("*.md"), *DOCS.glob("notebooks/*.ipynb"), *top):
         if page.exists():
             linked(page, found)

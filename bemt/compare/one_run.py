@@ -45,7 +45,7 @@ def cfd_points(path: str) -> tuple[Dataset, Dataset]:
         return imported, imported
     if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
         hint = (
-            f"`python -m bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
+            f"`bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
         )
         raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
     points = named(as_dataset(imported))
@@ -53,7 +53,7 @@ def cfd_points(path: str) -> tuple[Dataset, Dataset]:
     if not known or ("rpm" not in points and "thrust_N" in points):
         got = f"channels {', '.join(list(imported.values)[:8])}"
         raise InputError(
-            Fault(path, "", got, "a speed and a load", "`python -m bemt import` shows how each column was read")
+            Fault(path, "", got, "a speed and a load", "`bemt import` shows how each column was read")
         )
     if conditions_of(imported):
         u = {}
@@ -219,10 +219,10 @@ def _next(document: Mapping[str, Any], name: str, case: str) -> str:
     readings = sum(len([k for k in p["loads"] if k != "duct_share"]) for p in document["points"])
     if readings < 3:
         steps.append("two more speeds or airspeeds: one point fits any cause; then "
-                     f"`python -m bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
+                     f"`bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
     else:
         steps.append(
-            f"`python -m bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot"
+            f"`bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot"
         )
     return "; ".join(steps)
 
