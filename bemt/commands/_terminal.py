@@ -50,9 +50,9 @@ def complain(what: object) -> None:
 
 
 def folded(text: str, width: int) -> str:
-    """Text with sentences folded at a width, at the indent of their line; tables are left as they are.
+    r"""Text with sentences folded at a width, at the indent of their line; tables are left as they are.
 
-    >>> print(folded("  one sentence that is too long\\na   table   of   cells   stays", 20))
+    >>> print(folded("  one sentence that is too long\na   table   of   cells   stays", 20))
       one sentence that
         is too long
     a   table   of   cells   stays

@@ -21,6 +21,7 @@ from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.case import Case
+    from bemt.dataset import Dataset
 
 __all__ = ["SCHEMA", "Plan", "document", "plan", "points", "text"]
 
@@ -83,13 +84,19 @@ class Plan:
 
 def points(path: str, case: Case) -> Record:
     """Read the points of a plan: a recording whose loads are not there yet."""
+    from bemt.recordings.load import import_file
+
+    return record_of(import_file(path), case)
+
+
+def record_of(imported: Dataset, case: Case) -> Record:
+    """Points of a plan from a table of them."""
     from bemt.base.errors import Fault, InputError
     from bemt.dataset import Dataset
     from bemt.diagnose.record import from_series
     from bemt.recordings.channels import named
-    from bemt.recordings.load import import_file
 
-    imported = import_file(path)
+    path = imported.name
     rows = named(imported)
     values = {k: v for k, v in imported.values.items() if imported.unit(k) or k in ("rpm", "J", "run")}
     values |= dict(rows.values)

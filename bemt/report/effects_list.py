@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
-import re
 import textwrap
 from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
 from bemt.base.tables import text_table
-from bemt.effects import catalogue
+from bemt.effects import catalogue, source_of
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
@@ -43,7 +41,7 @@ def _entry(cls: type[Effect]) -> dict[str, Any]:
     }
     return {
         "id": cls.id, "title": cls.title, "kind": cls.kind, "sign": cls.sign, "on_by_default": cls.on_by_default,
-        "diagnosed": cls.diagnosed, "needs": list(cls.needs), "source": _notes(cls),
+        "diagnosed": cls.diagnosed, "needs": list(cls.needs), "source": source_of(cls),
         "parameters": [
             {"name": p.name, "unit": p.unit, "default": getattr(effect, p.name), "low": p.low, "high": p.high,
              "off": p.off, "source": p.source}
@@ -51,12 +49,6 @@ def _entry(cls: type[Effect]) -> dict[str, Any]:
         ],
         "choices": words,
     }  # fmt: skip
-
-
-def _notes(cls: type[Effect]) -> str:
-    """Notes of the docstring, in one line."""
-    text = inspect.cleandoc(cls.__doc__ or "").partition("Notes\n-----\n")[2]
-    return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(text.split()))
 
 
 def _range(p: dict[str, Any]) -> str:

@@ -212,11 +212,11 @@ def _grids(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
 def _next(compared: bool) -> list[str]:
     lines = [
         "More: --details (every case in full), --out DIR (tables), --json,",
-        f"  bemt report CASES --out DIR (figures)",
+        "  bemt report CASES --out DIR (figures)",
     ]
     if compared:
         lines[-1] += ","
-        lines.append(f"  bemt diagnose LOG --case CASE (what the model leaves out)")
+        lines.append("  bemt diagnose LOG --case CASE (what the model leaves out)")
     return lines
 
 
