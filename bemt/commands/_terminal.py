@@ -61,9 +61,11 @@ def folded(text: str, width: int) -> str:
     for line in text.split("\n"):
         indent = len(line) - len(line.lstrip(" "))
         if len(line) > width > indent + 20 and "  " not in line[indent:]:
-            more = {"break_long_words": False, "break_on_hyphens": False}
-            out += textwrap.wrap(line.strip(), width, initial_indent=" " * indent,
-                                 subsequent_indent=" " * (indent + 2), **more)  # fmt: skip
+            first, more = " " * indent, " " * (indent + 2)
+            out += textwrap.wrap(
+                line.strip(), width, initial_indent=first, subsequent_indent=more, break_long_words=False,
+                break_on_hyphens=False,
+            )  # fmt: skip
         else:
             out.append(line)
     return "\n".join(out)

@@ -28,6 +28,6 @@ def run(args: argparse.Namespace) -> int:
     for one in parser.parsers.values():
         for action in one._actions:
             if action.choices is None and action.nargs != 0 and action.type is None:
-                action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE
+                vars(action)["complete"] = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE
     print(shtab.complete(parser, shell=args.shell))
     return EXIT_OK

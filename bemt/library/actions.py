@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from bemt.case.sources import Source
+    from bemt.compare.as_measured import AsMeasured
     from bemt.diagnose.plan import Plan
-    from bemt.rotors.conditioning import AsMeasured
 
 __all__ = [
     "CalibratedRotor", "ExportedCase", "TestPlan", "calibrate_rotor", "cite", "estimate", "export", "plan", "report",
@@ -196,7 +196,7 @@ class CalibratedRotor:
     ----------
     source : Propeller
         The propeller as its case describes it.
-    found : bemt.rotors.conditioning.AsMeasured
+    found : bemt.compare.as_measured.AsMeasured
         What the runs say.
     recordings : tuple of str
         The files.
@@ -371,7 +371,7 @@ def export(
     >>> import tempfile
     >>> made = export("10x5", tempfile.mkdtemp(), "qprop")
     >>> [file.suffix for file in made.files], "qprop" in made.text.lower()
-    (['.prop'], True)
+    (['.qprop'], True)
     >>> export("10x5", tempfile.mkdtemp(), "qpropp")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
@@ -384,9 +384,10 @@ def export(
     wanted = [formats] if isinstance(formats, str) else list(formats)
     known = target_ids()
     faults = [Fault("", "formats", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
-    speeds = {name: None if value is None else float(numbers(name, value))
-              for name, value in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s))}  # fmt: skip
-    flow = Run(**speeds)
+    flow = Run(
+        rpm=None if rpm is None else float(numbers("rpm", rpm)),
+        airspeed_m_s=None if airspeed_m_s is None else float(numbers("airspeed_m_s", airspeed_m_s)),
+    )
     faults += check_run(flow)
     if faults:
         raise InputError(faults)
