@@ -205,7 +205,7 @@ def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:
     frame = pd.DataFrame({"rpm": [4000.0, 6000.0, 8000.0], "airspeed_m_s": [0.0, 4.0, 8.0]})
     frame.to_csv(tmp_path / "plan.csv", index=False)
     one, other = bemt.plan(frame, "10x5"), bemt.plan(tmp_path / "plan.csv", "10x5")
-    assert one.sight == other.sight and one.to_dict()["size"] == pytest.approx(other.to_dict()["size"])
+    assert one.detectable == other.detectable and one.to_dict()["size"] == pytest.approx(other.to_dict()["size"])
 
 
 def test_a_report_of_one_case(tmp_path: Path) -> None:

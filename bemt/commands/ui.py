@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
         "server.address": "localhost", "server.port": args.port, "server.headless": str(args.no_browser).lower(),
         "browser.gatherUsageStats": "false", "server.fileWatcherType": "none", "server.maxUploadSize": 50,
         "client.toolbarMode": "minimal", "client.showErrorDetails": "none",
+        "runner.magicEnabled": "false",
     }  # fmt: skip
     words = [word for key, value in options.items() for word in (f"--{key}", str(value))]
     done = subprocess.run([sys.executable, "-m", "streamlit", "run", str(page), *words], check=False)

@@ -34,6 +34,8 @@ SCHEMA = "bemt.plan/1"
 _HYPER = (1.0, 0.0, 0.01, 0.6)
 _BEST = (1.0, 0.0, 0.003, 0.3)
 _ONE_IN_20 = 1.645
+DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
+"""Words for people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,9 +190,10 @@ def text(answer: Plan) -> str:
     for a in order:
         near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= look.ALIKE]
         nearest = min(near, default=(float("nan"), "-"))
-        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}", answer.sight[c.ids[a]],
+        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}",
+                     DETECTABLE[answer.sight[c.ids[a]]],
                      f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
-    header = ["effect", "", "size", "sight", "nearest look-alike"]
+    header = ["effect", "", "size", "detectable", "nearest look-alike"]
     out = [f"plan of {answer.points} points: size of each effect at typical strength, in standard deviations",
            text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
     for group in c.classes():

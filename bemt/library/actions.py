@@ -104,7 +104,7 @@ class TestPlan:
     >>> p = plan({"rpm": [4000, 6000, 8000]}, "10x5")
     >>> p
     <plan of 3 points>
-    >>> set(p.sight.values()) <= {"visible", "marginal", "invisible"}, p.to_dict()["schema"], len(p.text) > 100
+    >>> set(p.detectable.values()) <= {"yes", "maybe", "no"}, p.to_dict()["schema"], len(p.text) > 100
     (True, 'bemt.plan/1', True)
     """
 
@@ -116,9 +116,11 @@ class TestPlan:
         return f"<plan of {self.found.points} points>"
 
     @property
-    def sight(self) -> dict[str, str]:
-        """Each effect: visible, marginal or invisible at its ordinary strength."""
-        return self.found.sight
+    def detectable(self) -> dict[str, str]:
+        """Each effect: yes, maybe or no at its ordinary strength."""
+        from bemt.diagnose.plan import DETECTABLE
+
+        return {effect: DETECTABLE[word] for effect, word in self.found.sight.items()}
 
     @property
     def text(self) -> str:
@@ -152,7 +154,7 @@ def plan(
     Returns
     -------
     TestPlan
-        ``.sight``, ``.text``, ``.to_dict()``.
+        ``.detectable``, ``.text``, ``.to_dict()``.
 
     Raises
     ------

@@ -101,7 +101,7 @@ def answer(st: Any, propeller: bemt.Propeller, point: dict[str, float]) -> None:
     if "kv" in point:
         found = bemt.drive(propeller, kv=point["kv"], cells=int(point["cells"]), airspeed_m_s=V)
         st.subheader("With this motor, full throttle")
-        st.text(found.text)
+        st.code(found.text, language=None)
 
 
 def recording(st: Any, propeller: bemt.Propeller) -> Any:
@@ -121,8 +121,10 @@ def recording(st: Any, propeller: bemt.Propeller) -> Any:
             with st.spinner("Comparing with every effect and fault ..."):
                 found = bemt.diagnose(path, propeller)
             head, _, rest = found.text.partition("\n")
-            st.success(head) if found.verdict in ("named", "none") else st.info(head)
-            st.text(rest)
+            shown = st.success if found.verdict in ("named", "none") else st.info
+            shown(head)
+            with st.expander("The whole answer", expanded=True):
+                st.code(rest, language=None)
     return points
 
 
@@ -135,7 +137,7 @@ def exports(st: Any, propeller: bemt.Propeller) -> None:
     if right.button("Export"):
         with tempfile.TemporaryDirectory() as folder:
             written = bemt.export(propeller, folder, chosen)
-            right.text(written.text.replace(folder, "."))
+            right.code(written.text.replace(folder, "."), language=None)
             right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
     with st.expander("What this answer stands on"):
         for source in bemt.cite(propeller):
