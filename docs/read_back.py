@@ -452,7 +452,7 @@ includes the change of the coefficients from 2,500 to 10,000 rev/min (Reynolds n
 fly. A single constant (`gazebo`) is right in static operation and off by the whole thrust in flight. That is a limit of
 the model, not of the fit.
 
-Tables end where a simulated aircraft rarely flies, because programs hold the last value: each speed is covered up to 1.2
+Tables end where simulated aircraft rarely fly, because programs hold the last value: each speed is covered up to 1.2
 times the airspeed at which the greatest speed has no thrust (J up to 4.8 times that of zero thrust), and an open rotor
 in descent down to twice its induced speed at rest. The coefficients hold the Reynolds numbers of the case's air; a
 note in the manifest says what three quarters of that density would change.

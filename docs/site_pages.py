@@ -26,7 +26,8 @@ API = {  # page: title, introduction, names
     "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on.", (
         *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
         *(f"bemt.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor", "CalibratedRotor",
-                                                "export", "ExportedCase", "report", "cite")), "bemt.case.sources.Source",
+                                                "export", "ExportedCase", "report", "cite")),
+        "bemt.case.sources.Source",
         "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.Band")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
         "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",

@@ -257,7 +257,8 @@ def fan(project: Path, folder: Path, *changes: tuple[str, str]) -> str:
 def test_faults_of_the_drive_come_all_at_once(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bad = fan(project, tmp_path / "bad", ("cells = 6", "cells = 0"), ("resistance_mohm = 12.5", "resistance_mohm = 0.0125"),
+    bad = fan(project, tmp_path / "bad", ("cells = 6", "cells = 0"),
+              ("resistance_mohm = 12.5", "resistance_mohm = 0.0125"),
               ("thermal_K_W = 1.0 ", "thermal = 1 "))  # fmt: skip
     assert main(["drive", bad]) == 2
     words = capsys.readouterr().err

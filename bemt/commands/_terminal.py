@@ -60,7 +60,7 @@ def folded(text: str, width: int) -> str:
     out = []
     for line in text.split("\n"):
         indent = len(line) - len(line.lstrip(" "))
-        if len(line) > width > indent + 20 and "  " not in line[indent:]:
+        if len(line) > width > indent + 20 and "  " not in line[indent:] and "\r" not in line:  # no line of progress
             first, more = " " * indent, " " * (indent + 2)
             out += textwrap.wrap(
                 line.strip(), width, initial_indent=first, subsequent_indent=more, break_long_words=False,

@@ -21,10 +21,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the sources."""
+    import shutil
+
     from bemt.base.tables import json_text
     from bemt.case import sources
     from bemt.library.rotors import rotor_of
 
     case = rotor_of(args.case).case
-    print(json_text(sources.document(case)) if args.json else sources.text(case) + "\n", end="")
+    width = min(100, shutil.get_terminal_size((100, 24)).columns)
+    print(json_text(sources.document(case)) if args.json else sources.text(case, width) + "\n", end="")
     return EXIT_OK

@@ -351,9 +351,7 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
             if typed.strip("'") == found["runs"][0]["name"]
             else "With --out run.toml: "
         )
-        return "\n".join(
-            [*lines, f"{lead}Next: bemt compare {typed} --case CASE   (a case: bemt new 10x5)\n"]
-        )
+        return "\n".join([*lines, f"{lead}Next: bemt compare {typed} --case CASE   (a case: bemt new 10x5)\n"])
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)

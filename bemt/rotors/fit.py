@@ -32,8 +32,8 @@ Statistica Sinica 21, 2011, not checked): the whole tells the correlations, sing
 # propellers tell the sum of their variances, not its parts; optical stations are off by about a degree (blades
 # turned to their measured zero-thrust J scatter by 0.7 to 1.5).  The hub's drag starts at a bluff body's (0.8 to 1.1:
 # Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).  Hover: moulded blades jump between hover and flight, of which
-# most rotors show little; centres of 1 and 2 % left flight falsely sure after a static run.  With 4 and 5 % the mean log
-# score of families left out goes from 0.321 to 0.322, after a static run and one flight point from 1.48 to 1.49.
+# most rotors show little; centres of 1 and 2 % left flight falsely sure after a static run.  With 4 and 5 % the mean
+# log score of families left out goes from 0.321 to 0.322, after a static run and one flight point from 1.48 to 1.49.
 _FREE: tuple[tuple[str, str, float, float], ...] = (
     ("stations_deg", "ln", 0.7, 0.3), ("label_deg", "ln", 0.8, 0.1), ("family_deg", "ln", 1.0, 0.1),
     ("offset_deg", "", 0.7, 0.15), ("lift", "ln", 0.03, 0.5), ("drag", "ln", 0.1, 0.3), ("camber_deg", "ln", 0.3, 0.3),
