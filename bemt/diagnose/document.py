@@ -218,7 +218,7 @@ def explanation(d: Answer) -> list[str]:
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
     if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blade count "
+        lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {wrong_rotor_check.nearest_rotors(d.problem)}.")  # fmt: skip
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
