@@ -18,19 +18,25 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset as Dataset
     from bemt.library import Answer as Answer
     from bemt.library import Propeller as Propeller
+    from bemt.library import calibrate_rotor as calibrate_rotor
+    from bemt.library import cite as cite
     from bemt.library import compare as compare
     from bemt.library import diagnose as diagnose
     from bemt.library import drive as drive
+    from bemt.library import estimate as estimate
+    from bemt.library import export as export
     from bemt.library import load as load
+    from bemt.library import plan as plan
     from bemt.library import propeller as propeller
     from bemt.library import read as read
+    from bemt.library import report as report
     from bemt.library import validate as validate
 
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
-_ROOMS = ("compare", "diagnose", "drive", "validate")  # packages that can be called like functions
+_ROOMS = ("compare", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
 _NAMES = (
-    "Answer", "Dataset", "InputError", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read",
-    "validate",
+    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "cite", "compare", "diagnose", "drive",
+    "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
 )  # fmt: skip
 __all__ = ["__version__", *_NAMES]
 

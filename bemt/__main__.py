@@ -1,4 +1,4 @@
-"""Run the command line: ``python -m bemt``."""
+"""Run the command line: ``bemt``."""
 
 import sys
 

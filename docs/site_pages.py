@@ -25,6 +25,9 @@ API = {  # page: title, introduction, names
         "bemt.library.rotors.propeller", "bemt.library.rotors.load", "bemt.library.rotors.Propeller")),
     "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on.", (
         *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
+        *(f"bemt.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor", "CalibratedRotor",
+                                                "export", "ExportedCase", "report", "cite")),
+        "bemt.case.sources.Source",
         "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.Band")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
         "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",
@@ -36,9 +39,16 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
     "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
-    "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
-    "Theory": ("theory.md", "oblique.md", "effects.md", "diagnosis.md"),
-    "Project": ("reports/README.md", "reports/report.md", "CONTRIBUTING.md", "CHANGELOG.md"),
+    "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
+    "Theory": ("believe.md", "theory.md", "oblique.md", "effects.md", "diagnosis.md"),
+    "Project": (
+        "structure.md",
+        "reports/README.md",
+        "reports/report.md",
+        "CONTRIBUTING.md",
+        "RELEASING.md",
+        "CHANGELOG.md",
+    ),
 }
 
 
@@ -135,7 +145,7 @@ def notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 def on_files(files: Any, config: Any) -> Any:
     """Add what is not a file of docs/, and what is made."""
     found: dict[str, Path] = {}
-    top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")]
+    top = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "RELEASING.md")]
     for page in (*DOCS.glob("*.md"), *DOCS.glob("notebooks/*.ipynb"), *top):
         if page.exists():
             linked(page, found)

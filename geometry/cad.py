@@ -135,7 +135,7 @@ def _loft(sections: list[tuple[float, Array]]) -> Any:
 
 
 def _turned(profile: Array) -> Any:
-    """Solid of revolution of a closed profile of radius and z [m] round the z axis; straight where three points are."""
+    """Solid of revolution of a closed profile of radius and z [m] around z; straight where three points are."""
     cq = needs("cadquery", "cad")
 
     points = [cq.Vector(float(r) * MM, 0.0, float(z) * MM) for r, z in profile]

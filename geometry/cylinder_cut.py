@@ -1,4 +1,4 @@
-"""Cut a mesh by cylinders round the z axis: exact hits on edges, joined by the edges that faces share."""
+"""Cut a mesh by cylinders around the z axis: exact hits on edges, joined by the edges that faces share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Faces = NDArray[np.int64]
 
 
 def loops(points: Array, faces: Faces, r: float) -> tuple[list[Array], int]:
-    """Cut a mesh by the cylinder of radius r round the z axis.
+    """Cut a mesh by the cylinder of radius r around the z axis.
 
     Every edge is met exactly; lines are joined by the edges that faces share, not by nearness.
     """

@@ -22,7 +22,7 @@ TURN = 61
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A grid of points, repeated round the z axis."""
+    """A grid of points, repeated around the z axis."""
 
     name: str  # ``blade``, ``hub``, ``duct`` or ``stator``
     points: Array  # Neighbours in the grid are neighbours on the surface [m]

@@ -278,7 +278,7 @@ def test_every_answer_that_is_not_sure_has_a_step_and_its_command(tmp_path: Path
         answer = compare(a, b)
         step = answer.document["next_measurement"]
         if answer.verdict not in ("none", "named", "sensor"):
-            assert step["text"] and step["command"].startswith("python -m bemt compare ")
+            assert step["text"] and step["command"].startswith("bemt compare ")
         first = answer.text.splitlines()[0]
         assert not first.startswith("verdict") and "thrust" in first
 
@@ -392,12 +392,12 @@ def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
     names = ("single_rotor__20210721_170209", "map10x10_zD_01__20210722_080607")
     files = [str(folder / f"15in_400kv_22V_U5_{name}.csv") for name in names]
     assert main(["compare", *files, "--rows-b", "rotor=right"]) == 0
-    command = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    command = next(line for line in capsys.readouterr().out.splitlines() if "bemt" in line)
     words = shlex.split(command)
-    assert words[3:8] == ["compare", *files, "--rows-b", "rotor=right"]
+    assert words[1:6] == ["compare", *files, "--rows-b", "rotor=right"]
     assert "speed_ratio=LOW:HIGH" in words
-    assert main([w.replace("LOW:HIGH", "0.95:1.05") for w in words[3:]]) == 0
-    again = next(line for line in capsys.readouterr().out.splitlines() if "python -m bemt" in line)
+    assert main([w.replace("LOW:HIGH", "0.95:1.05") for w in words[1:]]) == 0
+    again = next(line for line in capsys.readouterr().out.splitlines() if "bemt" in line)
     assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
 
 
@@ -415,7 +415,7 @@ def test_the_step_of_an_answer_keeps_rows_air_and_label(
     given = {"rows_a": ["rpm=3500:9000"], "rows_b": ["rpm=3400:9000"], "air_a": "1m/s", "air_b": "1m/s"}
     doc = compare(*pair(tmp_path, change), case, label="10x5", **given).document
     step = doc["next_measurement"]
-    told = [line for line in doc.get("told", []) if line.lstrip().startswith("python -m bemt compare")]
+    told = [line for line in doc.get("told", []) if line.lstrip().startswith("bemt compare")]
     for command in [*told, *([step["command"]] if step["command"] else [])]:
         words = shlex.split(command)
         assert {"rpm=3500:9000", "rpm=3400:9000", "--label"} <= set(words)

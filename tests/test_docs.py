@@ -205,7 +205,7 @@ def shell_commands(markdown: str) -> list[str]:
 def test_the_two_commands_are_those_that_ci_runs(project: Path) -> None:
     commands = shell_commands((project / "README.md").read_text(encoding="utf-8"))
     assert len(commands) == 2, "one command for the sweep, one for the tests"
-    assert commands[0].endswith("python -m bemt sweep cases/")
+    assert commands[0].endswith("bemt sweep cases/")
     assert commands[1].endswith("python -m pytest")
     ci = (project / ".ci" / "run").read_text(encoding="utf-8")
     steps = re.findall(r"^step \"[^\"]+\" (?:\\\n\s*)?'([^']+)'$", ci, flags=re.MULTILINE)
@@ -214,11 +214,11 @@ def test_the_two_commands_are_those_that_ci_runs(project: Path) -> None:
     assert os.access(project / ".ci" / "run", os.X_OK)
 
 
-def test_the_commands_of_the_readme_exist(project: Path) -> None:
+def test_the_commands_of_the_page_exist(project: Path) -> None:
     from bemt.commands.cli import build_parser
 
-    readme = (project / "README.md").read_text(encoding="utf-8")
-    table = re.findall(r"^\| `python -m bemt ([^`]+)` \| (.*) \|$", readme, flags=re.MULTILINE)
+    page = (project / "docs" / "command_line.md").read_text(encoding="utf-8")
+    table = re.findall(r"^\| `bemt ([^`]+)` \| (.*) \|$", page, flags=re.MULTILINE)
     parser = build_parser()
     for command, does in table:
         words = [w for part in re.findall(r"`(--[^`]+)`", does) for w in part.split()]
@@ -228,12 +228,36 @@ def test_the_commands_of_the_readme_exist(project: Path) -> None:
     assert choices is not None and len(table) > 20 and {command.split()[0] for command, _ in table} <= set(choices)
 
 
-def test_the_structure_of_the_readme_names_every_room(project: Path) -> None:
-    readme = (project / "README.md").read_text(encoding="utf-8")
-    block = readme.partition("## Structure")[2].partition("```text\n")[2].partition("```")[0]
+def test_the_structure_names_every_room(project: Path) -> None:
+    page = (project / "docs" / "structure.md").read_text(encoding="utf-8")
+    block = page.partition("## Packages")[2].partition("```text\n")[2].partition("```")[0]
     words = {word.strip("_") for word in re.findall(r"\w+", block)}
     rooms = {p.stem for p in (project / "bemt").iterdir() if p.suffix in ("", ".py") and not p.name.startswith("_")}
     assert [room for room in rooms if not {room, room.partition("_")[0]} & words] == []
+
+
+def test_the_readme_is_short_and_its_commands_exist(project: Path) -> None:
+    from bemt.commands.cli import build_parser
+
+    readme = (project / "README.md").read_text(encoding="utf-8")
+    assert len(readme.split()) <= 900
+    rows = re.findall(r"^\| [^|`]+ \| (.*) \|$", readme, flags=re.MULTILINE)
+    commands = [words for row in rows for words in re.findall(r"`bemt ([^`]+)`", row)]
+    assert len(commands) > 10
+    for words in commands:
+        words = words.replace("TARGET", "dfdc")
+        assert build_parser().parse_args(shlex.split(words)).command == words.split()[0]
+
+
+def test_the_output_in_the_readme_is_today_s(project: Path) -> None:
+    """Rows of the table: thrust and its uncertainty."""
+    readme = (project / "README.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^(\w+) +\d+ +([\d.]+) ± ([\d.]+) .* agrees", readme, flags=re.MULTILINE)
+    assert len(shown) >= 3
+    for name, thrust, u in shown:
+        own = bemt.load(project / "cases" / name).solve()
+        assert float(thrust) == pytest.approx(own.thrust_N[0], rel=0.01)
+        assert float(u) == pytest.approx(own.u["thrust_N"][0], rel=0.05)
 
 
 def test_the_python_of_the_readme_runs(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -255,8 +279,8 @@ def test_the_commands_of_the_documents_exist(project: Path, document: str) -> No
     from bemt.commands.cli import build_parser
 
     for line in shell_commands((project / "docs" / document).read_text(encoding="utf-8")):
-        if " -m bemt " in line:
-            words = shlex.split(line.rpartition(" -m bemt ")[2], comments=True)
+        if found := re.match(r"(?:.* -m )?bemt (.*)", line.rpartition("&& ")[2]):
+            words = shlex.split(found[1].partition(" > ")[0], comments=True)
             assert build_parser().parse_args(words).command == words[0]
 
 

@@ -419,7 +419,7 @@ def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
         effects.catalogue()
 
 
-# The promise of ``python -m bemt effects``: the catalogue and nothing else, in every form it is printed.
+# The promise of ``bemt effects``: the catalogue and nothing else, in every form it is printed.
 
 
 DECLARED = '''
@@ -476,7 +476,7 @@ def test_the_page_is_what_the_command_prints(project: Path) -> None:
     page = (project / "docs" / "effects.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^### (\S+)$", page, flags=re.M))  # a new effect may wait for the next edition
     assert len(named) > 30
-    assert page == effects_list.markdown(named), "run python -m bemt effects --markdown > docs/effects.md"
+    assert page == effects_list.markdown(named), "run bemt effects --markdown > docs/effects.md"
 
 
 def test_every_effect_is_in_every_form(capsys: pytest.CaptureFixture[str]) -> None:

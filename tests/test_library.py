@@ -180,3 +180,54 @@ def test_a_case_cannot_be_written_into_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(bemt.InputError, match="file"):
         bemt.propeller("10x5").write(tmp_path / "file")
+
+
+def test_faults_of_the_library_name_arguments() -> None:
+    """All at once, and none speaks of an option of the command line."""
+    with pytest.raises(bemt.InputError) as caught:
+        bemt.estimate("10x5", rpm=-1, airspeed_m_s=1e6, chord_mm=0.8, density_kg_m3=1225)
+    told = str(caught.value)
+    assert len(caught.value.faults) == 4 and "--" not in told
+    assert all(name in told for name in ("rpm", "airspeed_m_s", "chord_mm", "density_kg_m3"))
+
+
+def test_estimate_is_the_answer_of_the_propeller() -> None:
+    points = bemt.estimate("10x5", [4000, 6000], [0.0, 5.0])
+    own = bemt.propeller("10x5").solve([4000, 4000, 6000, 6000], [0.0, 5.0, 0.0, 5.0])
+    np.testing.assert_allclose(points.thrust_N, own.thrust_N, rtol=1e-9)
+    np.testing.assert_allclose(points.u["thrust_N"], own.u["thrust_N"], rtol=1e-9)
+    assert list(points.to_pandas().rpm) == [4000, 4000, 6000, 6000]
+
+
+def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:
+    import pandas as pd
+
+    frame = pd.DataFrame({"rpm": [4000.0, 6000.0, 8000.0], "airspeed_m_s": [0.0, 4.0, 8.0]})
+    frame.to_csv(tmp_path / "plan.csv", index=False)
+    one, other = bemt.plan(frame, "10x5"), bemt.plan(tmp_path / "plan.csv", "10x5")
+    assert one.detectable == other.detectable and one.to_dict()["size"] == pytest.approx(other.to_dict()["size"])
+
+
+def test_a_report_of_one_case(tmp_path: Path) -> None:
+    case = bemt.propeller("10x5").write(tmp_path / "case")
+    html, summary = bemt.report(case, tmp_path / "out", title="Mine")
+    assert "Mine" in html.read_text(encoding="utf-8") and summary.exists()
+
+
+def test_what_an_answer_stands_on_follows_the_case(tmp_path: Path) -> None:
+    """An effect that is switched off is not cited; a duct brings its own; data of the case come along."""
+    p = bemt.propeller("10x5")
+    names = [s.name for s in bemt.cite(p)]
+    assert "swirl" in names and "tip_gap" not in names and len(names) == len(set(names))
+    assert "swirl" not in [s.name for s in bemt.cite(p.replaced({"model.effects_off": ["swirl"]}))]
+    assert all(len(s.source) > 10 for s in bemt.cite(p))
+    fan = bemt.cite(str(Path(__file__).parents[1] / "cases" / "ds30"))
+    assert "tip_gap" in [s.name for s in fan] and any(s.kind == "data" and "Cahill" in s.source for s in fan)
+
+
+def test_the_api_is_typed_where_it_is_installed_editable(project: Path) -> None:
+    """One .pth file, which type checkers follow, instead of an import hook; and the marker of PEP 561."""
+    import tomllib
+
+    config = tomllib.loads((project / "pyproject.toml").read_text(encoding="utf-8"))
+    assert config["tool"]["setuptools"]["package-dir"] == {"": "."} and (project / "bemt" / "py.typed").exists()

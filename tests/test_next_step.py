@@ -32,7 +32,7 @@ def step(d: chain.Answer) -> list[str]:
     first = next(i for i, line in enumerate(lines) if line.strip().startswith("Next: "))
     return [
         lines[first].strip(),
-        *(line.strip() for line in lines[first:] if line.strip().startswith("python -m bemt")),
+        *(line.strip() for line in lines[first:] if line.strip().startswith("bemt")),
     ]
 
 
@@ -85,7 +85,7 @@ def test_the_loads_of_another_rotor_bring_the_question_first(grid: dict[str, np.
     )
     said = told(of(series))
     assert said.decision.verdict == "insufficient"
-    assert "this rotor" in step(said)[0] and step(said)[1].startswith("python -m bemt import")
+    assert "this rotor" in step(said)[0] and step(said)[1].startswith("bemt import")
 
 
 def test_a_level_beside_a_reference_asks_for_the_weather_of_both_days() -> None:

@@ -66,14 +66,40 @@ def test_the_quick_start_runs_as_printed(
     shown = ""
     for command in commands:
         words = shlex.split(command)
-        if words[:3] == ["python", "-m", "bemt"]:
-            assert main(words[3:]) == 0, command
+        if words[0] == "bemt":
+            assert main(words[1:]) == 0, command
         else:
             assert words[0] == "python" and words[1].startswith("docs/"), command
             runpy.run_path(str(ROOT / words[1]), run_name="__main__")
         shown += capsys.readouterr().out
     verdict = re.search(r"offset_deg ([\d.]+)", shown)
     assert verdict is not None and abs(float(verdict[1]) - 1.5) < 0.3
-    assert re.search(r"pitch_offset .* invisible", shown)
+    assert re.search(r"^ +pitch_offset .* no  ", shown, flags=re.M)
     assert main(["diagnose", "after.csv", "--case", "prop_10x5"]) == 0
     assert "verdict: insufficient" in capsys.readouterr().out
+
+
+def fluent(path: Path, name: str, value: float) -> None:
+    """A report file as Fluent writes it: a history that settles at a value."""
+    rows = "".join(f"{k} {value * (1.0 + 0.3 * 0.97**k):.8g}\n" for k in range(1, 601))
+    path.write_text(f'"{path.stem}"\n"Iteration" "{name}"\n("Iteration" "{name}")\n{rows}')
+
+
+def test_the_commands_of_the_cfd_engineer_run_on_fluent_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The block of docs/people.md as printed, with .out files; two grids are told apart before any physics."""
+    page = (ROOT / "docs" / "people.md").read_text(encoding="utf-8").partition("## The CFD engineer")[2]
+    block = re.findall(r"^```sh\n(.*?)^```", page, flags=re.M | re.S)[0]
+    first = shlex.split(block.splitlines()[0])
+    runs = {"coarse": (55000, 22.1, "6e5"), "fine": (55000, 23.4, "5e6"), "run1": (35000, 9.4, "5e6"),
+            "run2": (45000, 15.6, "5e6"), "run3": (55000, 23.4, "5e6")}  # fmt: skip
+    for name, (rpm, thrust, cells) in runs.items():
+        fluent(folder / "thrust-rfile.out", "thrust", thrust)
+        fluent(folder / "torque-rfile.out", "torque", 0.0104 * thrust)
+        words = [{"55000": str(rpm), "run.toml": f"{name}.toml"}.get(w, w) for w in first[1:]]
+        assert main([*words, "--setup", f"cells={cells}"]) == 0
+    capsys.readouterr()
+    shown = {}
+    for command in block.splitlines():
+        assert main(shlex.split(command)[1:]) == 0, command
+        shown[command.split()[1], len(shown)] = capsys.readouterr().out
+    assert "23." in shown["compare", 1] and "grid" in shown["compare", 2] and "verdict" in shown["diagnose", 3]

@@ -103,7 +103,7 @@ def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def _inert(text: str) -> str:
-    """Text that no spreadsheet calculates; a carriage return would begin a row of its own."""
+    """Text that no spreadsheet evaluates; a carriage return would begin a row of its own."""
     text = text.replace("\r", " ")
     if not text.startswith(("=", "+", "-", "@", "\t", " =", " +", " -", " @")):
         return text

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from bemt.base.errors import Fault, InputError
 
-if TYPE_CHECKING:  # numpy is not needed here, and its import would slow `python -m bemt --help`
+if TYPE_CHECKING:  # numpy is not needed here, and its import would slow `bemt --help`
     import numpy as np
     from numpy.typing import NDArray
 

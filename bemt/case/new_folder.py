@@ -44,7 +44,7 @@ class Wanted:
 
 
 _CAMPAIGN = """\
-# OpenFOAM runs of this case: python -m bemt cfd {name}/cfd
+# OpenFOAM runs of this case: bemt cfd {name}/cfd
 schema = "bemt.cfd/1"
 name = "{name}"
 case = "../case.toml"

@@ -152,7 +152,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
     if (blade.known_from == "reference") != posterior:
         got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
         expected = 'known_from = "reference" and blade.as_built.file together'
-        out.add("blade.known_from", got, expected, "python -m bemt calibrate-rotor writes both")
+        out.add("blade.known_from", got, expected, "bemt calibrate-rotor writes both")
     if blade.section is not None:
         _check_section(out, blade.section)
 

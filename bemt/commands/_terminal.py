@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-WIDTH = 110
 GREEN, YELLOW, RED = "32", "33", "31"
 SAID = (
     (GREEN, r"^verdict: (?:named|none)\b.*"),
@@ -28,10 +29,11 @@ REFUSED = ((YELLOW, r"^\S*[Ww]arning: "), (RED, r"^.*?: (?=got )|^.*?: error: |^
 def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
     """Give a function that shows a line; does nothing if quiet, or if stderr is not a terminal."""
     shown = sys.stderr.isatty() and not quiet
+    width = shutil.get_terminal_size().columns - 1  # a wrapped line could not be taken back
 
     def say(line: str) -> None:
         if shown:
-            sys.stderr.write(f"\r\x1b[2K{line[:WIDTH]}")
+            sys.stderr.write(f"\r\x1b[2K{line[:width]}")
             sys.stderr.flush()
 
     try:
@@ -47,24 +49,41 @@ def complain(what: object) -> None:
     print(what, file=sys.stderr, flush=True)
 
 
-def called() -> str:
-    """How the user called this program."""
-    name = os.path.basename(sys.argv[0] if sys.argv else "").removesuffix(".exe")
-    return "bemt" if name == "bemt" else "python -m bemt"
+def folded(text: str, width: int) -> str:
+    r"""Text with sentences folded at a width, at the indent of their line; tables are left as they are.
+
+    >>> print(folded("  one sentence that is too long\na   table   of   cells   stays", 20))
+      one sentence that
+        is too long
+    a   table   of   cells   stays
+    """
+    out = []
+    for line in text.split("\n"):
+        indent = len(line) - len(line.lstrip(" "))
+        if len(line) > width > indent + 20 and "  " not in line[indent:] and "\r" not in line:  # no line of progress
+            first, more = " " * indent, " " * (indent + 2)
+            out += textwrap.wrap(
+                line.strip(), width, initial_indent=first, subsequent_indent=more, break_long_words=False,
+                break_on_hyphens=False,
+            )  # fmt: skip
+        else:
+            out.append(line)
+    return "\n".join(out)
 
 
 class _Painted:
-    """Stream that colours what the patterns match."""
+    """Stream of a terminal: folds sentences at its width, and colours what the patterns match."""
 
     def __init__(self, stream: Any, patterns: tuple[tuple[str, str], ...]) -> None:
         self._stream, self._colours = stream, [colour for colour, _ in patterns]
         self._any = re.compile("|".join(f"({pattern})" for _, pattern in patterns), re.M)
 
     def write(self, text: str) -> int:
-        """Write, coloured."""
-        self._stream.write(
-            self._any.sub(lambda found: f"\x1b[{self._colours[(found.lastindex or 1) - 1]}m{found[0]}\x1b[0m", text)
-        )
+        """Write, folded and coloured."""
+        shown = folded(text, shutil.get_terminal_size().columns)
+        if self._colours:
+            told = self._any.sub(lambda f: f"\x1b[{self._colours[(f.lastindex or 1) - 1]}m{f[0]}\x1b[0m", shown)
+        self._stream.write(told if self._colours else shown)
         return len(text)
 
     def __getattr__(self, name: str) -> Any:
@@ -73,14 +92,14 @@ class _Painted:
 
 @contextmanager
 def coloured() -> Iterator[None]:
-    """Colour stdout and stderr on a terminal, unless NO_COLOR is set (https://no-color.org)."""
+    """Fold long lines on a terminal, and colour them unless NO_COLOR is set (https://no-color.org)."""
     plain = bool(os.environ.get("NO_COLOR")) or os.environ.get("TERM") == "dumb"
     before = sys.stdout, sys.stderr
     try:
-        if not plain and sys.stdout.isatty():
-            sys.stdout = _Painted(sys.stdout, SAID)
-        if not plain and sys.stderr.isatty():
-            sys.stderr = _Painted(sys.stderr, REFUSED)
+        if sys.stdout.isatty():
+            sys.stdout = _Painted(sys.stdout, () if plain else SAID)
+        if sys.stderr.isatty():
+            sys.stderr = _Painted(sys.stderr, () if plain else REFUSED)
         yield
     finally:
         sys.stdout, sys.stderr = before

@@ -1,4 +1,4 @@
-"""``python -m bemt bench``: time per operating point, ours and the peers'."""
+"""``bemt bench``: time per operating point, ours and the peers'."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt calibrate FILES``: K1/K2 refitted on measured propellers, and where the formula holds."""
+"""``bemt calibrate FILES``: K1/K2 refitted on measured propellers, and where the formula holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt calibrate-rotor REFERENCE --case CASE``: a case whose rotor is known from a run of its own."""
+"""``bemt calibrate-rotor REFERENCE --case CASE``: a case whose rotor is known from a run of its own."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
         if written:
             folder = shlex.quote(Path(args.out).as_posix())
             print(f"{Path(args.out).as_posix()}: {', '.join(written)}")
-            print(f"next: {_terminal.called()} sweep {folder}")
+            print(f"next: bemt sweep {folder}")
             if case.file.drive is not None:
-                print(f"      {_terminal.called()} drive {folder}")
+                print(f"      bemt drive {folder}")
         else:
             print("nothing written; --out DIR writes the case with this rotor")
     return EXIT_OK if found.found.converged else EXIT_UNCONVERGED

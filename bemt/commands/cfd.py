@@ -1,4 +1,4 @@
-"""``python -m bemt cfd CAMPAIGN.toml``: run a list of CFD cases, resume where it stopped, record what came out."""
+"""``bemt cfd CAMPAIGN.toml``: run a list of CFD cases, resume where it stopped, record what came out."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from typing import Any
 import bemt.commands
 from bemt import __version__
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
-from bemt.commands._terminal import called, coloured
+from bemt.commands._terminal import coloured
 
 __all__ = ["build_parser", "commands", "main"]
 
@@ -108,7 +108,7 @@ def commands() -> dict[str, ModuleType]:
     return {file.NAME: file for file in files if hasattr(file, "NAME")}
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> _Top:
     """Make the parser of the whole command line.
 
     >>> args = build_parser().parse_args(["sweep", "cases/", "--jobs", "2"])
@@ -116,7 +116,7 @@ def build_parser() -> argparse.ArgumentParser:
     ('sweep', ['cases/'], 2)
     """
     what = "Propeller and ducted-fan aerodynamics: BEMT, compared with the K1/K2 model, CFD and bench recordings."
-    parser = _Top(prog=called(), description=what)
+    parser = _Top(prog="bemt", description=what)
     parser.add_argument("--version", action="version", version=f"bemt {__version__}")
     adder = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
     parser.found, parser.parsers = commands(), {}

@@ -1,4 +1,4 @@
-"""``python -m bemt compare A B``: what changed between two recordings; ``RUN --case C``: one run and BEMT."""
+"""``bemt compare A B``: what changed between two recordings; ``RUN --case C``: one run and BEMT."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt data uiuc``: a public database of measured propellers into the user's cache."""
+"""``bemt data uiuc``: a public database of measured propellers into the user's cache."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt diagnose``: recording and case in, the physics that was left out."""
+"""``bemt diagnose``: recording and case in, the physics that was left out."""
 
 from __future__ import annotations
 

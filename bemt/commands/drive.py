@@ -1,4 +1,4 @@
-"""``python -m bemt drive``: thrust over pulse width, hover, endurance and response of a rotor with its drive."""
+"""``bemt drive``: thrust over pulse width, hover, endurance and response of a rotor with its drive."""
 
 from __future__ import annotations
 

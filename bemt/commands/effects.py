@@ -1,4 +1,4 @@
-"""``python -m bemt effects``: every effect of the catalogue, its parameters and their sources, what gives it away."""
+"""``bemt effects``: every effect of the catalogue, its parameters and their sources, what gives it away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt estimate 10x5 --rpm 6000``: thrust and power from a label, with bands, K1/K2 beside them."""
+"""``bemt estimate 10x5 --rpm 6000``: thrust and power from a label, with bands, K1/K2 beside them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt export CASE --out DIR``: a case as solids, as loads for simulators, as disks and blades."""
+"""``bemt export CASE --out DIR``: a case as solids, as loads for simulators, as disks and blades."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt import``: what is in a file of results, with honest means, in one table or one JSON document."""
+"""``bemt import``: what is in a file of results, with honest means, in one table or one JSON document."""
 
 from __future__ import annotations
 

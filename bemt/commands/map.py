@@ -1,4 +1,4 @@
-"""``python -m bemt map``: a bench recording becomes a map of pulse width to thrust, and back."""
+"""``bemt map``: a bench recording becomes a map of pulse width to thrust, and back."""
 
 from __future__ import annotations
 

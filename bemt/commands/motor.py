@@ -1,4 +1,4 @@
-"""``python -m bemt motor``: the torque constant by three methods, whether they agree, and why not."""
+"""``bemt motor``: the torque constant by three methods, whether they agree, and why not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt new 10x5``: a commented case folder that runs at once, unknowns as assumptions with ranges."""
+"""``bemt new 10x5``: a commented case folder that runs at once, unknowns as assumptions with ranges."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 
 from bemt.base.errors import EXIT_OK
 from bemt.commands import _options
-from bemt.commands._terminal import called
 
 NAME = "new"
 HELP = "write a case folder from a label, stations, a scan or the diameter of a fan"
@@ -54,9 +53,9 @@ def run(args: argparse.Namespace) -> int:
     folder, files = new_folder.write(new_folder.Wanted(**told, airspeed_m_s=args.airspeed), args.out)
     print(f"{folder.as_posix()}: {', '.join(files)}")
     typed = shlex.quote(folder.as_posix())
-    print(f"next: {called()} sweep {typed}")
+    print(f"next: bemt sweep {typed}")
     if args.kv is not None:
-        print(f"      {called()} drive {typed}")
+        print(f"      bemt drive {typed}")
     if args.campaign:
-        print(f"      {called()} cfd {typed}/cfd")
+        print(f"      bemt cfd {typed}/cfd")
     return EXIT_OK

@@ -1,4 +1,4 @@
-"""``python -m bemt plan``: which effects a test plan can see, before anyone measures."""
+"""``bemt plan``: which effects a test plan can see, before anyone measures."""
 
 from __future__ import annotations
 

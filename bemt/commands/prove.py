@@ -1,4 +1,4 @@
-"""``python -m bemt prove``: conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
+"""``bemt prove``: conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
 
 from __future__ import annotations
 

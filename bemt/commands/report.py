@@ -1,4 +1,4 @@
-"""``python -m bemt report CASES --out DIR``: the validation report as one self-contained HTML file and a summary."""
+"""``bemt report CASES --out DIR``: the validation report as one self-contained HTML file and a summary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt reproduce``: every number of the source thesis beside ours."""
+"""``bemt reproduce``: every number of the source thesis beside ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt stations FILE``: stations of a CAD model, a scan or a design tool's file, as a case to solve."""
+"""``bemt stations FILE``: stations of a CAD model, a scan or a design tool's file, as a case to solve."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``python -m bemt sweep``: solve cases and print them beside their recorded values."""
+"""``bemt sweep``: solve cases and print them beside their recorded values."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(json_text(document))
     elif not args.quiet and not args.details:
         files = find_cases(args.paths)
-        print(summary(document["cases"], _terminal.called(), files, cut=sys.stdout.isatty()))
+        print(summary(document["cases"], files, cut=sys.stdout.isatty()))
     elif not args.quiet:
         solved = [case_text(result) for result in document["cases"]]
         print("\n\n".join([*solved, overview_text(document["cases"])]))

@@ -1,4 +1,4 @@
-"""``python -m bemt thrusters``: share force and roll moment among the thrusters of a body."""
+"""``bemt thrusters``: share force and roll moment among the thrusters of a body."""
 
 from __future__ import annotations
 

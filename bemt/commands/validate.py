@@ -1,4 +1,4 @@
-"""``python -m bemt validate DIR``: BEMT against a folder of measured propellers."""
+"""``bemt validate DIR``: BEMT against a folder of measured propellers."""
 
 from __future__ import annotations
 

@@ -166,7 +166,7 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
         out.append(f"{ends} ({density - 1:+.1%}).")
     step = doc.get("next_measurement") or {}
     told = doc["told"] if "diagnosis" in doc else [sentence(doc)]
-    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(("Next: ", "python -m bemt ")))]
+    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(("Next: ", "bemt ")))]
     drive = (doc.get("subsystems") or {}).get("drive")
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")

@@ -33,7 +33,7 @@ class Invocation:
         """Command that asks this, some of it replaced.
 
         >>> Invocation("a.csv", "b.csv", rows_b=("rotor=right",), label="10x5").command(case="CASE")
-        'python -m bemt compare a.csv b.csv --rows-b rotor=right --label 10x5 --case CASE'
+        'bemt compare a.csv b.csv --rows-b rotor=right --label 10x5 --case CASE'
         """
         given = replace(self, **other)
         words = [given.a, given.b]
@@ -41,7 +41,7 @@ class Invocation:
             words += [word for row in rows for word in (option, row)]
         options = {"--air-a": given.air_a, "--air-b": given.air_b, "--label": given.label, "--case": given.case}
         words += [word for option, text in options.items() if text is not None for word in (option, text)]
-        return " ".join(["python -m bemt compare", *(shlex.quote(word) for word in words)])
+        return " ".join(["bemt compare", *(shlex.quote(word) for word in words)])
 
     def with_rows(self, letter: str, column: str) -> str:
         """Command that also chooses a range of one column of A or B; LOW and HIGH are the user's to fill in."""
@@ -52,7 +52,7 @@ class Invocation:
         """Command with the air of both days; what was not given is the user's to fill in.
 
         >>> Invocation("a.csv", "b.csv", air_a="45kt", air_b="1.2kg/m3").with_days()
-        'python -m bemt compare a.csv b.csv --air-a TEMPERATURE,PRESSURE,45kt --air-b 1.2kg/m3'
+        'bemt compare a.csv b.csv --air-a TEMPERATURE,PRESSURE,45kt --air-b 1.2kg/m3'
         """
         return self.command(air_a=_with_places(self.air_a), air_b=_with_places(self.air_b))
 

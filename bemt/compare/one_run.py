@@ -44,17 +44,13 @@ def cfd_points(path: str) -> tuple[Dataset, Dataset]:
     if is_run(imported):
         return imported, imported
     if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
-        hint = (
-            f"`python -m bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
-        )
+        hint = f"`bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
         raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
     points = named(as_dataset(imported))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
     if not known or ("rpm" not in points and "thrust_N" in points):
         got = f"channels {', '.join(list(imported.values)[:8])}"
-        raise InputError(
-            Fault(path, "", got, "a speed and a load", "`python -m bemt import` shows how each column was read")
-        )
+        raise InputError(Fault(path, "", got, "a speed and a load", "`bemt import` shows how each column was read"))
     if conditions_of(imported):
         u = {}
         flies = np.nan_to_num(points.values.get("airspeed_m_s", np.zeros(len(points)))) > 0.5
@@ -219,11 +215,9 @@ def _next(document: Mapping[str, Any], name: str, case: str) -> str:
     readings = sum(len([k for k in p["loads"] if k != "duct_share"]) for p in document["points"])
     if readings < 3:
         steps.append("two more speeds or airspeeds: one point fits any cause; then "
-                     f"`python -m bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
+                     f"`bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
     else:
-        steps.append(
-            f"`python -m bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot"
-        )
+        steps.append(f"`bemt diagnose {name} --case {case}` names what fits all points, or says that it cannot")
     return "; ".join(steps)
 
 

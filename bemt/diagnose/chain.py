@@ -176,9 +176,9 @@ def _next(
     elif chosen.kind == "air":
         commands = given.of_days()
     elif chosen.kind == "rotor":
-        commands = (f"python -m bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE"))
+        commands = (f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE"))
     elif chosen.kind == "mend":
-        commands = tuple(f"python -m bemt import {f}" for f in given.recordings)
+        commands = tuple(f"bemt import {f}" for f in given.recordings)
     else:
         commands = ()
     return replace(chosen, commands=commands)

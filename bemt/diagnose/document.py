@@ -141,7 +141,8 @@ def _gain(d: Answer) -> str:
             f"{_CHANNEL[channel].lower()} {s['holdout_before'] / most:.1%} before, {s['holdout_after'] / most:.1%} "
             f"after (noise {s['noise'] / most:.1%}, smooth fit without physics {s['gp_only'] / most:.1%})"
         )
-    return f"Prediction error on {d.blocks} left out of the fit, of the largest value: " + "; ".join(words) + "."
+    head = f"Predicting {d.blocks} it was not fitted to, the error in % of the largest value is: "
+    return head + "; ".join(words) + "."
 
 
 def _parameters(d: Answer) -> str:
@@ -217,7 +218,7 @@ def explanation(d: Answer) -> list[str]:
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
     if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
-        lines.append(f"Before any physics: the case is of another rotor ({off}). Check diameter, pitch and blades "
+        lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {wrong_rotor_check.nearest_rotors(d.problem)}.")  # fmt: skip
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."

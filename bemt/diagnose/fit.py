@@ -279,7 +279,7 @@ def _told(grid: dict[str, Any], value: Any, unit: str) -> dict[str, Any]:
 
 
 def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:
-    """Range of a parameter, as far as the world has it at these points."""
+    """Range of a parameter that is physically possible at these points."""
     values = [float(s[p.name]) for s in found.of(id_).settings if p.name in s]
     inside = [max(min(values), p.low), min(max(values), p.high)] if values else [p.low, p.high]
     return (inside[0], inside[1]) if inside[1] > inside[0] else (p.low, p.high)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["beside", "elsewhere", "improved_case", "is_improved"]
 
-_HEAD = "with what `python -m bemt diagnose` found: "
+_HEAD = "with what `bemt diagnose` found: "
 
 
 def improved_case(answer: Answer, case: Case, source: str) -> str:

@@ -21,6 +21,7 @@ from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.case import Case
+    from bemt.dataset import Dataset
 
 __all__ = ["SCHEMA", "Plan", "document", "plan", "points", "text"]
 
@@ -33,6 +34,8 @@ SCHEMA = "bemt.plan/1"
 _HYPER = (1.0, 0.0, 0.01, 0.6)
 _BEST = (1.0, 0.0, 0.003, 0.3)
 _ONE_IN_20 = 1.645
+DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
+"""Words for people."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +86,19 @@ class Plan:
 
 def points(path: str, case: Case) -> Record:
     """Read the points of a plan: a recording whose loads are not there yet."""
+    from bemt.recordings.load import import_file
+
+    return record_of(import_file(path), case)
+
+
+def record_of(imported: Dataset, case: Case) -> Record:
+    """Points of a plan from a table of them."""
     from bemt.base.errors import Fault, InputError
     from bemt.dataset import Dataset
     from bemt.diagnose.record import from_series
     from bemt.recordings.channels import named
-    from bemt.recordings.load import import_file
 
-    imported = import_file(path)
+    path = imported.name
     rows = named(imported)
     values = {k: v for k, v in imported.values.items() if imported.unit(k) or k in ("rpm", "J", "run")}
     values |= dict(rows.values)
@@ -181,9 +190,10 @@ def text(answer: Plan) -> str:
     for a in order:
         near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= look.ALIKE]
         nearest = min(near, default=(float("nan"), "-"))
-        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}", answer.sight[c.ids[a]],
+        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}",
+                     DETECTABLE[answer.sight[c.ids[a]]],
                      f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
-    header = ["effect", "", "size", "sight", "nearest look-alike"]
+    header = ["effect", "", "size", "detectable", "nearest look-alike"]
     out = [f"plan of {answer.points} points: size of each effect at typical strength, in standard deviations",
            text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
     for group in c.classes():

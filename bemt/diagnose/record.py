@@ -159,7 +159,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
         raise InputError(
             Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients",
-                  "`python -m bemt import` shows how each column was read and what names one")
+                  "`bemt import` shows how each column was read and what names one")
         )  # fmt: skip
     rpm = got["rpm"].copy()
     if "airspeed_m_s" in got:

@@ -149,7 +149,7 @@ def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Pat
         source["assumptions"] = array
     elsewhere(source, case)
     names = ", ".join(Path(p).name for p in paths)
-    head = f"# {case.name} with its rotor as `python -m bemt calibrate-rotor` found it from {names}"
+    head = f"# {case.name} with its rotor as `bemt calibrate-rotor` found it from {names}"
     files = {file.relative_to(case.folder): file.read_bytes() for file in beside(case) if file.name != POSTERIOR}
     for name, data in files.items():
         write_atomic(out / name, data)

@@ -78,12 +78,12 @@ class Given:
         """Command that diagnoses the same again, or with one more file."""
         files = [*self.recordings, *([run] if run else [])]
         known = [*self.references, *([reference] if reference else [])]
-        words = ["python -m bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
+        words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
         return " ".join(words)
 
     def comparison(self, reference: str) -> str:
         """Command that sets the first recording beside a reference."""
-        return f"python -m bemt compare {reference} {self.recordings[0]}"
+        return f"bemt compare {reference} {self.recordings[0]}"
 
     def of_days(self) -> tuple[str, ...]:
         """Command that compares with each reference in the air of both days."""

@@ -12,13 +12,26 @@ from __future__ import annotations
 import ast
 import dataclasses
 import importlib
+import inspect
 import pkgutil
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 
 from bemt.effects.base import Baking, Effect, Parameter
 
-__all__ = ["Baking", "Effect", "Parameter", "catalogue", "from_text", "places", "standard", "to_text", "without"]
+__all__ = [
+    "Baking",
+    "Effect",
+    "Parameter",
+    "catalogue",
+    "from_text",
+    "places",
+    "source_of",
+    "standard",
+    "to_text",
+    "without",
+]
 
 
 @lru_cache(maxsize=1)
@@ -44,6 +57,12 @@ def catalogue() -> dict[str, type[Effect]]:
 def places() -> dict[str, int]:
     """Position of each effect in the catalogue, by id."""
     return {name: k for k, name in enumerate(catalogue())}
+
+
+def source_of(cls: type[Effect]) -> str:
+    """Law of an effect and where it comes from: the notes of its docstring, in one line."""
+    text = inspect.cleandoc(cls.__doc__ or "").partition("Notes\n-----\n")[2]
+    return re.sub(r":\w+:`([^`]+)`|``([^`]+)``", r"`\1\2`", " ".join(text.split()))
 
 
 def standard() -> tuple[Effect, ...]:

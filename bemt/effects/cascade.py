@@ -61,7 +61,7 @@ class Cascade(Effect):
     inviscid = True
     title = "blade interference at high solidity (cascade)"
     sign = (
-        "less thrust and less torque by shares that grow with solidity and hardly depend on speed; solidity above 0.3"
+        "less thrust and less torque by shares that grow with solidity and barely depend on speed; solidity above 0.3"
     )
     parameters = (
         Parameter("zero_lift", "1", 0.0, 1.0, "1: the row's zero-lift angle; 0: the single section's", steps=0),

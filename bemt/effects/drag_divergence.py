@@ -31,7 +31,9 @@ class DragDivergence(Effect):
 
     id = "drag_divergence"
     title = "transonic drag divergence"
-    sign = "torque rises sharply above one tip Mach number, thrust hardly; Reynolds number would act at every speed"
+    sign = (
+        "torque rises sharply above one tip Mach number, thrust barely moves; Reynolds number would act at every speed"
+    )
     parameters = (Parameter("kappa", "1", 0.80, 0.95, "0.87 NACA sections, 0.95 supercritical (Mason 1990)", 5),)
     uses_mach = True
     order = 45

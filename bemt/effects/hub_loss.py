@@ -22,7 +22,7 @@ class HubLoss(Effect):
     id = "hub_loss"
     inviscid = True
     title = "hub loss (lift loss at the blade root)"
-    sign = "less thrust and torque by constant shares, growing with loading; the root is so slow that it hardly shows"
+    sign = "less thrust and torque by constant shares, growing with loading; the root is so slow that it barely shows"
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl", 3),)
 
     def momentum(self, bake: Baking) -> None:

@@ -33,7 +33,7 @@ class Nacelle(Effect):
     inviscid = True
     title = "body behind the propeller"
     check = "run without the propeller at the same airspeeds and subtract that drag"
-    sign = "thrust is low by an amount that grows with V^2 (in the slipstream also with load), torque hardly changes"
+    sign = "thrust is low by an amount that grows with V^2 (in the slipstream also with load), torque barely changes"
     parameters = (
         Parameter("deficit", "1", 0.0, 0.6, "0.25 on the axis of a half-body, more of a blunt one", 4, 0.0),
         Parameter("cd", "1", 0.0, 1.2, "spinner to bluff motor, on hub area, Hoerner 1965", 4, 0.0),

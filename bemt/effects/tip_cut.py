@@ -27,7 +27,7 @@ class TipCut(Effect):
     id = "tip_cut"
     geometric = True
     title = "blades shorter than stated"
-    sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust hardly moves"
+    sign = "less thrust and even less torque at every speed; the advance ratio of zero thrust barely moves"
     check = "measure the diameter"
     parameters = (Parameter("cut", "1", 0.0, 0.15, "declared, share of the radius", 4, 0.0),)
     on_by_default = False

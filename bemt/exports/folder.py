@@ -159,6 +159,11 @@ def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
     return files | dict(manifest.get("openfoam", {}).get("files", {}))
 
 
+def listed(manifest: Mapping[str, Any]) -> list[str]:
+    """Names of the files that a manifest lists, below its folder."""
+    return sorted(_hashes(manifest))
+
+
 def _manifest(out: Path) -> dict[str, Any]:
     """Manifest of the export that is in a folder; empty when it is not one of ours."""
     try:

@@ -6,7 +6,11 @@ small object. Nothing prints. Bad input raises :class:`bemt.base.errors.InputErr
 
 from __future__ import annotations
 
+from bemt.library.actions import calibrate_rotor, cite, estimate, export, plan, report
 from bemt.library.answers import Answer, compare, diagnose, drive, read, validate
 from bemt.library.rotors import Propeller, load, propeller
 
-__all__ = ["Answer", "Propeller", "compare", "diagnose", "drive", "load", "propeller", "read", "validate"]
+__all__ = [
+    "Answer", "Propeller", "calibrate_rotor", "cite", "compare", "diagnose", "drive", "estimate", "export", "load",
+    "plan", "propeller", "read", "report", "validate",
+]  # fmt: skip

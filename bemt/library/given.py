@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +13,34 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["numbers", "path_text"]
+__all__ = ["in_words_of_the_library", "numbers", "path_text"]
+
+ARGUMENTS = {
+    "--airspeed": "airspeed_m_s", "--density": "density_kg_m3", "--format": "formats", "--out": "folder",
+    "--case": "propeller", "--plan": "points",
+}  # fmt: skip
+"""Arguments whose name is not the option's."""
+
+
+def argument(option: str) -> str:
+    """Name of the argument for an option of the command line; other words stay.
+
+    >>> argument("--chord-mm"), argument("--airspeed"), argument("case.toml")
+    ('chord_mm', 'airspeed_m_s', 'case.toml')
+    """
+    return ARGUMENTS.get(option, option[2:].replace("-", "_")) if option.startswith("--") else option
+
+
+@contextmanager
+def in_words_of_the_library() -> Iterator[None]:
+    """Name arguments, not options, in the faults of what runs inside."""
+    try:
+        yield
+    except InputError as error:
+        faults = [replace(f, file=argument(f.file), where=argument(f.where)) for f in error.faults]
+        if faults == list(error.faults):
+            raise
+        raise InputError(faults) from error
 
 
 def numbers(name: str, value: Any) -> NDArray[np.float64]:

@@ -351,15 +351,13 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
             if typed.strip("'") == found["runs"][0]["name"]
             else "With --out run.toml: "
         )
-        return "\n".join(
-            [*lines, f"{lead}Next: python -m bemt compare {typed} --case CASE   (a case: python -m bemt new 10x5)\n"]
-        )
+        return "\n".join([*lines, f"{lead}Next: bemt compare {typed} --case CASE   (a case: bemt new 10x5)\n"])
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)
-        lines.append(f"Next: python -m bemt diagnose {first} --case CASE   (a case: python -m bemt new 10x5)\n")
+        lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")
         if len(others) == 1:
-            lines[-1] += f"      python -m bemt compare {first} {others[0]}\n"
+            lines[-1] += f"      bemt compare {first} {others[0]}\n"
     return "\n".join(lines)
 
 

@@ -7,15 +7,18 @@ page unescaped, no file outside of DIR is written, and the HTML lets no script r
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.face import CallableRoom
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
 HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
+sys.modules[__name__].__class__ = CallableRoom  # bemt.report(...) is bemt.library.report(...)
 
 
 def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -46,7 +49,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
     thesis = (
         "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
-        "python -m bemt reproduce where those data are."
+        "bemt reproduce where those data are."
     )
     told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
     for key, title, top, found in (

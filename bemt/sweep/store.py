@@ -54,7 +54,7 @@ def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
 
 
 def keep(folder: Path, mark: str, result: Mapping[str, Any]) -> None:
-    """Write table and result; the result comes last, for it says that all is there."""
+    """Write table and result; the result comes last, so its presence marks completion."""
     stored = {"fingerprint": mark, "result": result}
     write_atomic(folder / TABLE, case_text(result) + "\n")
     write_atomic(folder / RESULT, json_text({**stored, "sha256": _seal(stored)}))

@@ -18,9 +18,7 @@ WIDTH, ROWS, SCREEN = 80, 20, 45
 """Columns of the screen, rows of the table and lines of the screen: the rest is counted."""
 
 
-def summary(
-    results: Sequence[Mapping[str, Any]], called: str = "python -m bemt", files: Sequence[Path] = (), cut: bool = True
-) -> str:
+def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cut: bool = True) -> str:
     """Summary of all cases, at most 45 lines of 80 columns; without `cut` long lines go on in the next one.
 
     ``files`` are those of the results: two cases may have one name.
@@ -36,7 +34,7 @@ def summary(
         lines += _short(f"{name}: not solved, {n} {'fault' if n == 1 else 'faults'} (see the messages)", cut)
     if len(failed) > 6:
         lines.append(f"and {len(failed) - 6} more that were not solved")
-    end = ["", *_next(called, bool(found))] if solved else []
+    end = ["", *_next(bool(found))] if solved else []
     for words in (_drives(solved), _worst(found), _ducts(solved), _unknowns(solved), _grids(solved, cut)):
         lines += ["", *words] if words else []
     flags = _flags(solved, SCREEN - len(lines) - len(end) - 1)
@@ -211,14 +209,14 @@ def _grids(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
     return [part for line in lines[:4] for part in _short(line, cut)]
 
 
-def _next(called: str, compared: bool) -> list[str]:
+def _next(compared: bool) -> list[str]:
     lines = [
         "More: --details (every case in full), --out DIR (tables), --json,",
-        f"  {called} report CASES --out DIR (figures)",
+        "  bemt report CASES --out DIR (figures)",
     ]
     if compared:
         lines[-1] += ","
-        lines.append(f"  {called} diagnose LOG --case CASE (what the model leaves out)")
+        lines.append("  bemt diagnose LOG --case CASE (what the model leaves out)")
     return lines
 
 

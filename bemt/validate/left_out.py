@@ -57,7 +57,7 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
         "folder": name,
         "families": sorted({s.record.family for s in seen}),
         "version": __version__,
-        "command": f"python -m bemt validate {name} --fit-population FILE",
+        "command": f"bemt validate {name} --fit-population FILE",
         "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
     }
     p, numbers = fit([s.record for s in seen], provenance=provenance)

@@ -1,0 +1,122 @@
+"""What the answer for a case stands on: the source of each effect, table and data set that takes part."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from bemt.case import Case
+from bemt.effects import source_of
+from bemt.readers import references as reference_file
+
+SCHEMA = "bemt.sources/1"
+BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, beside recordings, version {}; "
+        "CITATION.cff gives the entry to cite")  # fmt: skip
+METHOD = (
+    "Blade element momentum theory: Glauert (1935), Airplane Propellers, in Durand, Aerodynamic Theory IV, ch. VII; "
+    "one residual in the inflow angle: Ning (2014), Wind Energy 17:1327, doi:10.1002/we.1636"
+)
+TABLES = (
+    "NeuralFoil (Sharpe 2024, github.com/peterdsharpe/NeuralFoil), a fit to XFOIL (Drela 1989, in Low Reynolds Number "
+    "Aerodynamics, Springer)"
+)
+K1K2 = (
+    "K1/K2 formula, for comparison: Staples (2013), Propeller Static & Dynamic Thrust Calculation, "
+    "electricrcaircraftguy.com"
+)
+RULE = (
+    "section rule of this project (bemt/sections/rule.py), calibrated on UIUC volume 1: NACA four-digit section, "
+    "n_crit {}, drag times {}"
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """One thing that an answer stands on.
+
+    Parameters
+    ----------
+    kind : str
+        ``method``, ``effect``, ``sections``, ``band``, ``comparison`` or ``data``.
+    name : str
+        Effect, table or file.
+    source : str
+        Law and reference; "not checked" marks a formula whose source could not be read.
+    """
+
+    kind: str
+    name: str
+    source: str
+
+
+def sources(case: Case) -> tuple[Source, ...]:
+    """Everything that takes part in the answer for a case, the method first.
+
+    Effects are those that are switched on; one that is inert for this rotor (a tip gap without a duct) is left out.
+    """
+    from bemt import __version__
+    from bemt.case.prepare import prepare_case
+
+    effects = [e for e in prepare_case(case).effects if case.ducted or e.id not in ("duct", "tip_gap")]
+    return (
+        Source("method", "program", BEMT.format(__version__)),
+        Source("method", "blade element momentum", METHOD),
+        *(Source("effect", e.id, source_of(type(e)) or "declared by this project") for e in effects),
+        *_sections(case),
+        *_bands(case),
+        Source("comparison", "k1k2", K1K2),
+        *_data(case),
+    )
+
+
+def _sections(case: Case) -> list[Source]:
+    given = case.file.polars
+    if given:
+        return [Source("sections", item.file, "table of the case; its file names its origin") for item in given]
+    model = case.file.model
+    return [
+        Source("sections", "tables", TABLES),
+        Source("sections", "rule", RULE.format(f"{model.n_crit:g}", f"{model.drag_level:g}")),
+    ]
+
+
+def _bands(case: Case) -> list[Source]:
+    from bemt.rotors import population
+
+    about = population.population().provenance
+    words = f"{about['propellers']} measured propellers ({about['points']} points) of {len(about['families'])} families"
+    found = [Source("band", "population", f"{about['source']}: {words}")]
+    if case.file.blade.as_built is not None:
+        origin = "runs of this rotor, taken in by `bemt calibrate-rotor`"
+        found.insert(0, Source("band", "as built", origin))
+    return found
+
+
+def _data(case: Case) -> list[Source]:
+    """Sources of the recorded values, each once."""
+    found = [Source("data", "case", case.file.origin)] if case.file.origin else []
+    path = case.references_path
+    rows = [] if path is None else reference_file.read(path)
+    told = dict.fromkeys((row.kind, row.source) for row in rows if row.source)
+    return found + [Source("data", kind, source) for kind, source in told]
+
+
+def document(case: Case) -> dict[str, Any]:
+    """Plain values of schema ``bemt.sources/1``."""
+    return {"schema": SCHEMA, "case": case.name, "sources": [asdict(s) for s in sources(case)]}
+
+
+def text(case: Case, width: int = 100) -> str:
+    """Sources for a terminal, in groups."""
+    titles = {"method": "Method", "effect": "Effects that are switched on", "sections": "Section tables",
+              "band": "Uncertainty band", "comparison": "Comparison", "data": "Recorded values"}  # fmt: skip
+    found = sources(case)
+    lines = [f"What the answer for {case.name} stands on:"]
+    for kind, title in titles.items():
+        rows = [s for s in found if s.kind == kind]
+        lines += ["", title] if rows else []
+        for s in rows:
+            lines += textwrap.wrap(f"{s.name}: {s.source}", width, initial_indent="  ", subsequent_indent="    ",
+                                   break_on_hyphens=False, break_long_words=False)  # fmt: skip
+    return "\n".join(lines)
