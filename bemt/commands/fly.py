@@ -99,5 +99,5 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
         return answer
     rpm = sum(speeds) / len(speeds)
     points = rotor_of(case).solve(rpm=rpm, airspeed_m_s=0.0)
-    u = points.u("thrust_N")
+    u = points.u["thrust_N"]
     return replace(answer, predicted=(float(points.thrust_N[0]) / rpm**2, float(u[0]) / rpm**2))

@@ -91,7 +91,7 @@ class FlightAnswer:
             lines.append(
                 "  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data."
             )
-        if np.isfinite(j.total_half) and abs(j.total) > j.total_half:
+        if j.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
             lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
                          f"±{100 * j.total_half:.1f} %): weight at the centre, battery or air.")  # fmt: skip
         if np.isfinite(self.wind.speed):

@@ -36,8 +36,11 @@ def read(path: Path) -> FlightLog:
     noise = io.StringIO()
     stopped, params = "", {}
     try:
-        with contextlib.redirect_stdout(noise), contextlib.redirect_stderr(noise):
-            log = reader(name)
+        with (
+            contextlib.redirect_stdout(noise),
+            contextlib.redirect_stderr(noise),
+            contextlib.closing(reader(name)) as log,
+        ):
             try:
                 while (m := log.recv_match(type=list(_TYPES))) is not None:
                     row = m.to_dict()

@@ -1,6 +1,7 @@
-"""Crazyflie: binary logs of its micro-SD card (``.usdlog``); the records are read by :mod:`bemt.readers.crazyflie_log`.
+"""Crazyflie: binary logs of its micro-SD card (``.usdlog``); the records are read in the readers' room.
 
-Units of the firmware's log variables (Bitcraze, crazyflie-firmware): acc g; gyro deg/s; pwm and motor 0 to 65535; vbatMV mV.
+Units of the firmware's log variables (Bitcraze, crazyflie-firmware): acc g; gyro deg/s; pwm and motor 0 to 65535;
+vbatMV mV.
 """
 
 from __future__ import annotations

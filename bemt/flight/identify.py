@@ -133,10 +133,11 @@ def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant
 
 def _regress(X: Array, y: Array) -> tuple[Array, Array]:
     """Least squares, with half widths of 95 % from the blocks."""
-    whole = np.linalg.lstsq(X, y, rcond=None)[0]
+    whole: Array = np.linalg.lstsq(X, y, rcond=None)[0].astype(float)
     parts = [np.linalg.lstsq(X[p], y[p], rcond=None)[0] for p in np.array_split(np.arange(y.size), _BLOCKS)]
     spread = np.std(parts, axis=0, ddof=1)
-    return whole, stats.t.ppf(0.975, _BLOCKS - 1) * spread / np.sqrt(_BLOCKS)
+    half: Array = float(stats.t.ppf(0.975, _BLOCKS - 1)) * spread / np.sqrt(_BLOCKS)
+    return whole, half
 
 
 def _per_rotor(

@@ -1,9 +1,10 @@
 """What is wrong with a flight, beside healthy ones: a rigid body that flies steadily balances its loads.
 
 A rotor that lost thrust at equal drive is driven harder until the loads balance again; of all commands that the mixer
-can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor e_k itself: one rotor, and so roll, pitch,
-yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw: A+ diag(1, 1, 0, 1) A e_k. The readings are logs of each
-rotor's share of the drive; the scatter is that between healthy flights, pooled over the directions.
+can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor e_k itself: one rotor, and so roll,
+pitch, yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw:
+A+ diag(1, 1, 0, 1) A e_k. The readings are logs of each rotor's share of the drive; the scatter is that between healthy
+flights.
 """
 
 from __future__ import annotations
@@ -172,16 +173,18 @@ def _decide(flight: Array, healthy: Array, layout: Array | None, alarm: float) -
     total_half = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
     visible = bar * max(1.0 / float(np.linalg.norm(W @ d)) for cause, d in ways.items() if "blade" in cause)
     said = FlightVerdict("none", (), "", tuple(found), change, scatter, visible, total=total, total_half=total_half)
-    gate = float(stats.f.ppf(1.0 - alarm, B - 1, free))
-    off = float(z @ z) / (B - 1)
+    gate = float(stats.f.ppf(1.0 - alarm, z.size, free))
+    off = float(z @ z) / z.size
+    rest = z.size - 1
+    most = rest * float(stats.f.ppf(1.0 - alarm, max(rest, 1), free))
     best = found[0]
     if best.t < bar:
-        if off > gate and best.chi2 > (B - 2) * stats.f.ppf(1.0 - alarm, max(B - 2, 1), free):
+        if off > gate and best.chi2 > most:
             return replace(
                 said, verdict="unknown", why="the balance moved, but not as one rotor or one weight moves it"
             )
         return replace(said, why="no more than healthy flights differ")
-    if B > 2 and best.chi2 > (B - 2) * stats.f.ppf(1.0 - alarm, B - 2, free) and best.chi2 > 0.25 * best.t**2:
+    if rest > 0 and best.chi2 > most and best.chi2 > 0.25 * best.t**2:
         return replace(said, verdict="unknown", why="no listed cause leaves a rest as small as healthy flights have")
     alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - best.chi2 < ALIKE)
     if len(alike) == 1:
@@ -196,18 +199,19 @@ def _whitening(spread: Array, layout: Array | None) -> tuple[Array, int]:
     The variance of each axis is shrunk to the common one with the weight of as many flights as there are axes.
     """
     n, B = spread.shape
-    common = max(float(np.sum(spread**2)) / ((n - 1) * (B - 1)), 1e-12)
     inner = np.eye(B) - 1.0 / B
     if layout is None:
-        return inner / np.sqrt(common), (n - 1) * (B - 1)
-    first = effect_matrix(layout)[:3] @ inner
-    q, r = np.linalg.qr(first.T)
-    axes = q[:, np.abs(np.diag(r)) > 1e-9].T
-    rest = np.linalg.svd(inner - axes.T @ axes)[2][: B - 1 - len(axes)]
-    axes = np.concatenate([axes, rest])
+        axes = np.linalg.svd(inner)[2][: B - 1]
+    else:
+        q, r = np.linalg.qr((effect_matrix(layout)[:3] @ inner).T)
+        axes = q[:, np.abs(np.diag(r)) > 1e-9].T
+    k = len(axes)
     own = np.sum((spread @ axes.T) ** 2, axis=0)
-    variance = (own + (B - 1) * common) / (n - 1 + B - 1)
-    return axes / np.sqrt(variance)[:, None], (n - 1) + (B - 1)
+    common = max(float(own.sum()) / ((n - 1) * k), 1e-12)
+    if layout is None:
+        return axes / np.sqrt(common), (n - 1) * k
+    variance = (own + k * common) / (n - 1 + k)
+    return axes / np.sqrt(variance)[:, None], n - 1 + k
 
 
 def _directions(B: int, layout: Array | None) -> dict[str, Array]:

@@ -17,13 +17,13 @@ LAYOUTS = {
     "crazyflie": "-45+ -135- 135+ 45-",
     "px4-x": "-45+ 135+ 45- -135-",
     "betaflight-x": "-135- -45+ 135+ 45-",
-    "hexa-x": "-90- 90+ -30- 150+ 30+ -150-",
+    "hexa-x": "-90- 90+ 30- -150+ -30+ 150-",
     "octo-x": "-22.5- 157.5- -67.5+ -157.5+ 22.5+ 112.5+ 67.5- -112.5-",
 }
 """Angle of each motor in its numbering [deg, from ahead to the left], and its turning seen from above: + to the left.
 
 Sources: Bitcraze, Crazyflie 2.x motor numbering; PX4 airframes reference; Betaflight default motor order; ArduPilot
-AP_MotorsMatrix (hexa X and octa X).
+AP_MotorsMatrix (hexa X and octa X); not checked against their files here.
 """
 
 

@@ -95,7 +95,8 @@ class FlightLog:
             above = z - np.percentile(z, 1.0) > _LOW_M if z[0] > _LOW_M else z > _LOW_M
             on &= above
         starts = self.t[np.flatnonzero(on)[:1]]
-        return on & (self.t >= starts[0] + _TRIM_S) if starts.size else on
+        late = self.t >= starts[0] + _TRIM_S if starts.size else on
+        return np.asarray(on & late, dtype=bool)
 
 
 def upright_share(q: Array) -> Array:

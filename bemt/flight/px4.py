@@ -1,4 +1,4 @@
-"""PX4: ULog (``.ulg``), read by pyulog. Topics and units as in PX4's message definitions (msg/*.msg); NED and FRD axes."""
+"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def read(path: Path) -> FlightLog:
     name = str(path)
     ulog = needs("pyulog", "flight").ULog
     try:
-        with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            found = ulog(name, _TOPICS, disable_str_exceptions=True)
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
+            found = ulog(file, _TOPICS, disable_str_exceptions=True)
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
         got = f"a damaged log ({type(error).__name__}: {error})"
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error

@@ -38,6 +38,7 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
         reader = next((r for r in _READERS if r.sniff(head)), None)
         if reader is None:
             raise InputError(Fault(os.fspath(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
-        return reader.read(Path(path))
+        found: FlightLog = reader.read(Path(path))
+        return found
     except OSError as error:
         raise InputError(system_fault(error)) from error

@@ -1,9 +1,9 @@
 """Wind from the residual force and the rotors' own in-plane force.
 
-Along the wind the force on the body is F = c w + b w |w|, w the wind less the body's velocity: the rotors' in-plane force (c, linear,
-e.g. Leishman, Principles of Helicopter Aerodynamics, ch. 2, 3; rotor drag of Faessler et al. 2018, eq. 4) and the drag of the
-body (b). The slope over the body's own velocity is -(c + 2 b |w|), so the mean force and the slopes with and without
-wind give it: w = 2 F / (c + slope). The unit of the force cancels.
+Along the wind the force on the body is F = c w + b w |w|, w the wind less the body's velocity: the rotors' in-plane
+force (c, linear: rotor drag as in Faessler, Franchi and Scaramuzza, IEEE RA-L 3, 2018; not checked here) and the drag
+of the body (b). The slope over the body's own velocity is -(c + 2 b |w|), so the mean force and the slopes with and
+without wind give it: w = 2 F / (c + slope). The unit of the force cancels.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BLOCKS = 10
 
 @dataclass(frozen=True)
 class Wind:
-    """Wind along the mean force: speed and 95 % half width [m/s], heading of its axis from x [deg]; why there is none."""
+    """Wind along the mean force: speed, 95 % half width [m/s], heading from x [deg]; why it is missing."""
 
     speed: float
     half: float
