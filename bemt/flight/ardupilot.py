@@ -31,7 +31,10 @@ def sniff(head: bytes) -> bool:
 def read(path: Path) -> FlightLog:
     """Read a log, as far as it is whole; messages stream, so the size does not matter."""
     name = str(path)
-    reader = needs("pymavlink.DFReader", "flight").DFReader_binary
+    base = needs("pymavlink.DFReader", "flight").DFReader_binary
+    # The compiled index prints past Python's streams; the other one tells of damage where it can be heard.
+    slow = {"init_arrays_fast": lambda self, progress_callback=None: self.init_arrays(progress_callback)}
+    reader = type("DataFlash", (base,), slow)
     rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
     noise = io.StringIO()
     stopped, params = "", {}

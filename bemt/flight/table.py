@@ -85,7 +85,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
             if shape == shapes:
                 times.append(float(t))
                 rows.append(row)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError, RecursionError):
             continue
     if not rows:
         raise InputError(Fault(name, "", "no row that can be read", "arrays in the cells"))
