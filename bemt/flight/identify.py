@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from bemt.base.units import G0
 from bemt.flight.log import FlightLog
@@ -124,6 +123,8 @@ def _balance(log: FlightLog, on: NDArray[np.bool_], lift: Array) -> Constant | N
 
 
 def _half(values: Array) -> float:
+    from scipy import stats
+
     return float(stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
 
 
@@ -133,6 +134,8 @@ def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant
 
 def _regress(X: Array, y: Array) -> tuple[Array, Array]:
     """Least squares, with half widths of 95 % from the blocks."""
+    from scipy import stats
+
     whole: Array = np.linalg.lstsq(X, y, rcond=None)[0].astype(float)
     parts = [np.linalg.lstsq(X[p], y[p], rcond=None)[0] for p in np.array_split(np.arange(y.size), _BLOCKS)]
     spread = np.std(parts, axis=0, ddof=1)

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
@@ -129,6 +128,8 @@ def judge(
     FlightVerdict
         With the error rate of the same rule on the healthy flights.
     """
+    from scipy import stats
+
     said = _decide(flight, np.array(healthy), layout, false_alarm)
     if len(healthy) < _LEAST:
         return said
@@ -142,6 +143,8 @@ def judge(
 
 
 def _decide(flight: Array, healthy: Array, layout: Array | None, alarm: float) -> FlightVerdict:
+    from scipy import stats
+
     B, n = flight.size, len(healthy)
     if n == 0:
         share = flight - flight.mean()

@@ -12,14 +12,17 @@ import json
 import re
 import zlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.flight import crazyflie
 from bemt.flight.log import FlightLog, joined
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 KIND = "CSV"
@@ -32,6 +35,8 @@ def sniff(head: bytes) -> bool:
 
 def read(path: Path) -> FlightLog:
     """Read a table; its headings decide what it is."""
+    import pandas as pd
+
     name, raw, ends = str(path), path.read_bytes(), ""
     if raw[:2] == b"\x1f\x8b":
         try:
@@ -109,6 +114,8 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
 
 
 def _betaflight(name: str, frame: pd.DataFrame, poles: int, ends: str) -> FlightLog:
+    import pandas as pd
+
     numbers = frame.apply(pd.to_numeric, errors="coerce")
     if "time" not in numbers:
         raise InputError(Fault(name, "time", "no such column", "time in us", "Decode with blackbox_decode"))

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from bemt.flight.log import FlightLog
 
@@ -48,6 +47,8 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     Wind
         NaN with the reason where the log does not show it [m/s].
     """
+    from scipy import stats
+
     still = [c for c in calm if c.force is not None and c.velocity is not None]
     if log.force is None or log.velocity is None:
         return Wind(np.nan, np.nan, np.nan, "no residual force in the log")
