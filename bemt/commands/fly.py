@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 NAME = "fly"
 HELP = "identify the rotors of a flight log, and judge it beside healthy flights"
 GROUP = "Recordings"
-EXAMPLE = "fly flight.ulg --mass 1.2 --healthy before.ulg"
+EXAMPLE = "fly flight.ulg --mass 1.2 --case 10x4.5"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
