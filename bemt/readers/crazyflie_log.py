@@ -63,7 +63,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
         raise InputError(Fault(name, "", "a wrong checksum", "the CRC32 of all bytes before it", "Copy the file again"))
     try:
-        tables = _tables(data[:-4])
+        tables, _ = log_tables(data[:-4])
     except (struct.error, KeyError, ValueError, UnicodeDecodeError) as error:
         raise InputError(Fault(name, "", f"a damaged log ({error})", "whole records", "Copy the file again")) from error
     tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
@@ -77,8 +77,23 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
     return data[at:end].decode("utf-8"), end + 1
 
 
-def _tables(data: bytes) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Variables by event; times in s from the first record."""
+def log_tables(data: bytes, partly: bool = False) -> tuple[dict[str, dict[str, NDArray[np.float64]]], int]:
+    """Variables of each event of a log.
+
+    Parameters
+    ----------
+    data : bytes
+        The file without its checksum.
+    partly : bool
+        Keep what stands before a damaged record instead of raising.
+
+    Returns
+    -------
+    tables : dict
+        Event to variable to (N,) values in the units of the log; `time_s` in seconds of the log's clock [s].
+    int
+        Place at which reading ended; `len(data)` when all is whole.
+    """
     version, events = struct.unpack_from("<HH", data, 1)
     at, known = 5, {}
     for _ in range(events):
@@ -97,16 +112,20 @@ def _tables(data: bytes) -> dict[str, dict[str, NDArray[np.float64]]]:
     rows: dict[int, list[tuple[float, ...]]] = {k: [] for k in known}
     stamp, scale = _TIMES[version], 1e-6
     while at < len(data):
-        number, time = stamp.unpack_from(data, at)
-        at += stamp.size
-        record = known[number][2]
-        rows[number].append((time * scale, *record.unpack_from(data, at)))
-        at += record.size
+        try:
+            number, time = stamp.unpack_from(data, at)
+            record = known[number][2]
+            rows[number].append((time * scale, *record.unpack_from(data, at + stamp.size)))
+        except (struct.error, KeyError):
+            if not partly:
+                raise
+            break
+        at += stamp.size + record.size
     out = {}
     for number, (name, names, _) in known.items():
         table = np.array(rows[number], dtype=float).reshape(-1, len(names) + 1)
         out[name] = {"time_s": table[:, 0]} | {n: table[:, k + 1] for k, n in enumerate(names)}
-    return out
+    return out, at
 
 
 def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Dataset:

@@ -1,0 +1,103 @@
+"""``python -m bemt fly``: a flight log in, the rotor's constants and what is wrong with it out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bemt.base.errors import EXIT_OK
+from bemt.commands import _options
+
+if TYPE_CHECKING:
+    from bemt.flight.answer import FlightAnswer
+
+NAME = "fly"
+HELP = "identify the rotors of a flight log, and judge it beside healthy flights"
+GROUP = "Recordings"
+EXAMPLE = "fly flight.ulg --mass 1.2 --case 10x4.5"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    kinds = "flight logs: PX4 ULog, ArduPilot DataFlash, Crazyflie usdlog, Betaflight or other CSV"
+    parser.add_argument("logs", nargs="+", metavar="LOG", help=kinds)
+    parser.add_argument("--case", metavar="ROTOR", help="case or label of the propeller, compared with the flight")
+    parser.add_argument("--mass", type=_mass, metavar="KG", help="mass in flight with battery [kg]")
+    layout = 'px4-x, crazyflie, betaflight-x, hexa-x, octo-x, or angles with turning: "-45+ 135+ 45- -135-"'
+    parser.add_argument("--layout", default="", metavar="LAYOUT", help=f"{layout} (default: of the format)")
+    healthy = "healthy flights of the same vehicle, 3 or more for a verdict"
+    parser.add_argument("--healthy", default=[], metavar="LOG", help=healthy, **_options.MANY)
+    known = "mass of the healthy flights [kg]: gives the mass of this one"
+    parser.add_argument("--healthy-mass", type=_mass, metavar="KG", help=known)
+    alarm = "accepted share of healthy flights that are accused (default 0.01); more finds smaller damage"
+    parser.add_argument("--false-alarm", type=_share, default=0.01, metavar="P", help=alarm)
+    parser.add_argument("--out", metavar="PNG", help="write a picture of the first log to this file")
+    _options.add_json(parser, "bemt.flight/1")
+    _options.add_quiet(parser, "no answer")
+
+
+def _mass(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < 1000.0:
+        raise argparse.ArgumentTypeError(f"got {text}; expected a mass above 0 and below 1000 kg")
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < 0.5:
+        raise argparse.ArgumentTypeError(f"got {text}; expected a probability above 0 and below 0.5")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read, identify, judge, print."""
+    from bemt.base.errors import Fault, InputError
+    from bemt.base.tables import json_text
+    from bemt.flight.answer import answer_on
+    from bemt.flight.read import read_log
+
+    faults: list[Fault] = []
+    found = {}
+    for path in dict.fromkeys([*args.logs, *args.healthy]):
+        try:
+            found[path] = read_log(path)
+        except InputError as error:
+            faults += error.faults
+    if faults:
+        raise InputError(faults)
+    healthy = {path: found[path] for path in args.healthy}
+    answers = []
+    for path in args.logs:
+        others = [log for name, log in healthy.items() if name != path]
+        answer = answer_on(found[path], others, args.mass, args.layout, args.healthy_mass, args.false_alarm)
+        answers.append(_with_model(answer, args.case) if args.case else answer)
+    if args.out:
+        from bemt.flight.picture import flight_picture
+
+        Path(args.out).write_bytes(flight_picture(answers[0], args.mass))
+    if args.json:
+        documents = [a.document() for a in answers]
+        print(
+            json_text(documents[0] if len(documents) == 1 else {"schema": "bemt.flight/1", "flights": documents}),
+            end="",
+        )
+    elif not args.quiet:
+        print("\n\n".join(a.text() for a in answers))
+    return EXIT_OK
+
+
+def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
+    """The answer with the model's thrust constant at the mean speed, hovering."""
+    from dataclasses import replace
+
+    from bemt.library.rotors import rotor_of
+
+    speeds = answer.found.rotors.get("mean rpm")
+    if speeds is None:
+        return answer
+    rpm = sum(speeds) / len(speeds)
+    points = rotor_of(case).solve(rpm=rpm, airspeed_m_s=0.0)
+    u = points.u["thrust_N"]
+    return replace(answer, predicted=(float(points.thrust_N[0]) / rpm**2, float(u[0]) / rpm**2))

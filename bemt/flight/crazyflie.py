@@ -1,0 +1,76 @@
+"""Crazyflie: binary logs of its micro-SD card (``.usdlog``); the records are read in the readers' room.
+
+Units of the firmware's log variables (Bitcraze, crazyflie-firmware): acc g; gyro deg/s; pwm and motor 0 to 65535;
+vbatMV mV.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.base.units import G0
+from bemt.flight.log import FlightLog, joined, upright_share
+from bemt.readers import crazyflie_log
+
+Array = NDArray[np.float64]
+KIND = "Crazyflie usdlog"
+
+
+def sniff(head: bytes) -> bool:
+    """Whether the first bytes are those of such a log."""
+    return crazyflie_log.sniff(head)
+
+
+def read(path: Path) -> FlightLog:
+    """Read a log, as far as it is whole."""
+    data, name = path.read_bytes(), str(path)
+    whole = len(data) > 8 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
+    body = data[:-4] if whole else data
+    try:
+        tables, end = crazyflie_log.log_tables(body, partly=True)
+    except (struct.error, KeyError, ValueError, IndexError, MemoryError) as error:
+        got = f"a header that cannot be read ({error})"
+        raise InputError(Fault(name, "header", got, "a whole header", "Copy the file again")) from error
+    columns = {k: (v["time_s"], v[k]) for v in tables.values() for k in v if k != "time_s"}
+    ends = ""
+    if not whole:
+        where = f"records end at byte {end} of {len(data)}" if end < len(data) - 4 else "all records can be read"
+        ends = f"wrong checksum; {where}"
+    return from_columns(name, KIND, columns, ends)
+
+
+def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], ends: str = "") -> FlightLog:
+    """Log from the firmware's variables, each with its times [s]."""
+
+    def many(*keys: str, factor: float = 1.0) -> tuple[Array, Array] | None:
+        if not all(k in columns for k in keys):
+            return None
+        t = columns[keys[0]][0]
+        return t, factor * np.stack([columns[k][1] for k in keys], axis=1)
+
+    def one(key: str, factor: float) -> tuple[Array, Array] | None:
+        return (columns[key][0], factor * columns[key][1]) if key in columns else None
+
+    motors = "1234"
+    command = many(*(f"motor.m{i}" for i in motors), factor=1 / 65535.0)
+    command = command or many(*(f"pwm.m{i}_pwm" for i in motors), factor=1 / 65535.0)
+    q = many(*(f"stateEstimate.q{a}" for a in "wxyz"))
+    roll = many("stateEstimate.roll", "stateEstimate.pitch", factor=np.pi / 180.0)
+    upright = (q[0], upright_share(q[1])) if q else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
+    sources = {
+        "command": command,
+        "rpm": many(*(f"rpm.m{i}" for i in motors)),
+        "acceleration": many(*(f"acc.{a}" for a in "xyz"), factor=G0),
+        "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
+        "upright": upright,
+        "velocity": many(*(f"stateEstimate.v{a}" for a in "xyz")),
+        "position": many(*(f"stateEstimate.{a}" for a in "xyz")),
+        "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
+    }
+    return joined(name, kind, sources, "command", layout="crazyflie", ends=ends)

@@ -1,0 +1,208 @@
+"""Constants of the rotors from a flight: momentum balance for thrust, regressions where the motion tells more.
+
+Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
+k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
+Bands are from ten blocks of the flight (batch means, e.g. Law, Simulation Modeling and Analysis, ch. 9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.units import G0
+from bemt.flight.log import FlightLog
+
+__all__ = ["Constant", "Identified", "identify"]
+
+Array = NDArray[np.float64]
+_BLOCKS, _APART = 10, 0.1  # a rotor's own constant is given when its half width is below this share [1]
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A value with the half width of its 95 % band, in `unit`."""
+
+    value: float
+    half: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What a flight shows.
+
+    Attributes
+    ----------
+    constants : dict of str to Constant
+        By name, each with its unit.
+    rotors : dict of str to tuple of float
+        One number a rotor: mean command, mean speed [rev/min], share of the squared drive [1].
+    unseen : tuple of str
+        What the log cannot show, with the manoeuvre or channel that would.
+    weight_per_drive : Constant or None
+        Weight over the sum of squared speeds, for unit mass; of mean commands where there is no speed.
+    """
+
+    constants: dict[str, Constant]
+    rotors: dict[str, tuple[float, ...]]
+    unseen: tuple[str, ...]
+    weight_per_drive: Constant | None
+
+
+def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
+    """Identify what the flight shows.
+
+    Parameters
+    ----------
+    log : FlightLog
+        The flight.
+    mass_kg : float or None
+        Mass with battery [kg]; None: constants are per kilogram.
+
+    Returns
+    -------
+    Identified
+        Constants with bands, in SI units but for speeds [rev/min].
+    """
+    on = log.flying
+    out: dict[str, Constant] = {}
+    rotors: dict[str, tuple[float, ...]] = {}
+    unseen: list[str] = []
+    drive = log.rpm if log.rpm is not None else log.command
+    if drive is None or on.sum() < 50:
+        return Identified(out, rotors, ("no flight with motors running: log motor commands and fly 10 s",), None)
+    t, x = log.t[on], drive[on]
+    upright = np.ones(t.size) if log.upright is None else log.upright[on]
+    speeds = log.rpm is not None
+    power = x**2 if speeds else x
+    word, unit = ("thrust constant", "N/rpm^2") if speeds else ("thrust per command", f"N/({log.command_unit})")
+    m, per = (1.0, "/kg") if mass_kg is None else (mass_kg, "")
+    weight = _balance(log, on, power.sum(axis=1) * upright)
+    if weight is not None:
+        out[word] = Constant(m * weight.value, m * weight.half, unit + per)
+    if mass_kg is None:
+        unseen.append("mass: give --mass, or a healthy flight of known mass with the same propellers")
+    if log.command is not None:
+        c = log.command[on]
+        rotors["mean command"] = tuple(map(float, c.mean(axis=0)))
+        out["hover command"] = _blocks(c.mean(axis=1), np.mean, log.command_unit)
+    if speeds:
+        rotors["mean rpm"] = tuple(map(float, x.mean(axis=0)))
+        rotors["share of rpm^2"] = tuple(map(float, (x**2).mean(axis=0) / np.mean(x**2)))
+        _per_rotor(log, on, m, per, out, unseen)
+    else:
+        unseen.append("thrust over speed: log the speed of each rotor (ESC telemetry)")
+    _yaw(log, on, power, speeds, out, unseen)
+    _motor(log, on, out, unseen)
+    if log.acceleration is None:
+        unseen.append("vibration, tape and imbalance: log the accelerometer at more than twice the shaft frequency")
+    elif speeds and 0.5 / float(np.median(np.diff(log.t))) < float(np.median(x)) / 60.0:
+        rate = 1.0 / float(np.median(np.diff(log.t)))
+        unseen.append(f"vibration at the shaft's {np.median(x) / 60:.0f} Hz: the log has {rate:.0f} samples a second")
+    unseen.append("thrust over advance ratio and in descent: climb and descend at three steady rates")
+    return Identified(out, rotors, tuple(unseen), weight)
+
+
+def _balance(log: FlightLog, on: NDArray[np.bool_], lift: Array) -> Constant | None:
+    """Momentum balance for unit mass."""
+    if not np.all(np.isfinite(lift)) or lift.mean() <= 0.0:
+        return None
+    t, gain = log.t[on], np.zeros(_BLOCKS)
+    parts = np.array_split(np.arange(t.size), _BLOCKS)
+    if log.velocity is not None:
+        vz = log.velocity[on, 2]
+        gain = np.array([(vz[p[-1]] - vz[p[0]]) / max(t[p[-1]] - t[p[0]], 1e-3) for p in parts])
+    values = np.array([(G0 + a) / lift[p].mean() for p, a in zip(parts, gain, strict=True)])
+    span = float(t[-1] - t[0])
+    whole = 0.0 if log.velocity is None else float(log.velocity[on, 2][-1] - log.velocity[on, 2][0]) / max(span, 1e-3)
+    return Constant((G0 + whole) / float(lift.mean()), _half(values), "1")
+
+
+def _half(values: Array) -> float:
+    from scipy import stats
+
+    return float(stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
+
+
+def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant:
+    return Constant(float(of(y)), _half(np.array([of(b) for b in np.array_split(y, _BLOCKS)])), unit)
+
+
+def _regress(X: Array, y: Array) -> tuple[Array, Array]:
+    """Least squares, with half widths of 95 % from the blocks."""
+    from scipy import stats
+
+    whole: Array = np.linalg.lstsq(X, y, rcond=None)[0].astype(float)
+    parts = [np.linalg.lstsq(X[p], y[p], rcond=None)[0] for p in np.array_split(np.arange(y.size), _BLOCKS)]
+    spread = np.std(parts, axis=0, ddof=1)
+    half: Array = float(stats.t.ppf(0.975, _BLOCKS - 1)) * spread / np.sqrt(_BLOCKS)
+    return whole, half
+
+
+def _per_rotor(
+    log: FlightLog, on: NDArray[np.bool_], m: float, per: str, out: dict[str, Constant], unseen: list[str]
+) -> None:
+    assert log.rpm is not None
+    text = "thrust constant of each rotor: the four move together; fly doublets in roll, pitch and yaw"
+    if log.acceleration is not None:
+        k, half = _regress(log.rpm[on] ** 2, log.acceleration[on, 2])
+        if np.all(k > 0.0) and np.all(half < _APART * k):
+            for i in range(k.size):
+                out[f"thrust constant, rotor {i + 1}"] = Constant(m * k[i], m * half[i], "N/rpm^2" + per)
+            return
+        text = text.replace("the four", f"the {k.size} rotors")
+    unseen.append(text)
+
+
+def _yaw(
+    log: FlightLog, on: NDArray[np.bool_], power: Array, speeds: bool, out: dict[str, Constant], unseen: list[str]
+) -> None:
+    """Angular acceleration in yaw over the difference of the two directions of turning."""
+    from bemt.flight.layout import layout_of
+
+    known = layout_of(log.layout, log.rotors)
+    if log.rates is None or known is None:
+        unseen.append("torque constant: log the yaw rate, give --layout, and fly yaw doublets")
+        return
+    step = float(np.median(np.diff(log.t)))
+    width = max(int(round(0.1 / step)), 1)
+    smooth = np.ones(width) / width
+    rate = np.gradient(np.convolve(log.rates[:, 2], smooth, "same"), log.t)[on]
+    # A rotor that turns to the left pushes the body to the right.
+    side = np.convolve(np.nan_to_num(_drive(log)) @ known[:, 1], smooth, "same")[on]
+    c, half = _regress(np.column_stack([-side, np.ones(side.size)]), rate)
+    unit = "(rad/s^2)/" + ("rpm^2" if speeds else log.command_unit)
+    if half[0] < 0.5 * abs(c[0]) and c[0] > 0.0:
+        out["torque constant over yaw inertia"] = Constant(float(c[0]), float(half[0]), unit)
+        unseen.append("torque constant itself: it needs the moment of inertia about the yaw axis")
+    else:
+        unseen.append("torque constant: this flight hardly yaws; fly yaw doublets")
+
+
+def _drive(log: FlightLog) -> Array:
+    out = log.rpm**2 if log.rpm is not None else log.command
+    assert out is not None
+    return out
+
+
+def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
+    if log.rpm is not None and log.command is not None and log.voltage is not None and log.command_unit == "1":
+        volts = (log.command[on] * log.voltage[on, None]).mean(axis=1)
+        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on].mean(axis=1))
+        if half[0] < abs(k[0]):
+            out["motor line, slope"] = Constant(float(k[0]), float(half[0]), "rpm/V")
+            out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")
+    if log.voltage is None:
+        unseen.append("battery: log its voltage")
+        return
+    out["battery voltage"] = _blocks(log.voltage[on], np.mean, "V")
+    if log.battery_current is not None and np.std(log.battery_current[on]) > 0.0:
+        line, half = _regress(np.column_stack([log.battery_current[on], np.ones(on.sum())]), log.voltage[on])
+        if line[0] < 0.0 and half[0] < -line[0]:
+            out["battery resistance"] = Constant(float(-line[0]), float(half[0]), "ohm")
+            return
+    unseen.append("battery resistance: log the current, and change thrust in steps")

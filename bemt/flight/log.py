@@ -1,0 +1,166 @@
+"""One flight on one time base, with a column for each rotor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+
+__all__ = ["FlightLog", "joined", "upright_share"]
+
+Array = NDArray[np.float64]
+Source = tuple[Array, Array]
+
+_ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
+
+
+@dataclass(frozen=True, eq=False)
+class FlightLog:
+    """One flight; N samples, B rotors; a quantity that was not logged is None.
+
+    Attributes
+    ----------
+    file, format : str
+        Where it was read, and the format by content.
+    t : (N,) float
+        Time from the first sample [s].
+    command : (N, B) float or None
+        Command of each motor; 0 to 1 unless `command_unit` says otherwise.
+    rpm : (N, B) float or None
+        Speeds [rev/min].
+    current : (N, B) float or None
+        Currents of the speed controllers [A].
+    acceleration : (N, 3) float or None
+        Specific force in body axes, z up [m/s2].
+    rates : (N, 3) float or None
+        Angular velocity in body axes, z up [rad/s].
+    upright : (N,) float or None
+        Cosine of the tilt [1].
+    velocity, position : (N, 3) float or None
+        In axes of the world, z up [m/s, m].
+    force : (N, 3) float or None
+        Residual force that the log holds, in its own unit.
+    voltage, battery_current : (N,) float or None
+        Battery [V, A].
+    command_unit, layout : str
+        Unit of the commands; usual layout of the format, may be empty.
+    join_s : dict of str to float
+        Half the sample interval of each quantity's source: how far a value may lie from its time [s].
+    ends : str
+        Where a damaged log ends; empty for a whole one.
+    """
+
+    file: str
+    format: str
+    t: Array
+    command: Array | None = None
+    rpm: Array | None = None
+    current: Array | None = None
+    acceleration: Array | None = None
+    rates: Array | None = None
+    upright: Array | None = None
+    velocity: Array | None = None
+    position: Array | None = None
+    force: Array | None = None
+    voltage: Array | None = None
+    battery_current: Array | None = None
+    command_unit: str = "1"
+    layout: str = ""
+    join_s: dict[str, float] = field(default_factory=dict)
+    ends: str = ""
+
+    @property
+    def rotors(self) -> int:
+        """Number of rotors."""
+        drive = self.command if self.command is not None else self.rpm
+        return 0 if drive is None else drive.shape[1]
+
+    @property
+    def flying(self) -> NDArray[np.bool_]:
+        """Samples in the air, (N,): motors on, off the ground where a height is known, without the first moments."""
+        drive = self.command if self.command is not None else self.rpm
+        if drive is None:
+            return np.zeros(self.t.size, dtype=bool)
+        total = np.nan_to_num(drive.sum(axis=1))
+        if self.command_unit == "us":
+            total = total - 1000.0 * drive.shape[1] if total.min() > 700.0 * drive.shape[1] else total
+        high = float(np.percentile(total, 90.0))
+        on = (total > _ON * high) & (high > 0.0)
+        if self.position is not None and np.ptp(self.position[:, 2]) > 2.0 * _LOW_M:
+            z = self.position[:, 2]
+            above = z - np.percentile(z, 1.0) > _LOW_M if z[0] > _LOW_M else z > _LOW_M
+            on &= above
+        starts = self.t[np.flatnonzero(on)[:1]]
+        late = self.t >= starts[0] + _TRIM_S if starts.size else on
+        return np.asarray(on & late, dtype=bool)
+
+
+def upright_share(q: Array) -> Array:
+    """Cosine of the tilt of unit quaternions.
+
+    Parameters
+    ----------
+    q : (N, 4) float
+        Scalar first [1].
+
+    Returns
+    -------
+    (N,) float
+        Share of the body's z axis along the world's [1].
+
+    Examples
+    --------
+    >>> upright_share(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))
+    array([ 1., -1.])
+    """
+    out: Array = 1.0 - 2.0 * (q[:, 1] ** 2 + q[:, 2] ** 2)
+    return out
+
+
+def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str, **more: str) -> FlightLog:
+    """Put sources with clocks of their own on one time base, linearly.
+
+    Parameters
+    ----------
+    file, kind : str
+        For the log.
+    sources : mapping of str to (times, values) or None
+        Times (M,) [s]; values (M,) or (M, k) in units of :class:`FlightLog`.
+    main : str
+        Source whose times are kept.
+    **more : str
+        Further attributes of the log.
+
+    Raises
+    ------
+    InputError
+        When fewer than 20 whole samples remain.
+    """
+    clean = {}
+    for key, source in sources.items():
+        if source is None:
+            continue
+        t, v = np.asarray(source[0], dtype=float), np.asarray(source[1], dtype=float)
+        good = np.isfinite(t) & np.isfinite(v.reshape(t.size, -1)).all(axis=1)
+        # A damaged clock jumps: times that fall back, and gaps of hours, end the usable part.
+        t, v = t[good], v[good]
+        jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
+        if jump.size:
+            t, v = t[: jump[0] + 1], v[: jump[0] + 1]
+        t, order = np.unique(t, return_index=True)
+        if t.size > 1:
+            clean[key] = (t, v[order])
+    if main not in clean or clean[main][0].size < 20:
+        raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
+    t = clean[main][0]
+    columns, halves = {}, {}
+    for key, (at, v) in clean.items():
+        flat = v.reshape(at.size, -1)
+        put = np.stack([np.interp(t, at, c) for c in flat.T], axis=1)
+        columns[key] = put[:, 0] if v.ndim == 1 else put
+        halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
+    return FlightLog(file, kind, t - t[0], join_s=halves, **columns, **more)  # type: ignore[arg-type]

@@ -1,0 +1,109 @@
+"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError, needs
+from bemt.flight.log import FlightLog, Source, joined, upright_share
+
+Array = NDArray[np.float64]
+KIND = "PX4 ULog"
+_TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
+           "vehicle_local_position", "battery_status"]  # fmt: skip
+_FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
+
+
+def sniff(head: bytes) -> bool:
+    """Whether the first bytes are those of such a log."""
+    return head[:7] == b"ULog\x01\x12\x35"
+
+
+def read(path: Path) -> FlightLog:
+    """Read a log, as far as it is whole."""
+    name = str(path)
+    ulog = needs("pyulog", "flight").ULog
+    try:
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
+            found = ulog(file, _TOPICS, disable_str_exceptions=True)
+    except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
+        got = f"a damaged log ({type(error).__name__}: {error})"
+        raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
+    return _made(name, found)
+
+
+def _made(name: str, found: Any) -> FlightLog:
+    tables: dict[str, dict[str, Array]] = {}
+    for d in found.data_list:
+        known = tables.get(d.name)
+        if known is None or _moves(d.data) > _moves(known):
+            tables[d.name] = d.data
+
+    def take(topic: str, keys: list[str]) -> Source | None:
+        data = tables.get(topic, {})
+        if not keys or any(k not in data for k in ["timestamp", *keys]):
+            return None
+        return 1e-6 * np.asarray(data["timestamp"], dtype=float), np.stack(
+            [np.asarray(data[k], dtype=float) for k in keys], axis=1
+        )
+
+    command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
+    if command is None:
+        command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
+    B = command[1].shape[1] if command else 0
+    count = min(B or 8, 8)
+    speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in range(count)])
+    if speeds is not None and not np.any(speeds[1]):
+        speeds = None
+    if B == 0 and speeds is not None:
+        speeds = _active(speeds)
+    currents = take("esc_status", [f"esc[{i}].esc_current" for i in range(count)])
+    q = take("vehicle_attitude", [f"q[{i}]" for i in range(4)])
+    xyz, vel = take("vehicle_local_position", list("xyz")), take("vehicle_local_position", ["vx", "vy", "vz"])
+    acc = take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)])
+    gyro = take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)])
+    volt, amp = take("battery_status", ["voltage_v"]), take("battery_status", ["current_a"])
+    sources: dict[str, Source | None] = {
+        "command": command,
+        "rpm": speeds,
+        "current": currents,
+        "acceleration": (acc[0], acc[1] * _FLIP) if acc else None,
+        "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None,
+        "upright": (q[0], upright_share(q[1])) if q else None,
+        "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
+        "position": (xyz[0], xyz[1] * _FLIP) if xyz else None,
+        "voltage": (volt[0], volt[1][:, 0]) if volt else None,
+        "battery_current": (amp[0], amp[1][:, 0]) if amp else None,
+    }
+    last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
+    ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
+    layout = "px4-x" if (B or 4) == 4 else ""
+    main = "command" if command else "rpm" if speeds else "acceleration"
+    return joined(name, KIND, sources, main, command_unit=unit, layout=layout, ends=ends)
+
+
+def _moves(data: dict[str, Array]) -> int:
+    """How many columns of a topic change: of two sets of outputs, the motors are on the one that moves."""
+    return sum(bool(len(v)) and bool(np.any(v != v[0])) for k, v in data.items() if k != "timestamp")
+
+
+def _numbered(tables: dict[str, dict[str, Array]], topic: str, key: str) -> list[str]:
+    form = re.compile(rf"{key}\[(\d+)\]")
+    found = [m for m in map(form.fullmatch, tables.get(topic, {})) if m]
+    return [m.group(0) for m in sorted(found, key=lambda m: int(m.group(1)))]
+
+
+def _active(source: Source | None) -> Source | None:
+    """Leading columns that are used: finite, and not at one value throughout."""
+    if source is None or not source[1].size:
+        return None
+    used = [bool(np.isfinite(c).any() and np.nanmax(c) > np.nanmin(c)) for c in source[1].T]
+    count = used.index(False) if False in used else len(used)
+    return (source[0], source[1][:, :count]) if count >= 2 else None

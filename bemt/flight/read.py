@@ -1,0 +1,44 @@
+"""The reader of a flight log, by its content."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bemt.base.errors import Fault, InputError, system_fault
+from bemt.flight import ardupilot, crazyflie, px4, table
+from bemt.flight.log import FlightLog
+
+__all__ = ["read_log"]
+
+_READERS = (crazyflie, px4, ardupilot, table)
+
+
+def read_log(path: str | os.PathLike[str]) -> FlightLog:
+    """Read a flight log: Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV.
+
+    Parameters
+    ----------
+    path : path
+        File; its name does not matter.
+
+    Returns
+    -------
+    FlightLog
+        Commands, speeds and motion on one time base, in units of that class.
+
+    Raises
+    ------
+    InputError
+        For a file that is no flight log, or damaged before its first twenty samples.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(4096)
+        reader = next((r for r in _READERS if r.sniff(head)), None)
+        if reader is None:
+            raise InputError(Fault(os.fspath(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
+        found: FlightLog = reader.read(Path(path))
+        return found
+    except OSError as error:
+        raise InputError(system_fault(error)) from error

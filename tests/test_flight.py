@@ -1,0 +1,282 @@
+"""The promise of the flight logs: constants come back, healthy flights are not accused, damaged files are refused."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import runpy
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import InputError
+from bemt.commands.cli import main
+from bemt.flight.answer import FlightAnswer, answer_on
+from bemt.flight.identify import identify
+from bemt.flight.judge import features, judge
+from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.flight.log import FlightLog
+from bemt.flight.picture import flight_picture
+from bemt.flight.read import read_log
+from bemt.flight.wind import wind
+
+
+@pytest.fixture(scope="module")
+def script(project: Path) -> dict[str, Any]:
+    """The script that writes flights."""
+    return runpy.run_path(str(project / "docs" / "flight_log.py"))
+
+
+@pytest.fixture(scope="module")
+def flights(script: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its folder."""
+    folder = tmp_path_factory.mktemp("flights")
+    script["main"](str(folder))
+    return folder
+
+
+def healthy(folder: Path) -> list[FlightLog]:
+    """Flights before the damage."""
+    return [read_log(p) for p in sorted(folder.glob("before_*"))]
+
+
+def test_thrust_constant_is_that_of_the_script(script: dict[str, Any], flights: Path) -> None:
+    """The band holds the truth, and is narrow."""
+    found = identify(read_log(flights / "before_1.usdlog"), script["MASS"]).constants["thrust constant"]
+    assert abs(found.value - script["K"]) < max(found.half, 0.005 * script["K"])
+    assert found.half < 0.02 * script["K"]
+
+
+def test_mass_follows_from_healthy_flights(script: dict[str, Any], flights: Path, tmp_path: Path) -> None:
+    """A payload of 20 % is weighed."""
+    (tmp_path / "heavy").write_bytes(script["flight"](5, mass=1.2 * script["MASS"]))
+    got = answer_on(read_log(tmp_path / "heavy"), healthy(flights), healthy_mass_kg=script["MASS"])
+    assert got.mass is not None and got.mass.value == pytest.approx(1.2 * script["MASS"], rel=0.01)
+
+
+def test_cut_blade_is_found_whatever_the_name(flights: Path, tmp_path: Path) -> None:
+    """Content decides, and the right motor is named."""
+    (tmp_path / "normal.txt").write_bytes((flights / "after.usdlog").read_bytes())
+    got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights)).judged
+    assert (got.verdict, got.effects) == ("named", ("damaged blade, motor 3",))
+    assert got.accused == 0 and got.healthy == 6 and 0.0 <= got.rate95[0] < got.rate95[1] < 1.0
+
+
+def test_without_healthy_flights_nothing_is_named(flights: Path) -> None:
+    """One flight alone is no evidence."""
+    assert answer_on(read_log(flights / "after.usdlog")).judged.verdict == "insufficient"
+
+
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
+def test_every_layout_balances_and_every_motor_is_found(name: str) -> None:
+    """Equal rotors make thrust alone; a loss as the mixer balances it is traced to its motor."""
+    layout = layout_of(name, len(LAYOUTS[name].split()))
+    assert layout is not None
+    A = effect_matrix(layout)
+    np.testing.assert_allclose(A @ np.ones(A.shape[1]), [0.0, 0.0, 0.0, A.shape[1]], atol=1e-9)
+    rng = np.random.default_rng(1)
+    calm = [0.01 * rng.normal(size=A.shape[1]) for _ in range(6)]
+    P = np.linalg.pinv(A) @ A
+    for k in range(A.shape[1]):
+        got = judge(np.mean(calm, axis=0) + 0.3 * P[:, k], calm, layout)
+        assert got.verdict in ("named", "class") and f"damaged blade, motor {k + 1}" in got.effects
+
+
+@pytest.mark.parametrize("rotors", [4, 8])
+def test_healthy_flights_are_accused_as_rarely_as_stated(rotors: int) -> None:
+    """Over 1,000 vehicles; the bound allows for chance."""
+    rng = np.random.default_rng(7)
+    layout = layout_of("px4-x" if rotors == 4 else "octo-x", rotors)
+    hits = 0
+    for _ in range(1000):
+        spread = 0.02 * rng.normal(size=(7, rotors))
+        hits += judge(spread[0], list(spread[1:3]), layout).verdict != "insufficient"
+        if layout is not None and rotors > 4:
+            A = effect_matrix(layout)
+            spread = spread @ (np.linalg.pinv(A) @ A)
+        from bemt.flight.judge import _decide
+
+        hits += _decide(spread[0], spread[1:], layout, 0.01).verdict in ("named", "class")
+    assert hits <= 20
+
+
+def test_wind_from_slope_and_mean() -> None:
+    """The law gives its own wind back."""
+    t = np.arange(0.0, 60.0, 0.02)
+    v = np.stack([np.sin(t), 0.0 * t, 0.0 * t], axis=1)
+
+    def blown(w: float) -> FlightLog:
+        relative = w - v[:, 0]
+        force = np.zeros_like(v)
+        force[:, 0] = 0.5 * relative + 0.05 * relative * np.abs(relative)
+        return FlightLog("f", "made", t, velocity=v, force=force)
+
+    for w in (4.0, 8.0, -12.0):
+        found = wind(blown(w), [blown(0.0)])
+        assert found.speed == pytest.approx(abs(w), abs=0.5) and abs(found.heading_deg) == (0.0 if w > 0 else 180.0)
+    assert wind(blown(0.0), [blown(0.0)]).speed == pytest.approx(0.0, abs=0.1)
+    assert np.isnan(wind(replace(blown(3.0), force=None), [blown(0.0)]).speed)
+
+
+def test_other_rotors_are_refused(flights: Path) -> None:
+    """A layout or a healthy flight of another vehicle."""
+    log = read_log(flights / "after.usdlog")
+    with pytest.raises(InputError):
+        answer_on(log, layout="octo-x")
+    eight = replace(log, command=np.ones((log.t.size, 8)), rpm=None)
+    with pytest.raises(InputError):
+        answer_on(log, [eight])
+
+
+def damaged(data: bytes, rng: np.random.Generator) -> bytes:
+    """A copy cut short, with bytes turned, a piece lost, or a piece overwritten."""
+    out = bytearray(data)
+    at = int(rng.integers(0, len(out)))
+    match int(rng.integers(0, 4)):
+        case 0:
+            del out[at:]
+        case 1:
+            for k in rng.integers(0, len(out), 20):
+                out[k] ^= int(rng.integers(1, 256))
+        case 2:
+            del out[at : at + int(rng.integers(1, 5000))]
+        case _:
+            out[at : at + 64] = rng.integers(0, 256, 64, dtype=np.uint8).tobytes()
+    return bytes(out)
+
+
+def broken_copies(samples: list[bytes], count: int, file: Path) -> int:
+    """Read damaged copies and answer; how many were refused."""
+    rng, refused = np.random.default_rng(3), 0
+    for k in range(count):
+        file.write_bytes(damaged(samples[k % len(samples)], rng))
+        try:
+            with np.errstate(all="ignore"):
+                answer_on(read_log(file)).text()
+        except InputError:
+            refused += 1
+    return refused
+
+
+def betaflight(rotors: int = 4) -> str:
+    """A table as blackbox_decode writes it."""
+    head = "loopIteration,time (us)," + ",".join(f"motor[{i}]" for i in range(rotors)) + ",vbatLatest (V)"
+    rows = [f"{k},{k * 4000}," + ",".join(str(1400 + i + k % 7) for i in range(rotors)) + ",15.9" for k in range(600)]
+    return "\n".join(['"motor_poles",14', head, *rows])
+
+
+def cells() -> bytes:
+    """A table with arrays in its cells, packed."""
+    rows = ["t,v,R,pwm,fa"]
+    for k in range(600):
+        parts = [[0.1, 0.0, 0.0], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], [1000 + k % 5] * 4, [0.0, 0.0, 0.1]]
+        rows.append(f"{0.02 * k}," + ",".join(f'"{json.dumps(p)}"' for p in parts))
+    return gzip.compress("\n".join(rows).encode(), mtime=0)
+
+
+def test_damaged_copies_never_raise_anything_else(flights: Path, tmp_path: Path) -> None:
+    """Refused with a fault, or read as far as they go."""
+    samples = [(flights / "after.usdlog").read_bytes(), betaflight().encode(), cells()]
+    assert 0 < broken_copies(samples, 150, tmp_path / "log") < 150
+
+
+def test_damaged_recordings_never_raise_anything_else(shared_data: Path, tmp_path: Path) -> None:
+    """The formats that libraries read."""
+    pytest.importorskip("pyulog")
+    pytest.importorskip("pymavlink")
+    folder = shared_data / "flight_logs"
+    samples = [p.read_bytes() for p in (*sorted(folder.glob("*.ulg")), *folder.glob("*.BIN"))]
+    broken_copies(samples, 30, tmp_path / "log")
+
+
+def test_a_cut_log_says_where_it_ends(flights: Path, tmp_path: Path) -> None:
+    """With the place."""
+    data = (flights / "after.usdlog").read_bytes()
+    (tmp_path / "cut").write_bytes(data[: len(data) // 2])
+    got = read_log(tmp_path / "cut")
+    assert got.ends and 5.0 < got.t[-1] < 7.0
+
+
+@pytest.mark.parametrize("rotors", [4, 6, 8])
+def test_betaflight_tables_keep_each_rotor(rotors: int, tmp_path: Path) -> None:
+    """Any number of rotors."""
+    (tmp_path / "log.csv").write_text(betaflight(rotors))
+    log = read_log(tmp_path / "log.csv")
+    assert log.rotors == rotors and log.command_unit == "us" and log.voltage is not None
+    assert log.t[1] == pytest.approx(0.004)
+
+
+def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Text, JSON, picture, exit codes."""
+    before = [str(p) for p in sorted(flights.glob("before_*"))]
+    call = ["fly", str(flights / "after.usdlog"), "--mass", "0.035", "--healthy", *before]
+    assert main([*call, "--json", "--out", str(tmp_path / "a.png")]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["schema"] == "bemt.flight/1" and said["decision"]["effects"] == ["damaged blade, motor 3"]
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    (tmp_path / "no.bin").write_bytes(b"\0" * 100)
+    assert main(["fly", str(tmp_path / "no.bin")]) == 2
+
+
+def answered(folder: Path, name: str, **more: Any) -> FlightAnswer:
+    """An answer on a recording."""
+    return answer_on(read_log(folder / name), **more)
+
+
+def test_every_recording_is_read(shared_data: Path) -> None:
+    """With rotors where motors were logged."""
+    pytest.importorskip("pyulog")
+    pytest.importorskip("pymavlink")
+    files = [p for p in (shared_data / "flight_logs").rglob("*.*") if p.suffix != ".md"]
+    assert files
+    for file in files:
+        log = read_log(file)
+        assert log.t.size >= 20 and log.rotors in (0, 4), file
+
+
+def test_recorded_thrust_constants_repeat(shared_data: Path) -> None:
+    """Within 1 % of their mean; the payload within 4 %; the brushed one within the bench's band."""
+    folder = shared_data / "flight_logs"
+    for stem in ("cf21_brushed_34.7g_*.usdlog", "cf21_brushless_37g_*.usdlog"):
+        k = [identify(read_log(p)).constants["thrust constant"].value for p in folder.glob(stem)]
+        assert np.max(np.abs(np.array(k) / np.mean(k) - 1.0)) < 0.01
+    calm = [read_log(p) for p in folder.glob("cf21_brushless_37g_*.usdlog")]
+    got = answered(folder, "cf21_brushless_payload_44.4g_eckart07.usdlog", healthy=calm, healthy_mass_kg=0.037)
+    assert got.mass is not None and abs(got.mass.value / 0.0444 - 1.0) < 0.04
+    bench = identify(read_log(next(folder.glob("cf21_brushed_34.7g_circle*.usdlog"))), 0.0347)
+    grams = 1000.0 * bench.constants["thrust constant"].value / 9.80665
+    assert 2.1e-8 < grams < 2.3e-8
+
+
+def test_recorded_quadrotor_with_cut_blades(shared_data: Path) -> None:
+    """No healthy or taped flight accused; from 2 mm on both blades the right motor and nothing else."""
+    folder = shared_data / "flight_logs" / "crazypad_E8"
+    calm = [features(read_log(p)) for p in sorted(folder.glob("normal*"))]
+    layout, read = layout_of("crazyflie", 4), [c for c in calm if c is not None]
+    told: Callable[[Path], Any] = lambda p: judge(features(read_log(p)), read, layout)  # type: ignore[arg-type]  # noqa: E731
+    assert told(next(folder.glob("tape*00*"))).accused == 0
+    for file in folder.glob("*"):
+        got = told(file)
+        if file.name.startswith(("tape", "normal")):
+            assert got.verdict == "none"
+        if got.verdict in ("named", "class"):
+            assert "damaged blade, motor 3" in got.effects
+
+
+def test_recorded_wind(shared_data: Path) -> None:
+    """Steady wind: the stated speed is within 2 m/s or within the band."""
+    folder = shared_data / "flight_logs" / "neural_fly"
+    calm = [read_log(folder / "baseline_nowind.csv.gz")]
+    for name, speed in (("35wind", 4.2), ("70wind", 8.5), ("100wind", 12.1)):
+        got = answered(folder, f"baseline_{name}.csv.gz", healthy=calm).wind
+        assert abs(got.speed - speed) < max(2.0, 1.3 * got.half)
+
+
+def test_picture_of_a_log_without_motors() -> None:
+    """It says so instead of failing."""
+    t = np.arange(0.0, 5.0, 0.01)
+    assert flight_picture(answer_on(FlightLog("f", "made", t))).startswith(b"\x89PNG")
