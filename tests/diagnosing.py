@@ -69,7 +69,7 @@ def recording(
     return Dataset("bench", "generated", values, u)
 
 
-def diagnose(series: Dataset, baseline: Case, nulls: int = 200) -> chain.Answer:
+def diagnose(series: Dataset, baseline: Case, nulls: int = 200) -> chain.Diagnosis:
     return chain.diagnose([record.from_series(series, baseline)], [baseline], nulls=nulls)
 
 

@@ -16,7 +16,7 @@ import pytest
 from bemt.case import Case, load_case
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, document, record
-from bemt.diagnose.answer import Answer
+from bemt.diagnose.answer import Diagnosis
 from bemt.diagnose.record import Record
 
 pytestmark = pytest.mark.slow
@@ -44,7 +44,7 @@ def taken(found: list[dict[str, str]], case: Case, reference: bool = False) -> R
     return replace(record.from_series(Dataset("cfd", "recording", values, u), case), reference=reference)
 
 
-def told(left_out: frozenset[str], found: list[dict[str, str]], reference: list[dict[str, str]]) -> Answer:
+def told(left_out: frozenset[str], found: list[dict[str, str]], reference: list[dict[str, str]]) -> Diagnosis:
     case = load_case(ROOT / "cases" / "prop_8x5" / "case.toml").replaced(
         {"model.effects_off": sorted(left_out), "blade.known_from": "cad"}  # the grids were made of this very case
     )

@@ -23,7 +23,7 @@ LEFT_OUT = "compressibility"
 
 
 @pytest.fixture(scope="module")
-def named(project: Path) -> chain.Answer:
+def named(project: Path) -> chain.Diagnosis:
     """The solver's own points with 1 % noise against a case without the Mach number."""
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm, J = (a.ravel() for a in np.meshgrid([8000.0, 15000.0, 22000.0], [0.0, 0.2, 0.4, 0.6]))
@@ -39,7 +39,7 @@ def named(project: Path) -> chain.Answer:
     return chain.diagnose([record.from_series(Dataset("bench", "own", values, u), without)], [without], only, nulls=120)
 
 
-def seen_as(answer: chain.Answer, verdict: str, effects: tuple[str, ...]) -> chain.Answer:
+def seen_as(answer: chain.Diagnosis, verdict: str, effects: tuple[str, ...]) -> chain.Diagnosis:
     """The same readings with another answer."""
     name = Explanation.of(*(effects[:2] if verdict == "named" else effects[:1]))
     best = fit.fit(answer.found, name)
@@ -61,7 +61,7 @@ def seen_as(answer: chain.Answer, verdict: str, effects: tuple[str, ...]) -> cha
     ids=["named", "pair", "class", "sensor", "none"],
 )
 def test_what_there_is_to_show_is_written(
-    named: chain.Answer, tmp_path: Path, verdict: str, effects: tuple[str, ...], expected: set[str]
+    named: chain.Diagnosis, tmp_path: Path, verdict: str, effects: tuple[str, ...], expected: set[str]
 ) -> None:
     from PIL import Image
 
@@ -85,7 +85,7 @@ def test_what_there_is_to_show_is_written(
                 assert image.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
 
 
-def test_the_colours_of_the_residual_are_what_its_heading_says(named: chain.Answer) -> None:
+def test_the_colours_of_the_residual_are_what_its_heading_says(named: chain.Diagnosis) -> None:
     figure, where = figures.residual(named), named.marked
     assert where is not None
     axis = next(a for a in figure.axes if "marked region" in a.get_title().replace("\n", " "))
@@ -95,14 +95,16 @@ def test_the_colours_of_the_residual_are_what_its_heading_says(named: chain.Answ
     assert inside.mean() == pytest.approx(100.0 * where.size)
 
 
-def test_the_residual_shows_the_run_and_not_its_reference(named: chain.Answer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_residual_shows_the_run_and_not_its_reference(
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
     free = np.arange(named.problem.y.size) % 2 == 0
     monkeypatch.setattr(type(named.problem), "free", property(lambda self: free))
     drawn = sum(len(np.asarray(a.collections[0].get_offsets())) for a in figures.residual(named).axes[:2])
     assert drawn == free.sum() < free.size
 
 
-def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: chain.Answer, tmp_path: Path) -> None:
+def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: chain.Diagnosis, tmp_path: Path) -> None:
     from matplotlib import pyplot as plt
 
     first, second = (figures.draw(named, tmp_path / name) for name in ("a", "b"))
@@ -114,7 +116,7 @@ def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: c
 @pytest.mark.parametrize(
     "odds", [(0.0, 0.009, -0.25, -0.333), (0.0, 57.2), (0.0, 214.0, -3.1), (0.0, 1.04), (0.0, 0.0)]
 )
-def test_labels_of_the_ranking_do_not_run_into_each_other(named: chain.Answer, odds: tuple[float, ...]) -> None:
+def test_labels_of_the_ranking_do_not_run_into_each_other(named: chain.Diagnosis, odds: tuple[float, ...]) -> None:
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -133,7 +135,7 @@ def test_labels_of_the_ranking_do_not_run_into_each_other(named: chain.Answer, o
             assert all(b.x0 - a.x1 > 3 for a, b in zip(boxes, boxes[1:], strict=False))
 
 
-def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Answer) -> None:
+def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Diagnosis) -> None:
     answer = seen_as(named, "named", (LEFT_OUT,))
     found = figures_effects.blade_loads(answer)
     assert found is not None
@@ -146,7 +148,7 @@ def test_the_loads_on_the_blade_add_up_to_the_signature(named: chain.Answer) -> 
 
 
 @pytest.mark.parametrize("name", ["pitch_offset", "thrust_gain", "pitch_offset+thrust_gain"])
-def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Answer, name: str) -> None:
+def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Diagnosis, name: str) -> None:
     what = Explanation.of(*name.split("+"))
     weights = fit.weights(named.found, what)
     intervals = fit.intervals(named.found, what)
@@ -182,7 +184,7 @@ def test_every_recording_has_a_line_among_those_shown() -> None:
     assert figures._chosen([0, 1], [1, 1]) == [0, 1]
 
 
-def test_a_reference_has_no_held_out_curve(named: chain.Answer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reference_has_no_held_out_curve(named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its readings are never left out: what is predicted for them is the case before calibration."""
     slow = named.problem.covariates["rpm"][named.problem.point] < 10000.0
     monkeypatch.setattr(type(named.problem), "free", property(lambda self: ~slow))
@@ -197,7 +199,7 @@ def rows_of(figure: Figure) -> set[str]:
 
 
 def test_effects_that_lead_the_ranking_are_in_the_matrix_before_others(
-    named: chain.Answer, monkeypatch: pytest.MonkeyPatch
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ids = named.alike.ids
     monkeypatch.setattr(figures_effects, "_MOST_EFFECTS", 2)
@@ -209,7 +211,7 @@ def test_effects_that_lead_the_ranking_are_in_the_matrix_before_others(
 
 
 def test_a_leading_effect_too_faint_at_usual_strength_is_shown_as_found_or_said(
-    named: chain.Answer, monkeypatch: pytest.MonkeyPatch
+    named: chain.Diagnosis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ids = named.alike.ids
     odds = {Explanation.of(LEFT_OUT): 0.6, NONE: 0.4}
@@ -235,7 +237,7 @@ def test_a_static_sweep_beside_runs_in_wind_is_one_line_over_the_speed() -> None
     rpm = np.r_[np.full(9, 5003.0), np.linspace(2000.0, 7000.0, 7)]
     parts = [SimpleNamespace(record=OneRecord(rpm))]
     answer = SimpleNamespace(problem=SimpleNamespace(parts=parts, covariates={"J": J, "rpm": rpm}))
-    found = figures._groups(cast("chain.Answer", answer), "J")
+    found = figures._groups(cast("chain.Diagnosis", answer), "J")
     assert [(line.words, line.over, int(line.points.sum())) for line in found] == [
         ("5003 rev/min", "J", 9), ("J = 0.00", "rpm", 7),
     ]  # fmt: skip

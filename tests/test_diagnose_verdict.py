@@ -33,7 +33,7 @@ from bemt.proof.intervals import calibrate
 
 
 @pytest.fixture(scope="module")
-def answer() -> chain.Answer:
+def answer() -> chain.Diagnosis:
     return diagnose(recording(case(), points("grid")), left_out("compressibility", case()))
 
 
@@ -41,25 +41,25 @@ def explained(words: str) -> Explanation:
     return {"none": NONE, "unknown": UNKNOWN}.get(words, Explanation.of(*words.split("__")))
 
 
-def told(answer: chain.Answer, **probability: float) -> verdict.Decision:
+def told(answer: chain.Diagnosis, **probability: float) -> verdict.Decision:
     """Decision if the explanations had these probabilities; "a__b" is a pair."""
     given = {explained(k): v for k, v in probability.items()}
     share = dict.fromkeys(answer.found.probability, 0.0) | given
     return rules.decide(verdict.VerdictQuery(replace(answer.found, probability=share), 0.002))
 
 
-def test_a_sure_effect_is_named(answer: chain.Answer) -> None:
+def test_a_sure_effect_is_named(answer: chain.Diagnosis) -> None:
     said = told(answer, compressibility=0.97, none=0.03)
     assert (said.verdict, said.effects) == ("named", ("compressibility",))
 
 
-def test_a_second_effect_that_may_be_there_is_mentioned(answer: chain.Answer) -> None:
+def test_a_second_effect_that_may_be_there_is_mentioned(answer: chain.Diagnosis) -> None:
     said = told(answer, compressibility=0.7, compressibility__thrust_zero=0.28, none=0.02)
     assert (said.verdict, said.effects) == ("class", ("compressibility", "thrust_zero"))
     assert said.probability > 0.95 and "left open" in said.why
 
 
-def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Answer) -> None:
+def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnosis) -> None:
     said = told(answer, compressibility=0.5, thrust_zero=0.45, none=0.05)
     assert (said.verdict, set(said.effects)) == ("class", {"compressibility", "thrust_zero"})
     assert said.probability == pytest.approx(0.95)
@@ -67,7 +67,7 @@ def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Answer)
     assert told(answer, compressibility=0.21, **many).verdict == "insufficient"
 
 
-def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Answer) -> None:
+def test_what_is_on_already_is_not_what_was_left_out(answer: chain.Diagnosis) -> None:
     assert "tip_loss" in {e.id for e in answer.problem.baseline}
     assert answer.found.log_bayes(Explanation.of("tip_loss")) < thresholds.PROVEN
     assert told(answer, tip_loss=0.99).verdict in ("insufficient", "unknown")
@@ -117,13 +117,13 @@ def test_what_is_named_beside_a_slip_explains_its_own(
 
 
 @pytest.mark.parametrize("walls", [None, object()])
-def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Answer) -> None:
+def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis) -> None:
     parts = [SimpleNamespace(baseline=p.baseline, model=SimpleNamespace(duct=walls)) for p in answer.problem.parts]
     problem: Any = SimpleNamespace(parts=parts)
     assert ("duct" in prior.present(problem)) == (walls is not None)
 
 
-def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Answer) -> None:
+def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
     assert confusion.nearest(answer.found) == "compressibility"
 
 
@@ -159,7 +159,7 @@ def test_intervals_end_at_the_physical_bounds() -> None:
     assert 0.0 <= a[2] < middle[2] < b[2] < 0.1
 
 
-def test_a_wrong_airspeed_is_that_of_the_tunnel_not_of_the_wall(answer: chain.Answer) -> None:
+def test_a_wrong_airspeed_is_that_of_the_tunnel_not_of_the_wall(answer: chain.Diagnosis) -> None:
     """At rest no factor on the airspeed changes anything, whatever a wall does to the inflow."""
     flow = answer.problem.parts[0].flow
     still = replace(flow, V=np.zeros_like(flow.V))
@@ -373,7 +373,7 @@ def test_what_takes_load_off_the_motor_is_no_fault_of_the_drive() -> None:
     assert revised("the drive changed as well", _said("named", "pitch_offset"), drive=drive, load_moves=True) is None
 
 
-def test_air_that_changes_with_time_moves_the_load(answer: chain.Answer) -> None:
+def test_air_that_changes_with_time_moves_the_load(answer: chain.Diagnosis) -> None:
     share = dict.fromkeys(answer.found.probability, 0.0) | {Explanation.of("recirculation"): 0.6, NONE: 0.4}
     query = verdict.VerdictQuery(replace(answer.found, probability=share), 0.002)
     query.steps.append(_said("insufficient"))
@@ -408,7 +408,7 @@ def test_a_number_that_may_as_well_be_off_is_not_pinned_to_its_end() -> None:
     assert rules.at_end("section", {"drag": {**low, "high": 0.9}})
 
 
-def test_two_effects_are_weighed_as_they_act_together(answer: chain.Answer) -> None:
+def test_two_effects_are_weighed_as_they_act_together(answer: chain.Diagnosis) -> None:
     found, state = answer.found, answer.found.states[0]
     assert state.mixed
     for pair, (extra, i, j) in state.mixed.items():
@@ -432,7 +432,7 @@ def test_none_one_effect_and_two_are_judged_under_their_best_covariances() -> No
     assert set(kept) == set(each.values())
 
 
-def test_the_groups_of_an_answer_are_views_of_one_weighing(answer: chain.Answer) -> None:
+def test_the_groups_of_an_answer_are_views_of_one_weighing(answer: chain.Diagnosis) -> None:
     assert answer.readings.values.size == answer.readings.u.size == answer.baseline.values.size
     assert answer.prior.keys() == answer.posterior.probability.keys()
     assert sum(answer.prior.values()) == pytest.approx(1.0) == pytest.approx(sum(answer.posterior.probability.values()))

@@ -12,8 +12,10 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.dataset import Dataset
 from bemt.diagnose import chain, rules, suggest, verdict, wrong_rotor_check
+from bemt.diagnose.assemble import build
 from bemt.diagnose.document import text
 from bemt.diagnose.explanation import Explanation
+from bemt.diagnose.problem import Part
 from bemt.diagnose.record import Record, from_series
 from bemt.rotors.latents import AsBuilt
 
@@ -22,11 +24,11 @@ def of(series: Dataset, reference: bool = False, findings: tuple[str, ...] = ())
     return replace(from_series(series, case()), reference=reference, findings=findings)
 
 
-def told(*records: Record) -> chain.Answer:
+def told(*records: Record) -> chain.Diagnosis:
     return chain.diagnose(records, [case()])
 
 
-def step(d: chain.Answer) -> list[str]:
+def step(d: chain.Diagnosis) -> list[str]:
     """Lines from "Next:" on that say what to do and what to type."""
     lines = text(d).split("\n")
     first = next(i for i, line in enumerate(lines) if line.strip().startswith("Next: "))
@@ -59,11 +61,11 @@ def test_beside_a_reference_at_other_speeds_it_is_none_either(grid: dict[str, np
 
 
 @pytest.fixture(scope="module")
-def compared(grid: dict[str, np.ndarray]) -> chain.Answer:
+def compared(grid: dict[str, np.ndarray]) -> chain.Diagnosis:
     return diagnose(recording(case(), grid), left_out("compressibility", case()))
 
 
-def test_a_named_effect_has_a_step_and_a_command(compared: chain.Answer) -> None:
+def test_a_named_effect_has_a_step_and_a_command(compared: chain.Diagnosis) -> None:
     assert compared.decision.verdict == "named"
     assert len(step(compared)) > 1
 
@@ -118,7 +120,7 @@ def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found:
      (2.5, 2.9, "look", "cross_talk"), (7.6, 9.0, "", "compressibility"), (7.6, 12.0, "run", "compressibility")],
 )  # fmt: skip
 def test_a_run_is_recommended_where_it_is_worth_its_time(
-    monkeypatch: pytest.MonkeyPatch, compared: chain.Answer, now: float, after: float, kind: str, lead: str
+    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis, now: float, after: float, kind: str, lead: str
 ) -> None:
     alone = len(compared.problem.parts[0].record)
     monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])
@@ -133,3 +135,23 @@ def test_a_run_is_recommended_where_it_is_worth_its_time(
         assert chosen.separates == (lead, rival) and chosen.points
     else:
         assert not chosen.separates and not chosen.points
+
+
+def asked(part: Part) -> str:
+    return "; ".join(o.text for o in suggest._options(part))
+
+
+def test_a_bench_is_not_asked_for_wind_nor_a_tunnel_to_open_a_door(compared: chain.Diagnosis) -> None:
+    tunnel = compared.problem.parts[0]
+    bench = replace(tunnel, flow=replace(tunnel.flow, V=np.zeros_like(tunnel.flow.V)))
+    assert "in wind" in asked(tunnel) and "in wind" not in asked(bench)
+    flown = replace(tunnel.record, V=np.maximum(tunnel.record.V, 1.0))
+    still = replace(tunnel.record, V=np.zeros_like(tunnel.record.V))
+    assert "door" in suggest._check("recirculation", still) and not suggest._check("recirculation", flown)
+
+
+@pytest.mark.parametrize("factor", [1.5, 0.7])
+def test_a_wider_blade_is_among_the_rotors_that_fit_the_loads(grid: dict[str, np.ndarray], factor: float) -> None:
+    wide = recording(case(), grid, (wrong_rotor_check._Chord(factor),))
+    problem = build([of(wide)], [case()])
+    assert f"chord {100.0 * (factor - 1.0):+.0f} %" in wrong_rotor_check.nearest_rotors(problem)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
 
-__all__ = ["Answer", "Baseline", "Posterior", "Readings"]
+__all__ = ["Diagnosis", "Baseline", "Posterior", "Readings"]
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class Posterior:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class Diagnosis:
     """What is wrong, in named groups; text, JSON, figures and report are views of it.
 
     Attributes
@@ -99,9 +99,9 @@ class Answer:
         Distances of effects in this plan.
     absent : dict of str to str
         Effects that could not be tried, and why.
-    drive : Answer or None
+    drive : Diagnosis or None
         Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
-    loads : Answer or None
+    loads : Diagnosis or None
         Of thrust and torque, where they name nothing and the answer is that of the drive.
     change : RunChange or None
         Change from the references, where there is one recording beside them.
@@ -121,8 +121,8 @@ class Answer:
     next: suggestion.Suggestion
     alike: confusion.Confusion
     absent: dict[str, str]
-    drive: Answer | None = None
-    loads: Answer | None = None
+    drive: Diagnosis | None = None
+    loads: Diagnosis | None = None
     change: RunChange | None = None
 
     @property

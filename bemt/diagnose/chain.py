@@ -25,7 +25,7 @@ from bemt.diagnose import (
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
-from bemt.diagnose.answer import Answer
+from bemt.diagnose.answer import Diagnosis
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.record import CHANNELS
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
     from bemt.diagnose.record import Record
 
-__all__ = ["Answer", "diagnose"]
+__all__ = ["Diagnosis", "diagnose"]
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def diagnose(
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
     change: RunChange | None = None,
-) -> Answer:
+) -> Diagnosis:
     """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
@@ -63,9 +63,9 @@ def diagnose(
     free = only is None and channels is None and baseline == "bemt"
 
     def chain(
-        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Answer | None = None,
+        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Diagnosis | None = None,
         compared: bool = False,
-    ) -> Answer:  # fmt: skip
+    ) -> Diagnosis:  # fmt: skip
         def ratios(absent: Collection[str]) -> RunChange | None:
             if not (compared and free):
                 return None
@@ -100,9 +100,9 @@ def _diagnose(
     nulls: int,
     baseline: str,
     given: suggestion.Given,
-    motor: Answer | None,
+    motor: Diagnosis | None,
     change: Callable[[Collection[str]], RunChange | None],
-) -> Answer:
+) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
     if question := wrong_rotor_check.finding(problem):
@@ -134,7 +134,7 @@ def _diagnose(
         step = ratio_check.next_of(query.change, files) or step
     if said.by == "both" and motor is not None:
         decision, parameters = said, parameters | motor.parameters
-    return Answer(
+    return Diagnosis(
         found, decision, said, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
         step, confusion.confusion(found), absent, motor, None, query.change,
     )  # fmt: skip
@@ -200,7 +200,11 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
         return note
     sure = decision.effects[:1] if decision.rule == verdict.BESIDE_IT else decision.effects
     claimed = decision.verdict in ("named", "sensor") or decision.rule == verdict.BESIDE_IT
-    if claimed and (mended := suggestion.correction(sure, dict(zip(best.ids, best.settings, strict=True)))):
+    if claimed and (
+        mended := suggestion.correction(
+            sure, dict(zip(best.ids, best.settings, strict=True)), found.problem.parts[0].record
+        )
+    ):
         return mended
     lead = best.ids[0] if best.ids else singles[0]
     listed = (*decision.effects, *(j for g in decision.classes for j in g), *singles)

@@ -24,7 +24,7 @@ from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.verdict import BESIDE_IT, inclusion
 
 if TYPE_CHECKING:
-    from bemt.diagnose.answer import Answer
+    from bemt.diagnose.answer import Diagnosis
     from bemt.diagnose.locate import Location
     from bemt.effects import Parameter
 
@@ -60,7 +60,7 @@ def _number(x: float) -> float | None:
     return float(x) if np.isfinite(x) else None
 
 
-def document(d: Answer) -> dict[str, Any]:
+def document(d: Diagnosis) -> dict[str, Any]:
     """Give the document."""
     found = d.found
     ranking = []
@@ -119,7 +119,7 @@ def _where(w: Location) -> str:
     return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} {most}, at {name} {both}."
 
 
-def _unexplained(d: Answer) -> list[str]:
+def _unexplained(d: Diagnosis) -> list[str]:
     """What the recording shows, and, where it is another thing, what calibration would leave of it.
 
     The location of the document is what remains in the light of the likeliest explanation. Where none is given, its
@@ -133,7 +133,7 @@ def _unexplained(d: Answer) -> list[str]:
     return lines
 
 
-def _gain(d: Answer) -> str:
+def _gain(d: Diagnosis) -> str:
     words = []
     for channel, s in d.scores.items():
         most = s["largest"] or 1.0
@@ -145,7 +145,7 @@ def _gain(d: Answer) -> str:
     return head + "; ".join(words) + "."
 
 
-def _parameters(d: Answer) -> str:
+def _parameters(d: Diagnosis) -> str:
     """What the parameters may be: effect by effect, named where there are two."""
     each = []
     for i, found in d.parameters.items():
@@ -177,7 +177,7 @@ def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
     return f"{value:{form}}" if p.unit in ("1", "") else f"{value:{form}} {p.unit}"
 
 
-def _with_size(d: Answer, name: str) -> str:
+def _with_size(d: Diagnosis, name: str) -> str:
     """Title of a named effect and, where one number is its size, that number."""
     cls, found = effects.catalogue()[name], d.parameters.get(name, {})
     if cls.fault == "unit" and "unit" in found:
@@ -189,7 +189,7 @@ def _with_size(d: Answer, name: str) -> str:
     return f"{cls.title} ({_sized(sizes[0], value, '+.3g')})"
 
 
-def _in_units(d: Answer, name: str, parameter: str, value: float) -> str:
+def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
     """The same of a shifted cell, in the unit of its channel."""
     channel = effects.catalogue()[name].sensor
     scales = [p.full_scale for p in d.problem.parts if not p.record.reference]
@@ -207,7 +207,7 @@ def _odds(told: dict[str, Any]) -> str:
     return " [" + ", ".join(f"{v if isinstance(v, str) else f'{v:.3g}'} {p:.2f}" for v, p in odds) + "]"
 
 
-def explanation(d: Answer) -> list[str]:
+def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
     decision, catalogue = d.decision, effects.catalogue()
     lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
@@ -264,7 +264,7 @@ def explanation(d: Answer) -> list[str]:
     return [line for line in lines if line]
 
 
-def _next(d: Answer) -> list[str]:
+def _next(d: Diagnosis) -> list[str]:
     """The next step, and what to type then."""
     step = d.next
     if not step.text:
@@ -276,7 +276,7 @@ def _next(d: Answer) -> list[str]:
     return [f"Next: {step.text}{gain}.", *(f"  {command}" for command in step.commands)]
 
 
-def _not_tried(d: Answer) -> list[str]:
+def _not_tried(d: Diagnosis) -> list[str]:
     """Effects that could not be tried, by reason, in one line."""
     reasons: dict[str, list[str]] = {}
     for name, why in d.absent.items():
@@ -285,7 +285,7 @@ def _not_tried(d: Answer) -> list[str]:
     return [f"Not tried: {'; '.join(words)}."] if words else []
 
 
-def _by_ratios(d: Answer) -> dict[str, Any]:
+def _by_ratios(d: Diagnosis) -> dict[str, Any]:
     """Document of the change from the reference."""
     assert d.change is not None
     return change_document(d.change)
@@ -299,7 +299,7 @@ def _title(name: str) -> str:
     return name if row is None else row.title
 
 
-def headline(d: Answer) -> str:
+def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     if d.by_ratios:
         words = change_headline(_by_ratios(d))
@@ -341,7 +341,7 @@ def headline(d: Answer) -> str:
     return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
 
 
-def _guess(d: Answer) -> str:
+def _guess(d: Diagnosis) -> str:
     """Title of the likeliest effect, where it is likely enough to be worth a look."""
     chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
     if chance < _GUESS or chance < d.found.probability[UNKNOWN]:
@@ -349,7 +349,7 @@ def _guess(d: Answer) -> str:
     return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
 
 
-def _from_reference(d: Answer) -> str:
+def _from_reference(d: Diagnosis) -> str:
     """Loads of the recording over those of the reference; "" where they were not compared."""
     if d.change is None:
         return ""
@@ -368,7 +368,7 @@ def _one_of(ids: Sequence[str]) -> str:
     return titles[0] if len(titles) == 1 else f"one of ({' / '.join(titles)})"
 
 
-def _off(d: Answer) -> str:
+def _off(d: Diagnosis) -> str:
     """By how much each channel differs from the case."""
     words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
     return " and ".join(words)
@@ -383,7 +383,7 @@ def _share(v: float) -> str:
     return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
-def text(d: Answer) -> str:
+def text(d: Diagnosis) -> str:
     """Lines, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)

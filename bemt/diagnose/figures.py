@@ -19,7 +19,7 @@ from bemt.diagnose.record import CHANNELS
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bemt.diagnose.answer import Answer
+    from bemt.diagnose.answer import Diagnosis
 
 __all__ = ["NAMES", "draw", "residual"]
 
@@ -49,11 +49,11 @@ _CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
 _MOST_LINES, _LONG, _ONE_J = 4, 3, 0.02
 
 
-def draw(answer: Answer, out: Path) -> list[Path]:
+def draw(answer: Diagnosis, out: Path) -> list[Path]:
     """Draw all figures that have something to show."""
     import matplotlib
 
-    makers: dict[str, Callable[[Answer], Figure | None]] = {
+    makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
         "residual": residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
@@ -102,11 +102,11 @@ def _varies(x: Array) -> bool:
     return bool(np.ptp(x) > 0.02 * max(float(np.max(np.abs(x))), 1e-12))
 
 
-def _channels(answer: Answer) -> list[int]:
+def _channels(answer: Diagnosis) -> list[int]:
     return [int(c) for c in np.unique(answer.problem.channel)]
 
 
-def _across(answer: Answer) -> str:
+def _across(answer: Diagnosis) -> str:
     """Covariate to draw over: that of the mismatch if it is no condition, else the first that varies in the test."""
     X, where = answer.problem.covariates, answer.marked
     if where is not None and where.variable in X and where.variable not in _CONDITIONS:
@@ -136,7 +136,7 @@ def _percent(d: Array) -> str:
 # Residual
 
 
-def residual(answer: Answer) -> Figure:
+def residual(answer: Diagnosis) -> Figure:
     """Draw where recording and baseline differ, as a map or along one variable."""
     X, where = answer.problem.covariates, answer.marked
     x = _across(answer)
@@ -147,7 +147,7 @@ def residual(answer: Answer) -> Figure:
     return _strip(answer, y if x in ("rpm", "M_tip", "Re") else x)
 
 
-def _shares(answer: Answer, c: int) -> tuple[NDArray[np.bool_], Array]:
+def _shares(answer: Diagnosis, c: int) -> tuple[NDArray[np.bool_], Array]:
     """Readings of a channel that are judged, and what the heading is the mean of: the located mismatch, if any."""
     problem, where = answer.problem, answer.marked
     here = (problem.channel == c) & problem.free
@@ -155,12 +155,12 @@ def _shares(answer: Answer, c: int) -> tuple[NDArray[np.bool_], Array]:
     return here, 100.0 * (d / problem.largest)[here]
 
 
-def _shown(answer: Answer) -> str:
+def _shown(answer: Diagnosis) -> str:
     calibration = "" if answer.marked is None else " − calibration"
     return f"recording − baseline{calibration}\n[% of the largest]"
 
 
-def _located(answer: Answer, c: int, name: str) -> tuple[float, float] | None:
+def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None:
     """Located interval of a covariate in a channel, with half a gap to the next points on either side."""
     where = answer.marked
     if where is None or where.channel != CHANNELS[c] or where.variable != name:
@@ -174,14 +174,14 @@ def _located(answer: Answer, c: int, name: str) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def _heading(answer: Answer, c: int, region: bool) -> str:
+def _heading(answer: Diagnosis, c: int, region: bool) -> str:
     text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
         text += f": mean {_percent(np.asarray(where.size))} of the largest, in the marked region"
     return text
 
 
-def _map(answer: Answer, x: str, y: str) -> Figure:
+def _map(answer: Diagnosis, x: str, y: str) -> Figure:
     from matplotlib.colors import LinearSegmentedColormap
 
     problem, channels = answer.problem, _channels(answer)
@@ -209,7 +209,7 @@ def _map(answer: Answer, x: str, y: str) -> Figure:
     return figure
 
 
-def _strip(answer: Answer, name: str) -> Figure:
+def _strip(answer: Diagnosis, name: str) -> Figure:
     problem, channels = answer.problem, _channels(answer)
     figure, axes = blank(3.4, 1, len(channels), sharex=True)
     factor = answer.found.states[0].hyper.scale
@@ -239,7 +239,7 @@ class _Line(NamedTuple):
     over: str  # Covariate of the abscissa
 
 
-def _groups(answer: Answer, name: str) -> list[_Line]:
+def _groups(answer: Diagnosis, name: str) -> list[_Line]:
     """Lines of points to draw over a covariate; of advance ratios with too few of its points, over the speed."""
     problem = answer.problem
     X, P = problem.covariates, problem.covariates["rpm"].size
@@ -305,7 +305,7 @@ def _label(name: str, x: Array) -> str:
     return f"{lead}{float(x.min()):.{digits}f} to {float(x.max()):.{digits}f}{unit}"
 
 
-def _coefficients(answer: Answer) -> Array:
+def _coefficients(answer: Diagnosis) -> Array:
     """Factor of every reading that makes it CT or CP; 1 for the speed of rotation."""
     problem, out = answer.problem, []
     for p in problem.parts:
@@ -315,7 +315,7 @@ def _coefficients(answer: Answer) -> Array:
     return np.concatenate(out)[problem.kept]
 
 
-def _before_after(answer: Answer) -> Figure:
+def _before_after(answer: Diagnosis) -> Figure:
     problem, channels = answer.problem, _channels(answer)
     groups = _groups(answer, _across(answer))
     sizes = [_count(problem.covariates[g.over][g.points]) for g in groups]

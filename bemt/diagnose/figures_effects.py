@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemt.air import Air
-    from bemt.diagnose.answer import Answer
+    from bemt.diagnose.answer import Diagnosis
 
 __all__ = ["blade_loads", "matrix", "radius", "ranking"]
 
@@ -35,7 +35,7 @@ _MOST_EFFECTS, _MOST_BARS = 15, 8
 _LEADING = 0.05
 
 
-def _representative(answer: Answer) -> int:
+def _representative(answer: Diagnosis) -> int:
     """Reading of median signature among those of the located region."""
     problem, where = answer.problem, answer.marked
     size = np.abs(answer.best.signature / problem.scale)
@@ -47,7 +47,7 @@ def _representative(answer: Answer) -> int:
     return int(rows[np.argsort(size[rows], kind="stable")[rows.size // 2]])
 
 
-def blade_loads(answer: Answer) -> tuple[int, Array, Array, Array] | None:
+def blade_loads(answer: Diagnosis) -> tuple[int, Array, Array, Array] | None:
     """Loads along the blade without and with what was found, where the effect acts on the rotor."""
     best, problem = answer.best, answer.problem
     extra = [effect_of(i, s) for i, s in zip(best.ids, best.settings, strict=True)]
@@ -73,7 +73,7 @@ def blade_loads(answer: Answer) -> tuple[int, Array, Array, Array] | None:
     return reading, s.radial["r"][0], prep.stations.dr, np.array(curves)
 
 
-def radius(answer: Answer) -> Figure | None:
+def radius(answer: Diagnosis) -> Figure | None:
     """Draw what the effect changes along the blade."""
     found = blade_loads(answer)
     if found is None:
@@ -99,7 +99,7 @@ def radius(answer: Answer) -> Figure | None:
     return figure
 
 
-def _likely(answer: Answer) -> dict[str, float]:
+def _likely(answer: Diagnosis) -> dict[str, float]:
     """Effects of the ranking with the probability of the likeliest explanation that each is in, likeliest first."""
     share: dict[str, float] = {}
     for what, p in sorted(answer.found.probability.items(), key=lambda kv: -kv[1]):
@@ -108,7 +108,7 @@ def _likely(answer: Answer) -> dict[str, float]:
     return share
 
 
-def _as_found(answer: Answer) -> confusion.Confusion:
+def _as_found(answer: Diagnosis) -> confusion.Confusion:
     """Distances, those of the leading effects that are too faint at usual strength at the strength that was found."""
     alike, found = answer.alike, answer.found
     sizes = dict(zip(alike.ids, alike.size, strict=True))
@@ -119,7 +119,7 @@ def _as_found(answer: Answer) -> confusion.Confusion:
     return confusion.confusion(found, at)
 
 
-def matrix(answer: Answer) -> Figure | None:
+def matrix(answer: Diagnosis) -> Figure | None:
     """Draw which effects look alike in this plan: the likely ones first, at the strength that was found."""
     from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
     from matplotlib.patches import Rectangle
@@ -178,7 +178,7 @@ def _neighbours(distance: Array, rows: Index) -> Index:
     return np.asarray(rows[leaves_list(linkage(squareform(near, checks=False), "average"))])
 
 
-def ranking(answer: Answer) -> Figure:
+def ranking(answer: Diagnosis) -> Figure:
     """Draw the explanations by their probability."""
     found = answer.found
     names = sorted(found.probability, key=lambda k: -found.probability[k])[:_MOST_BARS]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bemt.diagnose.answer import Answer
+    from bemt.diagnose.answer import Diagnosis
     from bemt.diagnose.signatures import Candidate
 
 __all__ = ["posterior"]
@@ -67,7 +67,7 @@ def _words(setting: dict[str, Any]) -> str:
     return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else str(v) for k, v in setting.items())
 
 
-def posterior(answer: Answer) -> Figure | None:
+def posterior(answer: Diagnosis) -> Figure | None:
     """Draw one panel per parameter, or a map of two."""
     if not answer.best.ids:
         return None

@@ -14,14 +14,14 @@ from bemt.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from bemt.case import Case
-    from bemt.diagnose.answer import Answer
+    from bemt.diagnose.answer import Diagnosis
 
 __all__ = ["beside", "elsewhere", "improved_case", "is_improved"]
 
 _HEAD = "with what `bemt diagnose` found: "
 
 
-def improved_case(answer: Answer, case: Case, source: str) -> str:
+def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     """Text of a case file with the effects of the verdict on."""
     named = not answer.by_ratios and answer.decision.verdict in ("named", "class")
     found = [effect_of(i, s) for i, s in zip(answer.best.ids, answer.best.settings, strict=True)]

@@ -44,6 +44,8 @@ ROTOR = (
 )
 """What comes before any cause where all loads are off by a quarter."""
 
+# Largest advance ratio of a recording up to which it is one at rest: a draught is no wind.
+_AT_REST = 0.02
 # Loads of a run and its reference that differ by such a share may be of days of different density.
 _DAYS = 0.03, 0.15
 
@@ -136,7 +138,7 @@ class _Option:
 
 
 def _options(part: Part) -> list[_Option]:
-    """Runs that a stand can do, around what was recorded."""
+    """Runs that this stand can do, around what was recorded: one that never had wind is a bench without a tunnel."""
     record, f = part.record, part.flow
     D = 2.0 * f.R
     low, high = float(record.rpm.min()), float(record.rpm.max())
@@ -153,8 +155,6 @@ def _options(part: Part) -> list[_Option]:
     static, same = np.zeros(_POINTS), np.full(_POINTS, middle)
     out = [
         at(f"static runs (no airspeed) at {low:.0f} to {high:.0f} rev/min", spread, static),
-        at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same,
-           np.linspace(0.2, 1.15 * J0, _POINTS) * middle / 60.0 * D),
         at(f"slower: static at {0.4 * low:.0f} to {0.8 * low:.0f} rev/min", np.linspace(0.4, 0.8, _POINTS) * low,
            static),
         at(f"repeat {low:.0f} to {high:.0f} rev/min in air 15 % thinner (altitude, or a hot day)", spread, static,
@@ -164,6 +164,9 @@ def _options(part: Part) -> list[_Option]:
         at("repeat the first points after 30 minutes of running", spread, static, None,
            time_s=now.get("time_s", 0.0) + 1800.0),
     ]  # fmt: skip
+    if top_J > _AT_REST:
+        wind = np.linspace(0.2, 1.15 * J0, _POINTS) * middle / 60.0 * D
+        out.append(at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same, wind))
     if tip < 0.75:
         up = min(1.3, 0.85 / max(tip, 1e-6))
         out.append(
@@ -315,7 +318,9 @@ def suggest(
     after, option = best
     apart, worth = now >= _ENOUGH and not reference, after >= _WORTH * now
     aims = ("confirm", "rule out")
-    look = next((f"to {aim} {n}, {check}" for aim, n in zip(aims, names, strict=True) if (check := _check(n))), "")
+    look = next(
+        (f"to {aim} {n}, {check}" for aim, n in zip(aims, names, strict=True) if (check := _check(n, part.record))), ""
+    )
     # what is told apart already, or would still be alike, is rather looked at than run
     if option is not None and worth and not (look and (apart or after < _ENOUGH)):
         return Suggestion(option.text, _points(problem.parts[0].record, option), names, now, after)
@@ -326,22 +331,24 @@ def suggest(
     return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), now, now)
 
 
-def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]]) -> Suggestion | None:
+def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:
     """What to put right in the stand or the file, where effects of the stand were found at such settings."""
     for name in names:
         cls = effects.catalogue().get(name)
-        if cls is None or cls.kind != "stand" or not _check(name):
+        if cls is None or cls.kind != "stand" or not _check(name, record):
             continue
-        text, found = _check(name), settings.get(name, {})
+        text, found = _check(name, record), settings.get(name, {})
         if float(found.get("factor", 1.0)) < 0.0 and "channel" in found:
             text = f"reverse the sign of {found['channel']} (sign = -1 in a recording.toml), or turn the sensor round"
         return Suggestion(text, (), (), 0.0, 0.0, "look")
     return None
 
 
-def _check(name: str) -> str:
-    """How to check an effect without a run."""
+def _check(name: str, record: Record) -> str:
+    """How to check an effect without a run, on the stand of a recording."""
     cls = effects.catalogue().get(name)
+    if cls is not None and cls.check_in_room and np.all(record.V > 0.0):
+        return ""
     if cls is not None and cls.check:
         return cls.check
     if name in ("thrust_gain", "torque_gain", "thrust_zero", "torque_zero"):

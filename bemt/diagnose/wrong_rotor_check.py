@@ -7,7 +7,7 @@ blades, a unit or the speed is another one.  The question comes before the physi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -42,9 +42,12 @@ _SHOWN = 3
 _NEARLY = 1.0
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 # Kinds of slips that are another rotor.
-_ROTORS = ("pitch", "diameter", "blades")
+_ROTORS = ("pitch", "chord", "diameter", "blades")
+_CHORDS = (0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.35, 1.5, 1.7)
 _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
+# Kind, words, logarithm of the loads over those of the case by channel, rarity.
+_Slip = tuple[str, str, dict[str, float], float]
 CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
 """Why nothing unknown is claimed of it."""
 SLIPS = ("unit_slip", "rpm_scale")
@@ -74,6 +77,20 @@ class _Blades(Effect):
         bake.B = self.count
 
 
+@dataclass(frozen=True)
+class _Chord(Effect):
+    """Blades wider or narrower by one factor."""
+
+    factor: float = 1.0
+
+    id = "chord"
+
+    def blade(self, bake: Baking) -> None:
+        """Change chord and solidity."""
+        bake.chord = bake.chord * self.factor
+        bake.sigma = bake.sigma * self.factor
+
+
 def levels(problem: Problem) -> dict[str, float]:
     """Median of each load of the test over that of the case [1]."""
     return {channel: 1.0 + level for channel, level in problem.level.items()}
@@ -91,8 +108,13 @@ def _suspicious(found: dict[str, float]) -> bool:
 def suspects(problem: Problem) -> list[Suspect]:
     """Rank the slips that would explain the level of the loads."""
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
+    return _ranked(found, _slips(problem, found))
+
+
+def _ranked(found: dict[str, float], slips: Iterable[_Slip]) -> list[Suspect]:
+    """The nearest of each kind, nearest kind first."""
     out: dict[str, Suspect] = {}
-    for kind, words, shift, rarity in _slips(problem, found):
+    for kind, words, shift, rarity in slips:
         square = sum((found[c] - shift.get(c, 0.0)) ** 2 for c in found) / _OFF**2 + rarity
         if kind not in out or square < out[kind].distance ** 2:
             out[kind] = Suspect(kind, words, math.sqrt(square))
@@ -106,11 +128,14 @@ def another_label(problem: Problem) -> bool:
 
 
 def nearest_rotors(problem: Problem) -> str:
-    """Rotors that would fit the level of the loads, nearest first."""
-    return " or ".join(s.words for s in suspects(problem) if s.kind in _ROTORS)
+    """Rotors that would fit the level of the loads, nearest first: another pitch, chord, diameter or blade count."""
+    found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}
+    chords = [("chord", f"chord {100.0 * (k - 1.0):+.0f} %", _Chord(k), 0.5) for k in _CHORDS]
+    slips = [s for s in _slips(problem, found) if s[0] in _ROTORS]
+    return " or ".join(s.words for s in _ranked(found, [*slips, *_shapes(problem, found, chords)]))
 
 
-def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str, dict[str, float], float]]:
+def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
     """Kind, words, logarithm of the loads over those of the case, rarity of each slip."""
     T, Q = CHANNELS[:2]
     part = next(p for p in problem.parts if not p.record.reference)
@@ -142,6 +167,14 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[tuple[str, str
     blades = part.flow.B
     changes += [("blades", f"{n} blades for {blades}", _Blades(n), 0.5 + math.log(n / blades) ** 2)
                 for n in _BLADES if n != blades]  # fmt: skip
+    yield from _shapes(problem, found, changes)
+
+
+def _shapes(
+    problem: Problem, found: dict[str, float], changes: Iterable[tuple[str, str, Effect, float]]
+) -> Iterator[_Slip]:
+    """The same of other blades, solved."""
+    part = next(p for p in problem.parts if not p.record.reference)
     f0 = part.predict(part.baseline).reshape(len(part.channels), -1)
     for kind, words, change, rarity in changes:
         f = part.predict(part.turned(change)).reshape(len(part.channels), -1)

@@ -403,6 +403,8 @@ class Effect:
     exact: ClassVar[bool] = False
     # How to check it without a run.
     check: ClassVar[str] = ""
+    # Whether that check is one of a room: no tunnel can do it.
+    check_in_room: ClassVar[bool] = False
     # Parameters with a few discrete values (such as a ratio of units).
     discrete: ClassVar[tuple[str, ...]] = ()
     # Names in Flow.extra that are required to see it.

@@ -38,7 +38,7 @@ class CoaxialNeighbour(Effect):
         "less thrust at the same speed, as in the wake of another rotor; strongest in static runs, fading with "
         "airspeed; gone when the other rotor stops"
     )
-    check = "stop the other rotor"
+    check = "see whether a second rotor is on the axis; if so, repeat with it stopped"
     parameters = (
         Parameter("z_over_R", "1", 0.1, 4.0, "coaxial stands, 0.1 to 1 diameters apart"),
         Parameter("load", "1", 0.0, 2.0, "declared; thrust of the neighbour over that of this rotor", 0, 0.0),

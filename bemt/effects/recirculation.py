@@ -28,6 +28,7 @@ class Recirculation(Effect):
     id = "recirculation"
     title = "recirculation in the room"
     check = "release smoke behind the propeller, or repeat with a door open and after a pause"
+    check_in_room = True
     along = ("time_s",)
     sign = (
         "thrust decays within seconds of each start, only at low advance ratio; drift of a cell does not depend on "

@@ -20,7 +20,7 @@ from bemt.library.rotors import Propeller, rotor_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.diagnose.answer import Answer as Judged
+    from bemt.diagnose.answer import Diagnosis
     from bemt.diagnose.contrast import Contrast
     from bemt.diagnose.record import Record
     from bemt.drive.drive_result import DriveResult
@@ -69,7 +69,7 @@ class Answer:
 
     Parameters
     ----------
-    diagnosis : bemt.diagnose.answer.Answer
+    diagnosis : bemt.diagnose.answer.Diagnosis
         The complete result.
     propeller : Propeller
         The propeller that was compared with the recording.
@@ -98,7 +98,7 @@ class Answer:
     True
     """
 
-    diagnosis: Judged
+    diagnosis: Diagnosis
     propeller: Propeller
 
     def __repr__(self) -> str:
