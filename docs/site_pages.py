@@ -34,7 +34,7 @@ API = {  # page: title, introduction, names
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
-    "How to": ("notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
+    "How to": ("choose.md", "notebooks/*", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
     "Commands and files": ("commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("theory.md", "effects.md", "diagnosis.md"),
