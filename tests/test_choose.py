@@ -36,6 +36,15 @@ def test_hover_and_full_throttle_are_those_of_drive(label: str, kv: float, cells
     assert found.u_power_W == pytest.approx(hover["power_W"].u, rel=0.3)
 
 
+def test_power_in_flight_is_above_momentum_theory() -> None:
+    T, V = 10.0, 25.0
+    found = choose(T, 6, labels=["8x3.5x3", "9x4x3", "9x6", "10x7"], kv=(500.0, 1500.0), airspeed_m_s=V)
+    power = found.dropna(subset=["power_W"])
+    area = np.array([math.pi / 4 * (0.0254 * float(label.split("x")[0])) ** 2 for label in power.label])
+    induced = np.sqrt(0.25 * V**2 + T / (2.0 * 1.225 * area)) - 0.5 * V
+    assert len(power) and (power.power_W > T * (V + induced)).all()
+
+
 def test_the_best_has_the_least_power_of_the_sure(few) -> None:
     sure = few[few.probability >= 0.9]
     assert len(sure) and few.power_W.iloc[0] == sure.power_W.min()

@@ -13,10 +13,9 @@ from bemt.base.units import INCH
 from bemt.case import Case, case_of, fresh
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import propagate
+from bemt.drive.rotor_table import SPEEDS
 
 Array = NDArray[np.float64]
-SPEEDS = np.geomspace(0.06, 1.0, 9)
-"""Solved speeds over the greatest."""
 FINE = 481
 
 
@@ -51,7 +50,7 @@ class RotorLoads:
 
 
 @dataclass(frozen=True)
-class Scatter:
+class LoadScatter:
     """Relative standard uncertainties of thrust and torque of a label at a speed, and their correlation."""
 
     log_diameter: float
@@ -85,7 +84,7 @@ def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float) -> RotorLoads |
                       float(case.air().a_sound))  # fmt: skip
 
 
-def scatter(label: str, rpm: float, airspeed_m_s: float) -> Scatter:
+def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
     """Bands of a label at one speed, by `bemt.case.propagate`: declared unknowns, model and numerics."""
     case = case_of_label(label)
     found = propagate(case, rpm, airspeed_m_s)
@@ -97,7 +96,7 @@ def scatter(label: str, rpm: float, airspeed_m_s: float) -> Scatter:
         half = [0.5 * (r[-1] - r[0]) for r in runs]
         together += half[0] * half[1] / 3.0
     rho = min(max(together / (u[0] * u[1]), -0.99), 0.99)
-    return Scatter(
+    return LoadScatter(
         math.log(case.diameter_m / INCH), case.stated_pitch_m / case.diameter_m, u[0] / abs(T), u[1] / abs(Q), rho
     )
 

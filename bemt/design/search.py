@@ -32,7 +32,7 @@ from bemt.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.case.unknowns import DRIVE
 from bemt.design import rotor_loads
 from bemt.design.motors_file import KnownMotor
-from bemt.design.rotor_loads import RotorLoads, Scatter
+from bemt.design.rotor_loads import LoadScatter, RotorLoads
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,9 +226,9 @@ def _standard(target: Target, max_in: float | None, blades: Sequence[int]) -> tu
         pitches = dict.fromkeys(round(2.0 * D * ratio) / 2.0 for ratio in RATIOS)
         out += [f"{D}x{P:g}" + (f"x{B}" if B != 2 else "") for P in pitches for B in blades]
     if not out:
-        least = math.sqrt(target.thrust_N / LOADING[1] * 4.0 / math.pi) / INCH
+        smallest, largest = (math.sqrt(target.thrust_N / x * 4.0 / math.pi) / INCH for x in reversed(LOADING))
         got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:g} in")
-        hint = f"The smallest disk for this thrust has about {least:.2g} in; name sizes with --labels"
+        hint = f"Disks for this thrust have {smallest:.2g} to {largest:.2g} in; name sizes with --labels"
         raise InputError(Fault("", "thrust", got, "a thrust that a standard size carries", hint))
     return tuple(out)
 
@@ -240,7 +240,7 @@ def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorL
     return rotor_loads.rotor_loads(label, min(sonic, fastest), target.airspeed_m_s)
 
 
-def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[Scatter]:
+def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
     """Bands of a few labels spread over the sizes that reach the target."""
     good = [one for one in loads if np.isfinite(one.speed_for(np.array([target.thrust_N]))[0])] or list(loads)
     order = sorted(good, key=lambda one: (one.diameter_m, one.pitch_m))
@@ -257,7 +257,7 @@ def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[Scatter]:
     return out
 
 
-def _nearest(one: RotorLoads, spreads: Sequence[Scatter]) -> Scatter:
+def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
     x, p = math.log(one.diameter_m / INCH), one.pitch_m / one.diameter_m
     return min(spreads, key=lambda s: math.hypot(s.log_diameter - x, s.pitch_ratio - p))
 
@@ -294,6 +294,11 @@ class _Chain:
         return duty, bus, (self.voc - self.battery_ohm * bus) * bus
 
 
+def _driven(amps: Array) -> Array:
+    """NaN where the air turns the rotor at full throttle: it says nothing about the motor's size."""
+    return np.where(amps > 0.0, amps, math.nan)
+
+
 def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target) -> _Chain:
     share = {}
     for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True):
@@ -304,16 +309,17 @@ def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target) ->
     typical = np.where(np.isnan(ohm), drop, 0.05)
     full = np.minimum((1.0 - typical) * loaded / k * 30.0 / math.pi, loads.rpm[-1])
     amps = loads.torque_at(full) / k / (1.0 - idle)
-    winding = np.where(np.isnan(ohm), drop * loaded / amps, ohm)
+    winding = np.where(np.isnan(ohm), drop * loaded / _driven(amps), ohm)
     for _ in range(60 if np.isfinite(ohm).any() else 0):  # a motor of known resistance: its full throttle
         new = np.maximum((loaded - winding * amps) / k * 30.0 / math.pi, 1.0)
         full = np.where(np.isnan(ohm), full, 0.7 * full + 0.3 * np.minimum(new, loads.rpm[-1]))
         amps = loads.torque_at(full) / k / (1.0 - idle)
+    amps = _driven(amps)
     rest = np.where(np.isnan(no_load), idle * amps, no_load)
     return _Chain(k, winding, rest, sag * target.voc / amps, target.voc)
 
 
-def _rows(loads: RotorLoads, u: Scatter, machines: Sequence[KnownMotor], target: Target) -> list[dict[str, Any]]:
+def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], target: Target) -> list[dict[str, Any]]:
     z = _draws()[0]
     thrust = np.exp(u.u_thrust * z[0])
     torque = np.exp(u.u_torque * (u.correlation * z[0] + math.sqrt(1.0 - u.correlation**2) * z[1]))
