@@ -1,0 +1,112 @@
+"""The ranking of `choose` as text, document and picture."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bemt.base.tables import csv_text, json_text, number_text, write_atomic
+from bemt.design.rotor_loads import size_in
+from bemt.design.search import Target
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA = "bemt.choose/1"
+RESULTS = ("choose.json", "choose.csv", "choose.png")
+SHOWN = 10
+
+
+def best_of_each(table: pd.DataFrame) -> pd.DataFrame:
+    """The best motor of each label, in the order of the ranking."""
+    return table.drop_duplicates("label").reset_index(drop=True)
+
+
+def text(table: pd.DataFrame) -> str:
+    """One screen: the best motor of each label."""
+    t: Target = table.attrs["target"]
+    sure = table.attrs["sure"]
+    at = "hover" if t.cruise_N is not None else "this thrust"
+    size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
+    good = int((table.probability >= sure).sum())
+    lines = [
+        f"{t.thrust_N:.3g} N on {t.cells}S at 50% charge{size}, tip Mach up to {t.max_tip_mach:g}: "
+        f"{good} of {len(table)} pairs meet it with a probability of {sure:.0%} or more",
+        f"power, current and time at {at} ({t.at_N:.3g} N); ± one standard deviation; best motor of each label",
+        "",
+    ]
+    if not good:
+        reach = table.loc[table.full_thrust_N.idxmax()]
+        lines[2:] = [f"none meets it. The most thrust has {reach.label} at {reach.kv:.0f} rev/min/V: "
+                     f"{reach.full_thrust_N:.3g} N", ""]  # fmt: skip
+    timed = "min" if t.capacity_Ah is not None else "min/Ah"
+    head = ["propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "why not the first"]
+    rows = [
+        [r.label, f"{r.kv:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
+         *(number_text(v, 3) for v in (r.current_A, r.peak_A, r.g_per_W, r.minutes)), number_text(r.tip_mach, 2),
+         number_text(r.full_thrust_N, 3), r.why or "-"]
+        for r in best_of_each(table).head(SHOWN).itertuples()
+    ]  # fmt: skip
+    width = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    lines += ["  ".join(cell.ljust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in [head, *rows]]
+    return "\n".join(lines) + "\n"
+
+
+def document(table: pd.DataFrame) -> dict[str, Any]:
+    """Plain values, ``bemt.choose/1``; all pairs, best first."""
+    return {"schema": SCHEMA, "target": vars(table.attrs["target"]), "sure": table.attrs["sure"],
+            "pairs": table.to_dict("records")}  # fmt: skip
+
+
+def write(table: pd.DataFrame, out: str | Path) -> None:
+    """Write document, table and picture to a folder."""
+    folder = Path(out)
+    write_atomic(folder / RESULTS[1], csv_text(list(table.columns), table.to_dict("records")))
+    write_atomic(folder / RESULTS[2], picture(table))
+    write_atomic(folder / RESULTS[0], json_text(document(table)))
+
+
+def front(table: pd.DataFrame) -> pd.DataFrame:
+    """Pairs of the best motors that no smaller propeller beats in power, smallest first (the Pareto front)."""
+    sure = best_of_each(table[table.probability >= table.attrs["sure"]])
+    sure = sure.assign(diameter_in=[size_in(label) for label in sure.label]).sort_values(["diameter_in", "power_W"])
+    return sure[sure.power_W < sure.power_W.cummin().shift(fill_value=math.inf)]
+
+
+def picture(table: pd.DataFrame) -> bytes:
+    """Power over diameter of the best motor of each label, coloured by probability, with the front. PNG bytes."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    t: Target = table.attrs["target"]
+    best = best_of_each(table).dropna(subset=["power_W"])
+    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    ax = figure.add_subplot()
+    size = [size_in(label) for label in best.label]
+    dots = ax.scatter(size, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3)
+    figure.colorbar(dots, ax=ax, label="probability that the target is met")
+    edge = front(table)
+    if len(edge):
+        ax.errorbar(edge.diameter_in, edge.power_W, edge.u_power_W, color="#D55E00", lw=1.2, capsize=2,
+                    label="least power for the size, ± one standard deviation")  # fmt: skip
+        for row in edge.itertuples():
+            ax.annotate(f"{row.label}, {row.kv:.0f}", (row.diameter_in, row.power_W), xytext=(-4, -4),
+                        textcoords="offset points", fontsize=7, ha="right", va="top")  # fmt: skip
+        ax.legend(frameon=False, fontsize=8)
+    ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
+    ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
+    ax.grid(True, alpha=0.3)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    return out.getvalue()
+
+
+def _banded(value: float, u: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.0f} ± {u:.0f}" if math.isfinite(u) and value >= 10.0 else number_text(value, 3)

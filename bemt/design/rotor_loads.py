@@ -1,0 +1,110 @@
+"""Loads of a label over speed, and how far a real rotor with this label is from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.units import INCH
+from bemt.case import Case, case_of, fresh
+from bemt.case.prepare import prepare_case
+from bemt.case.propagate import propagate
+from bemt.drive.rotor_table import SPEEDS
+
+Array = NDArray[np.float64]
+FINE = 481
+
+
+@dataclass(frozen=True, eq=False)
+class RotorLoads:
+    """Thrust and torque of a rotor over speed, (FINE,) each, up to where the solver converges."""
+
+    label: str
+    diameter_m: float
+    pitch_m: float
+    blades: int
+    rpm: Array  # rising [rev/min]
+    thrust_N: Array
+    torque_Nm: Array
+    a_sound: float  # [m/s]
+
+    def speed_for(self, thrust_N: Array) -> Array:
+        """Speed that gives a thrust, NaN where none in the table does. [rev/min]"""
+        first = int(np.argmax(np.r_[np.diff(self.thrust_N) > 0.0, True] & (self.thrust_N > 0.0)))
+        T, n = np.maximum.accumulate(self.thrust_N[first:]), self.rpm[first:]
+        found = np.interp(np.sqrt(thrust_N), np.sqrt(T), n, right=math.nan)
+        return np.where(thrust_N < T[0], math.nan, found)
+
+    def torque_at(self, rpm: Array) -> Array:
+        """Torque, NaN above the table; with the square of the speed below it. [N m]"""
+        q = np.interp(rpm, self.rpm, self.torque_Nm / self.rpm**2, right=math.nan)
+        return np.asarray(q * rpm**2)
+
+    def tip_mach(self, rpm: Array, airspeed_m_s: float) -> Array:
+        """Helical tip Mach number [1]."""
+        return np.hypot(math.pi * self.diameter_m * rpm / 60.0, airspeed_m_s) / self.a_sound
+
+
+@dataclass(frozen=True)
+class LoadScatter:
+    """Relative standard uncertainties of thrust and torque of a label at a speed, and their correlation."""
+
+    log_diameter: float
+    pitch_ratio: float
+    u_thrust: float
+    u_torque: float
+    correlation: float
+
+
+@lru_cache(maxsize=512)
+def case_of_label(label: str) -> Case:
+    """Case of a label with its declared unknowns."""
+    return case_of(fresh.label_text(label))
+
+
+def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float) -> RotorLoads | None:
+    """Solve a label over speed; None where too few speeds converge."""
+    from scipy.interpolate import PchipInterpolator
+
+    case = case_of_label(label)
+    points = prepare_case(case).solve(SPEEDS * rpm_max, airspeed_m_s, case.air())
+    T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
+    good = np.isfinite(T) & np.isfinite(Q)
+    if np.count_nonzero(good) < 4:
+        return None
+    n = points.rpm[good]
+    fine = np.linspace(n[0], n[-1], FINE)
+    thrust, torque = (np.asarray(PchipInterpolator(n, v[good] / n**2)(fine)) * fine**2 for v in (T, Q))
+    pitch = case.stated_pitch_m
+    return RotorLoads(label, case.diameter_m, pitch, int(case.file.rotor.blades), fine, thrust, torque,
+                      float(case.air().a_sound))  # fmt: skip
+
+
+def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
+    """Bands of a label at one speed, by `bemt.case.propagate`: declared unknowns, model and numerics."""
+    case = case_of_label(label)
+    found = propagate(case, rpm, airspeed_m_s)
+    T, Q = (float(found.nominal[key][0]) for key in ("thrust_N", "torque_Nm"))
+    u = [float(found.points.u[key][0]) for key in ("thrust_N", "torque_Nm")]
+    together = 0.0
+    for one in found.moved:
+        runs = [[float(run[key][0]) for run in one.runs] for key in ("thrust_N", "torque_Nm")]
+        half = [0.5 * (r[-1] - r[0]) for r in runs]
+        together += half[0] * half[1] / 3.0
+    rho = min(max(together / (u[0] * u[1]), -0.99), 0.99)
+    return LoadScatter(
+        math.log(case.diameter_m / INCH), case.stated_pitch_m / case.diameter_m, u[0] / abs(T), u[1] / abs(Q), rho
+    )
+
+
+def size_in(label: str) -> float:
+    """Diameter that a label states [in].
+
+    >>> size_in("9x4.5x3")
+    9.0
+    """
+    return float(fresh.read_label(label).diameter_in)

@@ -1,0 +1,143 @@
+"""Promises of ``choose``: agrees with ``drive``, ranks by what it states, refuses what cannot be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import InputError
+from bemt.commands.cli import main
+from bemt.design import choose
+from bemt.design.answer import best_of_each, front
+from bemt.design.motors_file import KnownMotor, read_motors
+from bemt.drive import drive_result
+
+FEW = ("9x6", "10x4.5", "11x5.5", "10x7")
+
+
+@pytest.fixture(scope="module")
+def few():
+    return choose(6.0, 3, labels=FEW, kv=(600.0, 1600.0))
+
+
+@pytest.mark.parametrize("label, kv, cells", [("10x4.5", 900.0, 3), ("15x5", 400.0, 6), ("6x4x3", 2300.0, 4)])
+def test_hover_and_full_throttle_are_those_of_drive(label: str, kv: float, cells: int) -> None:
+    case = drive_result.case_for(label, kv=kv, cells=cells)
+    full = drive_result.full_throttle(case, bands=False)["thrust_N"].value
+    mass = 0.4 * full / 9.80665
+    found = choose(0.9 * full, cells, labels=[label], kv=(kv, kv), mass_kg=mass).iloc[0]
+    hover = drive_result.solve(drive_result.with_drive(case, mass_kg=mass)).hover
+    assert found.full_thrust_N == pytest.approx(full, rel=0.01)
+    assert found.rpm == pytest.approx(hover["rpm"].value, rel=0.003)
+    assert found.power_W == pytest.approx(hover["power_W"].value, rel=0.01)
+    assert found.current_A == pytest.approx(hover["battery_A"].value, rel=0.01)
+    assert found.u_power_W == pytest.approx(hover["power_W"].u, rel=0.3)
+
+
+def test_power_in_flight_is_above_momentum_theory() -> None:
+    T, V = 10.0, 25.0
+    found = choose(T, 6, labels=["8x3.5x3", "9x4x3", "9x6", "10x7"], kv=(500.0, 1500.0), airspeed_m_s=V)
+    power = found.dropna(subset=["power_W"])
+    area = np.array([math.pi / 4 * (0.0254 * float(label.split("x")[0])) ** 2 for label in power.label])
+    induced = np.sqrt(0.25 * V**2 + T / (2.0 * 1.225 * area)) - 0.5 * V
+    assert len(power) and (power.power_W > T * (V + induced)).all()
+
+
+def test_the_best_has_the_least_power_of_the_sure(few) -> None:
+    sure = few[few.probability >= 0.9]
+    assert len(sure) and few.power_W.iloc[0] == sure.power_W.min()
+    assert np.all(np.diff(sure.power_W) >= 0.0) and (few.why.iloc[1:] != "").all()
+    assert set(few.index[: len(sure)]) == set(sure.index)
+
+
+def test_a_higher_target_is_never_more_probable(few) -> None:
+    more = choose(8.0, 3, labels=FEW, kv=(600.0, 1600.0))
+    both = few.merge(more, on=["label", "motor"])
+    assert (both.probability_y <= both.probability_x + 1e-12).all()
+    assert (both.full_thrust_N_x - both.full_thrust_N_y).abs().max() < 1e-6 * both.full_thrust_N_x.max()
+
+
+def test_the_front_falls_with_size(few) -> None:
+    edge = front(few)
+    assert np.all(np.diff(edge.diameter_in) > 0) and np.all(np.diff(edge.power_W) < 0)
+    assert len(best_of_each(few)) == few.label.nunique()
+
+
+def test_time_is_part_of_the_target() -> None:
+    ask = {"labels": ["11x5.5"], "kv": (900.0, 900.0), "mass_kg": 1.2, "rotors": 4, "capacity_Ah": 5.0}
+    free = choose(None, 3, **ask).iloc[0]
+    assert choose(None, 3, minutes=0.5 * free.minutes, **ask).probability.iloc[0] > 0.9 * free.probability
+    assert choose(None, 3, minutes=3.0 * free.minutes, **ask).probability.iloc[0] == 0.0
+
+
+def test_a_known_motor_narrows_the_power() -> None:
+    label, kv = ["10x4.5"], 900.0
+    typical = choose(5.0, 3, labels=label, kv=(kv, kv)).iloc[0]
+    known = choose(5.0, 3, labels=label, motors=[KnownMotor("M", kv, 0.1, 0.9)]).iloc[0]
+    assert known.u_power_W < typical.u_power_W and known.motor == "M"
+    worse = choose(5.0, 3, labels=label, motors=[KnownMotor("M", kv, 0.3, 0.9)]).iloc[0]
+    assert worse.power_W > known.power_W and worse.full_thrust_N < known.full_thrust_N
+
+
+def test_an_unreachable_target_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["choose", "--thrust", "60", "--cells", "3", "--kv", "900", "--labels", "10x4.5", "9x6"]
+    assert main(words) == 1
+    assert "none meets it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "request_, where",
+    [
+        ({"thrust_N": 0.0, "cells": 3}, "thrust"), ({"thrust_N": -3.0, "cells": 3}, "thrust"),
+        ({"thrust_N": math.nan, "cells": 3}, "thrust"), ({"cells": 3}, "thrust"), ({"thrust_N": 5.0}, "cells"),
+        ({"thrust_N": 5.0, "cells": 0}, "cells"), ({"thrust_N": 5.0, "cells": 3, "max_tip_mach": 1.2}, "max-tip-mach"),
+        ({"thrust_N": 5.0, "cells": 3, "blades": (200,)}, "blades"),
+        ({"thrust_N": 5.0, "cells": 3, "kv": (1, 2)}, "kv"),
+        ({"thrust_N": 5.0, "cells": 3, "max_diameter_in": 254.0}, "max-diameter-in"),
+        ({"thrust_N": 5.0, "cells": 3, "minutes": 9.0}, "capacity"),
+        ({"thrust_N": 5.0, "cells": 3, "capacity_Ah": 5000.0, "mass_kg": 1.0}, "thrust|capacity"),
+        ({"thrust_N": 1.0, "cells": 3, "mass_kg": 10.0}, "thrust"),
+        ({"thrust_N": 4000.0, "cells": 6, "max_diameter_in": 10.0}, "thrust"),
+        ({"thrust_N": 5.0, "cells": 3, "airspeed_m_s": 200.0}, "airspeed"),
+        ({"thrust_N": 5.0, "cells": 3, "sure": 1.5}, "sure"),
+        ({"thrust_N": 5.0, "cells": 3, "labels": ["10y5"]}, ""),
+    ],
+)  # fmt: skip
+def test_odd_requests_are_refused(request_, where: str) -> None:
+    with pytest.raises(InputError) as error:
+        choose(**request_)
+    if where:
+        assert {f.where for f in error.value.faults} <= set(where.split("|"))
+
+
+def test_a_file_of_motors_is_read_or_refused_with_all_its_faults(tmp_path) -> None:
+    file = tmp_path / "motors.csv"
+    file.write_text("name,kv,resistance_mohm,no_load_A\nA,900,90,0.8\nB,400,,\n")
+    a, b = read_motors(file)
+    assert (a.kv, a.resistance_ohm, a.no_load_A) == (900.0, pytest.approx(0.09), 0.8)
+    assert math.isnan(b.resistance_ohm) and math.isnan(b.no_load_A)
+    file.write_text("name,kv,resistance_mohm,no_load_A\nA,9,0.01,nan\nB,x,5,-1\n")
+    with pytest.raises(InputError) as error:
+        read_motors(file)
+    assert len(error.value.faults) == 5
+
+
+def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "choose",
+        "--thrust",
+        "6",
+        "--cells",
+        "3",
+        "--kv",
+        "800:1000",
+        "--labels",
+        *FEW,
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    assert main(words) == 0
+    assert {f.name for f in (tmp_path / "o").iterdir()} == {"choose.json", "choose.csv", "choose.png"}
+    assert "P(met)" in capsys.readouterr().out
