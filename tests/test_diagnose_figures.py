@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from bemt.base import canvas
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
-from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
+from bemt.diagnose import chain, confusion, figures, figures_effects, fit, record
 from bemt.diagnose.explanation import NONE, Explanation
 
 ALL = set(figures.NAMES)

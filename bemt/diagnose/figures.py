@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
-from bemt.diagnose.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
+from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
+from bemt.diagnose.figures_recording import FIRST, first_picture
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from bemt.case import Case
+    from bemt.compare.first_picture import PredictionView
     from bemt.diagnose.answer import Answer
 
 __all__ = ["NAMES", "draw", "residual"]
@@ -27,7 +30,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "ranking")
-"""Stems of the files."""
+"""Stems of the files, after the first picture."""
 
 LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
@@ -49,8 +52,8 @@ _CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
 _MOST_LINES, _LONG, _ONE_J = 4, 3, 0.02
 
 
-def draw(answer: Answer, out: Path) -> list[Path]:
-    """Draw all figures that have something to show."""
+def draw(answer: Answer, out: Path, cases: Sequence[Case] = ()) -> list[Path]:
+    """Draw all figures that have something to show; with its cases, the recording inside their band comes first."""
     import matplotlib
 
     makers: dict[str, Callable[[Answer], Figure | None]] = {
@@ -58,6 +61,12 @@ def draw(answer: Answer, out: Path) -> list[Path]:
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
     written = []
+    for old in out.glob(f"{FIRST}*.png"):
+        old.unlink()
+    for view in _views(answer, cases):
+        stem = FIRST if len({c.path.resolve() for c in cases}) == 1 else f"{FIRST}_{view.case}"
+        written.append(out / f"{stem}.png")
+        write_atomic(written[-1], slim(view.png()))
     with matplotlib.rc_context(STYLE):
         for name in NAMES:
             figure = makers[name](answer)
@@ -69,14 +78,20 @@ def draw(answer: Answer, out: Path) -> list[Path]:
     return written
 
 
+def _views(answer: Answer, cases: Sequence[Case]) -> list[PredictionView]:
+    """Recordings that are judged, beside their cases."""
+    records = [part.record for part in answer.problem.parts if not part.record.reference]
+    return first_picture(records, cases) if len(cases) in (1, len(records)) else []
+
+
 def _page(figure: Figure) -> bytes:
     """PNG of a figure; the same figure gives the same bytes."""
     png = io.BytesIO()
     figure.savefig(png, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
-    return _slim(png.getvalue())
+    return slim(png.getvalue())
 
 
-def _slim(png: bytes) -> bytes:
+def slim(png: bytes) -> bytes:
     """PNG with fewer colours until it is small enough."""
     from PIL import Image
 

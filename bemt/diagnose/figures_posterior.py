@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.diagnose import fit
-from bemt.diagnose.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.base.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.signatures import effect_of
 
