@@ -46,6 +46,9 @@ def run(args: argparse.Namespace) -> int:
     """Write the report; the exit code is that of the sweep behind it."""
     from bemt.report import HTML_NAME, write
 
+    paths = [] if args.recording and args.paths == ["."] else args.paths
+    paths, args.recording = _options.sorted_out(paths, args.recording) if args.recording else (paths, [])
+    args.paths = paths or ["."]
     with _terminal.progress(args.quiet) as say:
         book, files = write(args.paths, args.out, say, _about(args), args.recording)
     for page in book["cases"]:

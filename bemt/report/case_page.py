@@ -291,7 +291,7 @@ def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, A
     told = page.get("diagnosis")
     items = reproduction_table(_of_case(reproduction, str(result["name"])))
     return sections(
-        ("Your recording inside the prediction", [("figures", first_pictures(told))] if told else []),
+        ("Your recording and the prediction", [("figures", first_pictures(told))] if told else []),
         _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
         ("Audit of the CFD", audits), _verification(page),
         ("Diagnosis: what the model leaves out", diagnosis_parts(told, first=False) if told else []),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -60,12 +61,13 @@ def page_verdict(page: Mapping[str, Any]) -> tuple[str, str, str]:
     if own[1] != NOTHING_RECORDED or not item:
         return own
     kind, word, why = diagnosis_verdict(item)
-    return kind, word, f"{own[2].partition('. ')[0]}. {why}"
+    return kind, word, f"{own[2].partition('. ')[0]}. {re.split(r'(?<=[.]) (?=[A-Z])', why)[0]}"
 
 
 def first_pictures(item: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Pictures of the recordings inside the prediction band."""
-    return [picture(name, data) for name, data in item.get("figures", []) if name.startswith(FIRST)]
+    own = [(name, data) for name, data in item.get("figures", []) if name.startswith(FIRST)]
+    return [picture(name, data) | {"alt": "Recording and prediction", "narrow": True} for name, data in own]
 
 
 def diagnosis_parts(item: Mapping[str, Any], first: bool = True) -> list[Part]:
