@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
-from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
 from bemt.diagnose.figures_recording import FIRST, first_picture
 from bemt.diagnose.record import CHANNELS
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose import fit
 from bemt.base.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.diagnose import fit
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.signatures import effect_of
 
