@@ -35,7 +35,7 @@ _GRID = 41  # points of the drawn band
 _MOVES = 0.02  # change of J over a recording from which it is drawn over J
 _ONE_SPEED = 0.03  # share by which speeds differ that are drawn as one
 _AROUND = 0.1  # share of its speed by which the band reaches beyond a single point
-_WIDE = 74  # characters in a line above the picture
+_WIDE = 60  # characters in a line above the picture
 _MARKS = (("o", canvas.BLACK), ("s", canvas.RED), ("^", canvas.GREEN), ("D", canvas.PURPLE))
 
 
@@ -107,11 +107,12 @@ class PredictionView:
         import matplotlib
 
         with matplotlib.rc_context(canvas.STYLE):
-            figure, axes = canvas.blank(0.7 + 2.5 * len(self.channels), len(self.channels), 1, sharex=True)
-            figure.set_figwidth(5.6)
+            figure, axes = canvas.blank(0.8 + 2.1 * len(self.channels), len(self.channels), 1, sharex=True)
+            figure.set_figwidth(4.4)
             for axis, channel in zip(axes[:, 0], self.channels, strict=True):
                 self._panel(axis, channel)
             axes[-1, 0].set_xlabel(_LABEL[self.over])
+            axes[-1, 0].locator_params(axis="x", nbins=6)
             handles, labels = axes[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
             words = (self.sentence.replace(" %", "\N{NO-BREAK SPACE}%"), *self.notes[:2])
