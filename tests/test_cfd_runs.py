@@ -444,6 +444,7 @@ def test_one_point_stands_beside_bemt_on_one_screen(
         assert load["u_cfd"] > 0 and load["u_bemt"] > 0 and set(load["u_bemt_by"]) == {"input", "model", "numerics"}
         assert load["u_both"] == pytest.approx(math.hypot(load["u_cfd"], load["u_bemt"]))
     assert {"grid study", "domain against disk"} <= {line["topic"] for line in found["audit"]}
+    assert Path("out/recording.png").read_bytes().startswith(b"\x89PNG")
     from bemt.compare import one_run
 
     screen = one_run.text(found)
@@ -474,7 +475,7 @@ def test_the_fan_of_the_thesis_goes_the_whole_road(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [n for n in RUNS if n != "Fluent, transient"])
-def test_every_program_goes_from_import_to_diagnose(
+def test_every_program_goes_from_import_to_report(
     name: str, put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make, options = RUNS[name]
@@ -482,6 +483,8 @@ def test_every_program_goes_from_import_to_diagnose(
     assert main(["import", *make(put), *options, "--out", "run.toml"]) == 0
     assert main(["compare", "run.toml", "--case", case]) == 0
     assert main(["diagnose", "run.toml", "--case", case]) == 0
+    assert main(["report", case, "--recording", "run.toml", "--out", "page", "--quiet"]) < 2
+    assert 'alt="Recording and prediction"' in Path("page/report.html").read_text()
 
 
 def test_the_shared_exports_become_runs(shared_data: Path) -> None:

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from bemt.base import canvas
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.dataset import Dataset
-from bemt.diagnose import canvas, chain, confusion, figures, figures_effects, fit, record
+from bemt.diagnose import chain, confusion, figures, figures_effects, fit, record
 from bemt.diagnose.explanation import NONE, Explanation
 
 ALL = set(figures.NAMES)
@@ -85,14 +86,23 @@ def test_what_there_is_to_show_is_written(
                 assert image.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
 
 
-def test_the_colours_of_the_residual_are_what_its_heading_says(named: chain.Diagnosis) -> None:
-    figure, where = figures.residual(named), named.marked
+def dots(axis: object) -> np.ndarray:
+    """Readings drawn in a panel, (N, 2)."""
+    drawn = [line.get_xydata() for line in axis.lines if line.get_marker() == "."]  # type: ignore[attr-defined]
+    return np.concatenate(drawn) if drawn else np.zeros((0, 2))
+
+
+def test_the_lines_of_the_residual_are_what_its_heading_says(named: chain.Diagnosis) -> None:
+    figure, where, problem = figures.residual(named), named.marked, named.problem
     assert where is not None
     axis = next(a for a in figure.axes if "marked region" in a.get_title().replace("\n", " "))
-    drawn = axis.collections[0]
-    at = np.asarray(drawn.get_offsets())[:, 0 if where.variable == "J" else 1]
-    inside = np.asarray(drawn.get_array())[(at >= where.low) & (at <= where.high)]
-    assert inside.mean() == pytest.approx(100.0 * where.size)
+    c = record.CHANNELS.index(where.channel)
+    here = (problem.channel == c) & problem.free
+    at = problem.covariates[where.variable][problem.point][here]
+    inside = (at >= where.low) & (at <= where.high)
+    expected = 100.0 * (where.mismatch / problem.largest)[here]
+    assert np.sort(dots(axis)[:, 1]) == pytest.approx(np.sort(expected))
+    assert expected[inside].mean() == pytest.approx(100.0 * where.size)
 
 
 def test_the_residual_shows_the_run_and_not_its_reference(
@@ -100,8 +110,16 @@ def test_the_residual_shows_the_run_and_not_its_reference(
 ) -> None:
     free = np.arange(named.problem.y.size) % 2 == 0
     monkeypatch.setattr(type(named.problem), "free", property(lambda self: free))
-    drawn = sum(len(np.asarray(a.collections[0].get_offsets())) for a in figures.residual(named).axes[:2])
+    drawn = sum(len(dots(a)) for a in figures.residual(named).axes[:2])
     assert drawn == free.sum() < free.size
+
+
+@pytest.mark.parametrize(("verdict", "word"), [("unknown", "not confirmed"), ("named", "improved")])
+def test_nothing_is_called_improved_where_nothing_is_named(named: chain.Diagnosis, verdict: str, word: str) -> None:
+    answer = seen_as(named, verdict, (LEFT_OUT,))
+    labels = [str(line.get_label()) for line in figures._before_after(answer).axes[0].lines]
+    assert any(word in label for label in labels)
+    assert verdict == "named" or not any("improved" in label for label in labels)
 
 
 def test_the_same_answer_gives_the_same_files_and_leaves_no_figure_open(named: chain.Diagnosis, tmp_path: Path) -> None:

@@ -261,3 +261,21 @@ def test_a_calibrated_case_keeps_its_things_under_a_name_of_its_own(
     u = [case["rows"][0]["u"] for case in json.loads(capsys.readouterr().out)["cases"]]
     assert u[1] < u[0]
     assert main(["drive", "measured"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "diameter_m"),
+    [(["--diameter-in", "2.75"], 0.06985), (["--diameter-mm", "90"], 0.09)],
+)
+def test_a_fan_has_a_name_and_a_diameter_in_millimetres_or_inches(
+    tmp_path: Path, words: list[str], diameter_m: float
+) -> None:
+    assert main(["new", "EDF70", "--fan", *words, "--out", str(tmp_path / "fan")]) == 0
+    case = load_case(tmp_path / "fan")
+    assert (case.name, case.ducted) == ("EDF70", True)
+    assert case.diameter_m == pytest.approx(diameter_m)
+    assert main(["new", "70mm", "--fan", *words, "--out", str(tmp_path / "two")]) == 2
+    assert main(["new", "10x5", *words, "--out", str(tmp_path / "two")]) == 2
+    both = ["--diameter-mm", "90", "--diameter-in", "3"]
+    assert main(["new", "EDF70", "--fan", *both, "--out", str(tmp_path / "two")]) == 2
+    assert not (tmp_path / "two").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -41,12 +42,51 @@ def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:
         out.add(f"{line}:{column}", f"byte 0x{raw[error.start]:02x}", "UTF-8 text", "Save the file as UTF-8")
         return None
     try:
-        return tomllib.loads(text)
+        fault = _too_long(text) or _too_large(found := tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         fault = _syntax_fault(str(error), text)
-        for found in _units_in(text, int(fault[0].partition(":")[0] or 0)) or [fault]:
-            out.add(*found)
+        for told in _units_in(text, int(fault[0].partition(":")[0] or 0)) or [fault]:
+            out.add(*told)
         return None
+    except RecursionError:
+        fault = "", "tables or arrays nested too deep to read", f"at most {_DEEPEST} levels", ""
+    except ValueError:  # Python reads no integer of thousands of digits
+        fault = "", "an integer of thousands of digits", "numbers up to 1e308", ""
+    if fault:
+        out.add(*fault)
+        return None
+    return found
+
+
+_DEEPEST = 40
+"""Levels of tables and arrays that a file may have, and parts that a dotted key may have."""
+_LONG_KEY = re.compile(rf"^[ \t]*\[*[ \t]*[\w\"'-]+(?:[ \t]*\.[ \t]*[\w\"'-]+){{{_DEEPEST}}}", re.M)
+
+
+def _too_long(text: str) -> tuple[str, str, str, str] | None:
+    """Refuse a key of so many parts that reading it takes for ever."""
+    found = _LONG_KEY.search(text)
+    if found is None:
+        return None
+    line = text.count("\n", 0, found.start()) + 1
+    return f"{line}:1", f"a key of more than {_DEEPEST} parts", f"at most {_DEEPEST} parts", ""
+
+
+def _too_large(document: dict[str, Any]) -> tuple[str, str, str, str] | None:
+    """Refuse what no model holds: values nested too deep, integers that no float is as large as."""
+    todo: list[tuple[str, Any, int]] = [("", document, 0)]
+    while todo:
+        where, value, level = todo.pop()
+        if level > _DEEPEST:
+            key = where.split(".")[0].partition("[")[0]
+            return key, "tables or arrays nested too deep", f"at most {_DEEPEST} levels", ""
+        if isinstance(value, dict):
+            todo += [(f"{where}.{k}" if where else str(k), v, level + 1) for k, v in value.items()]
+        elif isinstance(value, list):
+            todo += [(f"{where}[{i}]", v, level + 1) for i, v in enumerate(value)]
+        elif isinstance(value, int) and abs(value) > sys.float_info.max:
+            return where, f"an integer of {value.bit_length() * 3 // 10} digits", "numbers up to 1e308", ""
+    return None
 
 
 _SAID = {

@@ -43,6 +43,7 @@ class Wanted:
         return None if self.series is None else find_family(self.series)
 
 
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(mm|in)?")
 _CAMPAIGN = """\
 # OpenFOAM runs of this case: bemt cfd {name}/cfd
 schema = "bemt.cfd/1"
@@ -88,7 +89,7 @@ def _faults(w: Wanted) -> list[Fault]:
     faults = []
     if w.stations is not None and w.scan is not None:
         faults.append(Fault("", "--scan, --stations", "both", "one of them"))
-    if w.label is None and w.stations is None and w.scan is None:
+    if w.label is None and w.stations is None and w.scan is None and not (w.fan and w.diameter_mm):
         faults.append(Fault("", "LABEL, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
     if w.fan and (w.stations is not None or w.scan is not None):
         faults.append(Fault("", "--fan", "together with a blade file", "--fan with the diameter as LABEL"))
@@ -100,9 +101,12 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(
             Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
         )
-    if w.diameter_mm is not None and (w.stations is None or not 5.0 <= w.diameter_mm <= 10000.0):
-        expected = "5 to 10000 mm" if w.stations else "nothing without --stations"
+    sized = w.stations is not None or w.fan
+    if w.diameter_mm is not None and (not sized or not 5.0 <= w.diameter_mm <= 10000.0):
+        expected = "5 to 10000 mm" if sized else "nothing without --stations or --fan"
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
+    if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
+        faults.append(Fault("LABEL", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
     if w.kv is not None and w.scan is not None:
         faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
@@ -133,12 +137,17 @@ def _files(w: Wanted) -> dict[str, bytes]:
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
         return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor)
-    size = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(mm|in)?", label.strip())
+    if w.diameter_mm is not None:
+        text = fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
+        name = fresh.case_name(label) if label else ""
+        return re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.M) if name else text
+    size = _SIZE.fullmatch(label.strip())
     if size is None:
         if "x" in label.lower():
             told = fresh.read_label(label, w.blades)
             blades = told.blades if (told.blades or 2) > 2 else w.blades
             return fresh.fan_text(told.diameter_in * INCH, told.pitch_in, blades, w.rpm, w.motor)
-        raise InputError(Fault("LABEL", "", repr(label), "a diameter, as in 70mm", "Or diameter x pitch in inches"))
+        raise InputError(Fault("LABEL", "", repr(label), "a diameter, as in 70mm",
+                               "A name goes with --diameter-mm or --diameter-in"))  # fmt: skip
     value = float(size[1])
     return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, w.blades, w.rpm, w.motor)

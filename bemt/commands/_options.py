@@ -27,6 +27,27 @@ def seed(text: str) -> int:
     raise argparse.ArgumentTypeError(f"got {text}; expected a whole number of 0 or more")
 
 
+def is_case(path: str) -> bool:
+    """Whether a path is a case: case.toml, or a folder with it or with folders of it."""
+    from pathlib import Path
+
+    file = Path(path)
+    if file.is_dir():
+        return (file / "case.toml").is_file() or any(file.glob("*/case.toml"))
+    return file.name == "case.toml" or (file.suffix == ".toml" and file.is_file() and b"[rotor]" in file.read_bytes())
+
+
+def sorted_out(cases: list[str], recordings: list[str]) -> tuple[list[str], list[str]]:
+    """Cases and recordings of words that stand in any order: an existing file among the cases that is none is a
+    recording, and a case among the recordings is a case.
+    """
+    from pathlib import Path
+
+    stray = [w for w in cases if Path(w).exists() and not is_case(w)]
+    moved = [w for w in recordings if is_case(w)]
+    return [*(w for w in cases if w not in stray), *moved], [*(w for w in recordings if w not in moved), *stray]
+
+
 def positive(text: str) -> int:
     """Whole number of 1 or more."""
     with suppress(ValueError):

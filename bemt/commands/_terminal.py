@@ -80,10 +80,9 @@ class _Painted:
 
     def write(self, text: str) -> int:
         """Write, folded and coloured."""
-        shown = folded(text, shutil.get_terminal_size().columns)
-        if self._colours:
-            told = self._any.sub(lambda f: f"\x1b[{self._colours[(f.lastindex or 1) - 1]}m{f[0]}\x1b[0m", shown)
-        self._stream.write(told if self._colours else shown)
+        if self._colours:  # first, for a fold could split what a pattern matches
+            text = self._any.sub(lambda f: f"\x1b[{self._colours[(f.lastindex or 1) - 1]}m{f[0]}\x1b[0m", text)
+        self._stream.write(folded(text, shutil.get_terminal_size().columns))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:

@@ -58,6 +58,8 @@ def run(args: argparse.Namespace) -> int:
         )  # fmt: skip
     if args.out:
         _write(Path(args.out), answer, figures=not args.no_figures)
+    if args.case and not (args.rows_a or args.rows_b or args.air_a or args.air_b):
+        _draw_first(args, [args.a, args.b])
     if args.json:
         print(json_text(answer.document), end="")
     elif not args.quiet:
@@ -75,11 +77,26 @@ def _one_run(args: argparse.Namespace) -> int:
         raise InputError(Fault("--case", "", "no case and one recording", "the case to put it beside", hint))
     with _terminal.progress(args.quiet or args.json) as say:
         document = one_run.compare_run(args.a, args.case, say)
+    _draw_first(args, [args.a])
     return _show(args, document, one_run.text(document, details=args.details), one_run.text(document, details=True))
 
 
+def _draw_first(args: argparse.Namespace, files: list[str]) -> None:
+    """With ``--out``, draw the recordings inside the prediction band of the case."""
+    if not args.out or args.no_figures:
+        return
+    from bemt.base.tables import write_atomic
+    from bemt.diagnose.figures_recording import FIRST, first_picture
+    from bemt.diagnose.load import load_all
+
+    cases, records = load_all(files, [args.case])
+    out = Path(args.out)
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomic(out / f"{FIRST}.png", first_picture(records, cases)[0].png())
+
+
 def _show(args: argparse.Namespace, document: dict[str, Any], screen: str, whole: str) -> int:
-    """Write and print an answer that has no picture."""
+    """Write and print an answer without a picture of its own."""
     from bemt.base.tables import json_text, write_atomic
 
     if args.out:

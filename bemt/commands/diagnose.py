@@ -24,7 +24,7 @@ EXAMPLE = "diagnose log.csv --case cases/prop_8x5"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument("recordings", nargs="+", metavar="RECORDING", help="tables or logs, analysed together")
+    parser.add_argument("recordings", nargs="*", metavar="RECORDING", help="tables or logs, analysed together")
     case = "case of all recordings, or one per recording"
     parser.add_argument("--case", required=True, metavar="CASE", help=case, **_options.MANY)
     off = "leave this effect out of the baseline; repeatable"
@@ -71,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     from bemt.diagnose.document import document, text
     from bemt.diagnose.load import load_all
 
+    args.case, args.recordings = _options.sorted_out(args.case, args.recordings)
+    _both_there(args)
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
                                  before=lambda found: folder.check(args.out, found), rpm=args.rpm,
                                  airspeed_m_s=args.airspeed)  # fmt: skip
@@ -97,6 +99,16 @@ def run(args: argparse.Namespace) -> int:
     elif not args.quiet:
         print("\n\n".join([text(answer), *(c.text() for c in blade.values())]))
     return EXIT_OK
+
+
+def _both_there(args: argparse.Namespace) -> None:
+    """Refuse a command without a recording or without a case."""
+    from bemt.base.errors import Fault, InputError
+
+    faults = [] if args.recordings else [Fault("RECORDING", "", "none", "one or more tables or logs")]
+    faults += [] if args.case else [Fault("--case", "", "no case", "the case of the rotor, as in cases/prop_8x5")]
+    if faults:
+        raise InputError(faults)
 
 
 def _too_few(args: argparse.Namespace, got: str, say: Callable[[str], None] | None) -> int:

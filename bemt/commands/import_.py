@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bemt.commands import _options
+
+if TYPE_CHECKING:
+    from bemt.compare.first_picture import PredictionView
 
 NAME = "import"
 HELP = "read CFD, bench or vendor data: channels, means, drift, warnings"
@@ -22,6 +27,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     speed.add_argument("--period", type=float, metavar="S", help="duration of a revolution [s]")
     last = "average the last N revolutions (default 4, or half)"
     parser.add_argument("--revolutions", type=_options.positive, metavar="N", help=last)
+    beside = parser.add_argument_group("beside a case")
+    beside.add_argument("--case", metavar="CASE", help="say how the recordings lie in the prediction band of this case")
+    beside.add_argument("--picture", metavar="FILE.png", help="with --case: draw the recordings inside the band")
     run = parser.add_argument_group("one CFD run", "what its files do not say; with --out it is kept in a run.toml")
     run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N, report-def-0='N m'",
                      **_options.REPEATABLE)  # fmt: skip
@@ -49,10 +57,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Read and show every file, and the CFD run that they make; the worst result sets the exit code."""
+    from bemt.base.errors import Fault, InputError
     from bemt.base.tables import json_text
     from bemt.recordings import cfd_options, load
     from bemt.recordings.choice import asked
 
+    if args.picture and not args.case:
+        raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     choice = asked(args.rpm, args.period, args.revolutions)
     load.check_format(args.format)
     names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup", "out")
@@ -67,5 +78,27 @@ def run(args: argparse.Namespace) -> int:
     if args.out and found["runs"]:
         made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
         wrote = cfd_options.write_run(made, args.out).as_posix()
-    print(json_text(found) if args.json else load.text(found, wrote), end="")
+    view = _beside(args, wrote)
+    if view is not None:
+        found["prediction"] = view.document()
+    first = f"{view.sentence}\n\n" if view is not None else ""
+    print(json_text(found) if args.json else first + load.text(found, wrote), end="")
     return load.exit_code(found)
+
+
+def _beside(args: argparse.Namespace, run_toml: str) -> PredictionView | None:
+    """Files inside the prediction band of the case, drawn where that is asked."""
+    if not args.case:
+        return None
+    from bemt.base.tables import write_atomic
+    from bemt.diagnose.figures_recording import first_picture
+    from bemt.diagnose.load import load_all
+
+    speed = [args.rpm] if args.rpm is not None and not run_toml else []
+    wind = [args.airspeed] if args.airspeed is not None and not run_toml else []
+    files = [run_toml] if run_toml else args.files
+    cases, records = load_all(files, [args.case], rpm=speed, airspeed_m_s=wind)
+    (view,) = first_picture(records, cases)
+    if args.picture:
+        write_atomic(Path(args.picture), view.png())
+    return view

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from bemt.base.errors import EXIT_OK
+from bemt.base.errors import EXIT_OK, Fault, InputError
 from bemt.commands import _options
 
 NAME = "new"
@@ -22,10 +22,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scan", metavar="FILE", help=solid)
     parser.add_argument("--unit", choices=("mm", "m", "in"), help="with --scan: unit, if the file does not state it")
     parser.add_argument("--stations", metavar="FILE", help=table)
-    parser.add_argument(
-        "--diameter-mm", type=float, metavar="D", help="with --stations, without a label: diameter [mm]"
-    )
-    parser.add_argument("--fan", action="store_true", help="a ducted fan")
+    parser.add_argument("--diameter-mm", type=float, metavar="D", help="with --stations or --fan: diameter [mm]")
+    parser.add_argument("--diameter-in", type=float, metavar="D", help="the same in inches")
+    fan = "a ducted fan; with --diameter-mm or --diameter-in LABEL is the name of the case"
+    parser.add_argument("--fan", action="store_true", help=fan)
     parser.add_argument(
         "--blades", type=_options.positive, metavar="B", help="number of blades (default: from the label, else 2)"
     )
@@ -49,6 +49,10 @@ def run(args: argparse.Namespace) -> int:
 
     from bemt.case import new_folder
 
+    if args.diameter_in is not None:
+        if args.diameter_mm is not None:
+            raise InputError(Fault("", "--diameter-mm, --diameter-in", "both", "one of them"))
+        args.diameter_mm = args.diameter_in * 25.4
     told = {name: value for name, value in vars(args).items() if name in new_folder.Wanted.__dataclass_fields__}
     folder, files = new_folder.write(new_folder.Wanted(**told, airspeed_m_s=args.airspeed), args.out)
     print(f"{folder.as_posix()}: {', '.join(files)}")

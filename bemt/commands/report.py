@@ -16,6 +16,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     _options.add_cases(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the report and its sweep")
+    own = "recordings of the one case: diagnosed, and shown on its page inside the prediction"
+    parser.add_argument("--recording", default=[], metavar="FILE", help=own, **_options.MANY)
     parser.add_argument(
         "--title", metavar="TEXT", help="title (default: that of the case if there is one, else Validation report)"
     )
@@ -44,8 +46,11 @@ def run(args: argparse.Namespace) -> int:
     """Write the report; the exit code is that of the sweep behind it."""
     from bemt.report import HTML_NAME, write
 
+    paths = [] if args.recording and args.paths == ["."] else args.paths
+    paths, args.recording = _options.sorted_out(paths, args.recording) if args.recording else (paths, [])
+    args.paths = paths or ["."]
     with _terminal.progress(args.quiet) as say:
-        book, files = write(args.paths, args.out, say, _about(args))
+        book, files = write(args.paths, args.out, say, _about(args), args.recording)
     for page in book["cases"]:
         for fault in page["result"]["faults"]:
             _terminal.complain(fault)

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
-from bemt.diagnose.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, RED, STYLE, blank
+from bemt.diagnose.figures_recording import FIRST, first_picture
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from bemt.case import Case
+    from bemt.compare.first_picture import PredictionView
     from bemt.diagnose.answer import Diagnosis
 
 __all__ = ["NAMES", "draw", "residual"]
@@ -27,7 +30,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "ranking")
-"""Stems of the files."""
+"""Stems of the files, after the first picture."""
 
 LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
@@ -47,10 +50,14 @@ _AXIS = {
 _CONDITIONS = ("J", "rpm", "M_tip", "Re", "density_kg_m3")
 # Most panels, fewest points of a curve, and how far advance ratios of one line are apart.
 _MOST_LINES, _LONG, _ONE_J = 4, 3, 0.02
+_SAID = ("named", "class", "sensor")
+"""Verdicts that name something, so that the fit counts as an improvement."""
+_BOLD = 3.0  # width of a line in the located region
+_SHADES = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
 
 
-def draw(answer: Diagnosis, out: Path) -> list[Path]:
-    """Draw all figures that have something to show."""
+def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]:
+    """Draw all figures that have something to show; with its cases, the recording inside their band comes first."""
     import matplotlib
 
     makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
@@ -58,6 +65,12 @@ def draw(answer: Diagnosis, out: Path) -> list[Path]:
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
     written = []
+    for old in out.glob(f"{FIRST}*.png"):
+        old.unlink()
+    for view in _views(answer, cases):
+        stem = FIRST if len({c.path.resolve() for c in cases}) == 1 else f"{FIRST}_{view.case}"
+        written.append(out / f"{stem}.png")
+        write_atomic(written[-1], slim(view.png()))
     with matplotlib.rc_context(STYLE):
         for name in NAMES:
             figure = makers[name](answer)
@@ -69,14 +82,20 @@ def draw(answer: Diagnosis, out: Path) -> list[Path]:
     return written
 
 
+def _views(answer: Diagnosis, cases: Sequence[Case]) -> list[PredictionView]:
+    """Recordings that are judged, beside their cases."""
+    records = [part.record for part in answer.problem.parts if not part.record.reference]
+    return first_picture(records, cases) if len(cases) in (1, len(records)) else []
+
+
 def _page(figure: Figure) -> bytes:
     """PNG of a figure; the same figure gives the same bytes."""
     png = io.BytesIO()
     figure.savefig(png, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
-    return _slim(png.getvalue())
+    return slim(png.getvalue())
 
 
-def _slim(png: bytes) -> bytes:
+def slim(png: bytes) -> bytes:
     """PNG with fewer colours until it is small enough."""
     from PIL import Image
 
@@ -182,30 +201,43 @@ def _heading(answer: Diagnosis, c: int, region: bool) -> str:
 
 
 def _map(answer: Diagnosis, x: str, y: str) -> Figure:
-    from matplotlib.colors import LinearSegmentedColormap
+    """One line over x for each group of y, so that a trend of either is seen at once."""
+    from matplotlib.lines import Line2D
 
     problem, channels = answer.problem, _channels(answer)
-    figure, axes = blank(3.9, 1, len(channels), sharex=True, sharey=True)
-    colours = LinearSegmentedColormap.from_list("signed", [BLUE, "#f4f4f4", RED])
-    values = {c: _shares(answer, c) for c in channels}
-    top = max(float(np.quantile(np.abs(np.concatenate([v for _, v in values.values()])), 0.98)), 0.1)
+    figure, axes = blank(4.3, 1, len(channels), sharex=True, sharey=True)
+    judged = np.unique(problem.point[problem.free])
+    line = np.full(problem.covariates[y].size, -1)
+    line[judged] = _lines(problem.covariates[y][judged])
+    groups = list(np.unique(line[judged]))
+    while len(groups) > len(_SHADES):  # neighbours together
+        line[np.isin(line, groups)] //= 2
+        groups = list(np.unique(line[judged]))
     for axis, c in zip(axes[0], channels, strict=True):
-        here, e = values[c]
+        here, e = _shares(answer, c)
         at = problem.point[here]
-        size = float(np.clip(6000.0 / at.size, 12.0, 110.0))
-        drawn = axis.scatter(
-            problem.covariates[x][at], problem.covariates[y][at], c=e, cmap=colours, vmin=-top, vmax=top, s=size,
-            edgecolors="#555555", linewidths=0.4, zorder=3,
-        )  # fmt: skip
+        axis.axhline(0.0, color=GREY, linewidth=0.8)
         span = next((s for n in (x, y) if (s := _located(answer, c, n)) is not None), None)
-        if span is not None and answer.marked is not None:
-            mark = axis.axvspan if answer.marked.variable == x else axis.axhspan
-            mark(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
-            mark(*span, facecolor="none", edgecolor=BLACK, linewidth=1.0, linestyle="--", zorder=2)
+        if span is not None and answer.marked is not None and answer.marked.variable == x:
+            axis.axvspan(*span, facecolor=ORANGE, alpha=0.25, edgecolor="none", zorder=1)
+        for k, colour in zip(groups, _SHADES, strict=False):
+            own = line[at] == k
+            if not own.any():
+                continue
+            value = problem.covariates[y][at][own]
+            marked = span is not None and answer.marked is not None and answer.marked.variable == y
+            inside = marked and bool(np.all((value >= span[0]) & (value <= span[1]))) if span else False
+            curve = _curve(problem.covariates[x][at][own], e[own])
+            axis.plot(problem.covariates[x][at][own], e[own], ".", color=colour, markersize=4)
+            axis.plot(*curve, color=colour, linewidth=_BOLD if inside else 1.5, label=_label(y, value))
         axis.set(title=_title(_heading(answer, c, span is not None), len(channels)), xlabel=_AXIS.get(x, x))
-        axis.margins(0.09)
-    axes[0, 0].set_ylabel(_AXIS.get(y, y))
-    figure.colorbar(drawn, ax=axes, label=_shown(answer), extend="both", pad=0.02)
+        axis.margins(0.05)
+    axes[0, 0].set_ylabel(_shown(answer))
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    if any(drawn.get_linewidth() == _BOLD for axis in axes[0] for drawn in axis.lines):
+        handles.append(Line2D([], [], color=GREY, linewidth=_BOLD))
+        labels.append("bold: the marked region")
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     return figure
 
 
@@ -298,7 +330,7 @@ def _chosen(parts: list[int], sizes: list[int]) -> list[int]:
 
 
 def _label(name: str, x: Array) -> str:
-    unit, digits = (" rev/min", 0) if name == "rpm" else ("", 2)
+    unit, digits = (" rev/min", 0) if name == "rpm" else ("", 0 if name == "Re" else 2)
     lead = "" if name == "rpm" else f"{name} = "
     if np.ptp(x) <= 0.1 * float(np.max(np.abs(x))):
         return f"{lead}{float(np.mean(x)):.{digits}f}{unit}"
@@ -324,11 +356,12 @@ def _before_after(answer: Diagnosis) -> Figure:
     figure, axes = blank(height, len(channels), len(shown), sharex="col", sharey="row")
     unit, factor = _coefficients(answer), answer.found.states[0].hyper.scale
     what, everywhere = " + ".join(answer.best.ids) or "calibration only", np.ones_like(problem.free)
+    fitted = "improved" if answer.decision.verdict in _SAID else "best fit, not confirmed"
     models = (
         ("baseline", problem.f0, RED, "--", everywhere),
-        (f"improved ({what})", answer.after, BLUE, "-", everywhere),
+        (f"{fitted} ({what})", answer.after, BLUE, "-", everywhere),
         # a reference is never held out
-        (f"improved, {answer.blocks} held out", answer.held, GREEN, ":", problem.free),
+        (f"the same, {answer.blocks} held out", answer.held, GREEN, ":", problem.free),
     )
     for row, c in zip(axes, channels, strict=True):
         for axis, line in zip(row, shown, strict=True):

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.bem import model as bem
 from bemt.bem import solver
 from bemt.diagnose import confusion
-from bemt.diagnose.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.fit import fit
 from bemt.diagnose.record import CHANNELS

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
 from bemt.diagnose import fit
-from bemt.diagnose.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.signatures import effect_of
 
@@ -24,13 +24,12 @@ __all__ = ["posterior"]
 
 Array = NDArray[np.float64]
 
-_MOST_PANELS, _MOST_BARS, _MOST_CURVES = 6, 6, 4
-_CURVES = ((BLUE, "-"), (RED, "--"), (GREEN, "-."), (PURPLE, ":"))
+_MOST_PANELS, _MOST_BARS = 6, 6
 
 
 @dataclass(frozen=True, eq=False)
 class _Panel:
-    """Numbers or words of one effect: no key is a bar per setting, one a curve, two a map."""
+    """Numbers or words of one effect: no key is a bar per setting, one an interval, two a map."""
 
     candidate: Candidate
     p: Array
@@ -79,9 +78,10 @@ def posterior(answer: Diagnosis) -> Figure | None:
         return None
     columns = min(len(panels), 2 if len(panels) in (2, 4) else 3)
     rows = -(-len(panels) // columns)
-    figure, axes = blank(0.4 + 3.1 * rows, rows, columns)
+    height = 1.9 if all(len(panel.keys) == 1 for panel in panels) else 3.1
+    figure, axes = blank(0.4 + height * rows, rows, columns)
     for axis, panel in zip(axes.ravel(), panels, strict=False):
-        (_bars, _curve, _map)[len(panel.keys)](axis, panel)
+        (_bars, _interval, _map)[len(panel.keys)](axis, panel)
     for axis in axes.ravel()[len(panels) :]:
         axis.set_visible(False)
     return figure
@@ -115,29 +115,27 @@ def _bars(axis: Axes, panel: _Panel) -> None:
     axis.legend(loc="lower right")
 
 
-def _curve(axis: Axes, panel: _Panel) -> None:
+def _interval(axis: Axes, panel: _Panel) -> None:
+    """The value and its 90 % interval as the answer states them, above where it was thought to lie before."""
     key = panel.keys[0]
-    x, words = panel.values(key), np.array(panel.words())
-    grid = np.unique(x)
-    width = np.gradient(grid)
-    low, high = panel.range(key)
-    names = sorted(set(words), key=lambda w: -float(panel.p[words == w].sum()))[:_MOST_CURVES]
-    inside = panel.intervals.get(key)
-    if inside:
-        axis.axvspan(inside["low"], inside["high"], color=SKY, alpha=0.3, linewidth=0, label="90 % interval")
-    peak = 0.0
-    for name, (colour, style) in zip(names, _CURVES, strict=False):
-        density = np.array([panel.p[(x == g) & (words == name)].sum() for g in grid]) / width
-        peak = max(peak, float(density.max()))
-        axis.plot(grid, density, style, color=colour, label=name or "posterior", marker="o" if grid.size < 12 else "")
-    before = np.array([panel.candidate.weight[x == g].sum() for g in grid]) / width / len(set(words))
-    flat = float(before.max())
-    axis.plot([low, *grid, high], [0.0, *before, 0.0], ":", color=BLACK, linewidth=1.0, label="prior")
-    axis.set_xlim(low - 0.04 * (high - low), high + 0.04 * (high - low))
-    axis.set_ylim(0.0, 1.35 * max(peak, flat))
-    unit = panel.label(key).rpartition("[")[2].rstrip("]")
-    density_unit = "1" if unit in ("", "1") else f"1/{unit}" if unit.isalpha() else f"1/({unit})"
-    axis.set(xlabel=panel.label(key), ylabel=f"density [{density_unit}]")
+    x = panel.values(key)
+    order = np.argsort(x, kind="stable")
+    weight = panel.candidate.weight[order] / panel.candidate.weight.sum()
+    before = np.interp([0.05, 0.95], np.cumsum(weight) - 0.5 * weight, x[order])
+    axis.plot(before, [0.0, 0.0], color=GREY, alpha=0.5, linewidth=9.0, solid_capstyle="butt", label="before, 90 %")
+    told = panel.intervals.get(key)
+    if told and isinstance(told["value"], int | float):
+        axis.plot([told["low"], told["high"]], [1.0, 1.0], color=BLUE, linewidth=5.0, solid_capstyle="butt",
+                  label="with the readings, 90 %")  # fmt: skip
+        axis.plot(told["value"], 1.0, "o", color=BLACK, markersize=7, zorder=3, label="value")
+        unit = panel.label(key).rpartition("[")[2].rstrip("]")
+        unit = "" if unit in ("", "1") else f" {unit}"
+        words = f"{told['value']:.3g} ({told['low']:.3g} to {told['high']:.3g}){unit}"
+        axis.set_title(words)
+    axis.set(ylim=(-0.7, 2.6), yticks=[], xlabel=panel.label(key))
+    axis.spines["left"].set_visible(False)
+    axis.margins(x=0.08)
+    axis.locator_params(axis="x", nbins=5)
     axis.legend(loc="upper center", ncols=2, columnspacing=1.0, handlelength=1.6)
 
 

@@ -30,7 +30,7 @@ def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Ca
     if figures:
         from bemt.diagnose import figures as pictures
 
-        pictures.draw(answer, out)
+        pictures.draw(answer, out, cases)
 
 
 def _targets(out: Path, cases: Sequence[Case]) -> dict[Path, Case]:

@@ -41,12 +41,19 @@ def _channel(got: Dataset, *names: str) -> Array | None:
     return None
 
 
+_FULL = 1.05  # throttle beyond which it is no fraction
+
+
 def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     pulse = _channel(got, "pulse_width_s")
     if pulse is not None:
         return pulse * 1e6
     throttle = _channel(got, "throttle")
     if throttle is not None:
+        full = float(np.nanmax(throttle, initial=0.0))
+        if full > _FULL:
+            told = f"throttle up to {full:g} without a unit"
+            raise InputError(Fault(name, "throttle", told, "a fraction of 0 to 1", "In percent? Head it throttle (%)"))
         notes.append("throttle read as 1000 us at 0 % and 2000 us at 100 %, which the file does not say")
         return 1000.0 + 1000.0 * throttle
     hint = "Log the ESC signal, or name its column as pulse_width or throttle in a recording.toml"

@@ -79,7 +79,7 @@ def decode(raw: bytes) -> str:
     Parameters
     ----------
     raw : bytes
-        UTF-8, UTF-16 with its mark, or Latin-1; the last character may be cut.
+        UTF-8, UTF-16 with its mark, or Latin-1; the last character of UTF-8 that has others beyond ASCII may be cut.
 
     Returns
     -------
@@ -96,7 +96,8 @@ def decode(raw: bytes) -> str:
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        if error.start > len(raw) - 4 and "unexpected end" in error.reason:
+        cut = error.start > len(raw) - 4 and "unexpected end" in error.reason
+        if cut and not raw[: error.start].isascii():
             return raw[: error.start].decode("utf-8-sig")
         return raw.decode("latin-1")
 

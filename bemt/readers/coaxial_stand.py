@@ -66,6 +66,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
             build.add(k, Heading(text, "_".join(p for p in parts if p), u))
         elif text.strip() == "Time [s]":
             build.add(k, Heading(text, "time_s", units.UNITS["s"]))
+    needed = [f"{k}_{side}_{unit}" for k, unit in (("pulse_width", "s"), ("thrust", "N")) for side in _SIDES]
+    empty = [name for name in (*needed, *(f"{side}_rpm" for side in _SIDES)) if name not in build.channels]
+    build.faults += [Fault(source.name, name, "an empty column", "numbers") for name in empty]
     if build.faults:
         raise InputError(build.faults)
     _tare_row(build)

@@ -25,12 +25,12 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
     from bemt.report.case_page import case_sections, reproduction_table
     from bemt.report.cfd_page import CFD_WORDS, cfd_sections
-    from bemt.report.diagnosis_block import diagnosis_parts
+    from bemt.report.diagnosis_block import diagnosis_parts, page_verdict
     from bemt.report.fidelity import FIDELITY_WORDS, fidelity_sections
     from bemt.report.front import answers, front_parts
     from bemt.report.trend_page import trend_sections
     from bemt.report.values import sections
-    from bemt.report.verdicts import headline, verdict
+    from bemt.report.verdicts import headline
 
     names = [str(page["result"]["name"]) for page in book["cases"]]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
@@ -41,7 +41,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             "id": key,
             "name": name[:40],
             "title": headline(page["result"]),
-            "top": [("verdict", verdict(page["result"]))],
+            "top": [("verdict", page_verdict(page))],
             "sections": case_sections(page, book["reproduction"]),
         }
     given = [item for item in book["reproduction"] if str(item["status"]).startswith("input")]
@@ -91,16 +91,22 @@ def write(
     out: str | Path,
     progress: Callable[[str], None],
     about: Mapping[str, str] | None = None,
+    recordings: Sequence[str] = (),
 ) -> tuple[Mapping[str, Any], tuple[Path, Path]]:
     """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files.
 
     ``about`` holds title, author, date and revision for the head of the page, each as far as wanted.
+    ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
     """
     from bemt.base.tables import write_atomic
     from bemt.report.gather import gather
     from bemt.report.summary import summary
 
     folder = Path(out)
+    if recordings:
+        from bemt.report.recorded import diagnose_into
+
+        diagnose_into(paths, recordings, folder, progress)
     book = {**gather(paths, folder, progress), "about": dict(about or {})}
     files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:

@@ -11,7 +11,7 @@ import numpy as np
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.report.audit_block import audit_parts
-from bemt.report.diagnosis_block import diagnosis_parts
+from bemt.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.report.rotor_view import viewer
 from bemt.report.values import Section, sections, uri
@@ -291,9 +291,10 @@ def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, A
     told = page.get("diagnosis")
     items = reproduction_table(_of_case(reproduction, str(result["name"])))
     return sections(
+        ("Your recording and the prediction", [("figures", first_pictures(told))] if told else []),
         _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
         ("Audit of the CFD", audits), _verification(page),
-        ("Diagnosis: what the model leaves out", diagnosis_parts(told) if told else []),
+        ("Diagnosis: what the model leaves out", diagnosis_parts(told, first=False) if told else []),
         _inputs(page), _limits(page),
         ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),
     )  # fmt: skip

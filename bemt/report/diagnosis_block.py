@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from bemt.base.page import num, table
+from bemt.diagnose.figures_recording import FIRST
 from bemt.report.values import Part, picture
+from bemt.report.verdicts import NOTHING_RECORDED, verdict
 
-__all__ = ["diagnosis_parts"]
+__all__ = ["diagnosis_parts", "diagnosis_verdict", "first_pictures", "page_verdict"]
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip
@@ -42,14 +45,39 @@ def _parameters(value: Any) -> str:
     return "; ".join(words)
 
 
-def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
-    """Give one diagnosis: verdict, place, ranking, errors before and after, what to measure, figures."""
+def diagnosis_verdict(item: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Give kind and words of a badge, and sentences."""
     d = _mapping(item.get("document"))
     said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
     why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
-    head = (KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why)
-    out: list[Part] = [("verdict", head)]
+    return KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why
+
+
+def page_verdict(page: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Say how a case stands; where only its diagnosis knows recordings, that says it."""
+    own = verdict(page["result"])
+    item = page.get("diagnosis")
+    if own[1] != NOTHING_RECORDED or not item:
+        return own
+    kind, word, why = diagnosis_verdict(item)
+    return kind, word, f"{own[2].partition('. ')[0]}. {re.split(r'(?<=[.]) (?=[A-Z])', why)[0]}"
+
+
+def first_pictures(item: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Pictures of the recordings inside the prediction band."""
+    own = [(name, data) for name, data in item.get("figures", []) if name.startswith(FIRST)]
+    return [picture(name, data) | {"alt": "Recording and prediction", "narrow": True} for name, data in own]
+
+
+def diagnosis_parts(item: Mapping[str, Any], first: bool = True) -> list[Part]:
+    """Give one diagnosis: verdict, first picture, place, ranking, errors before and after, what to measure, figures.
+
+    ``first`` is False where the first picture stands elsewhere on the page.
+    """
+    d = _mapping(item.get("document"))
+    said = str(d.get("verdict") or "unknown")
+    out: list[Part] = [("verdict", diagnosis_verdict(item)), ("figures", first_pictures(item) if first else [])]
     place = _mapping(d.get("location"))
     if place.get("channel") and said != "none":
         low, high, size, z = (num(place.get(k), 3).text for k in ("low", "high", "size", "z"))
@@ -78,4 +106,5 @@ def diagnosis_parts(item: Mapping[str, Any]) -> list[Part]:
         out += [("command", str(command)) for command in _list(step.get("commands"))]
     absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
-    return [*out, ("figures", [picture(name, data) for name, data in item.get("figures", [])])]
+    rest = [picture(name, data) for name, data in item.get("figures", []) if not name.startswith(FIRST)]
+    return [*out, ("figures", rest)]

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.page import Cell, num, table
+from bemt.report.diagnosis_block import page_verdict
 from bemt.report.plot import Mark, Plot, figure, points
 from bemt.report.values import Part, uri
 from bemt.report.verdicts import answer, headline, verdict
@@ -40,10 +41,11 @@ def answers(book: Mapping[str, Any], ids: Sequence[str]) -> list[dict[str, Any]]
     """Give one sentence per case."""
     out = []
     for page, key in zip(book["cases"], ids, strict=True):
-        kind, word, _ = verdict(page["result"])
+        kind, word, told = page_verdict(page)
+        words = answer(page["result"]) if verdict(page["result"])[1] == word else told
         still = page["pictures"].get("rotor")
         out.append({"id": key, "title": headline(page["result"]), "kind": kind, "word": word,
-                    "words": answer(page["result"]), "picture": uri(still) if still else ""})  # fmt: skip
+                    "words": words, "picture": uri(still) if still else ""})  # fmt: skip
     return out
 
 
@@ -90,7 +92,7 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
     rows = []
     for page, key in zip(book["cases"], ids, strict=True):
         result = page["result"]
-        kind, word, _ = verdict(result)
+        kind, word, _ = page_verdict(page)
         v = {source: items[0][1:] for source, items in _values(page).items()}
         own: Mapping[str, Any] = next((r for r in result.get("rows", []) if r["source"] == "bemt"), {})
         T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))

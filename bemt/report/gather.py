@@ -23,6 +23,8 @@ from geometry.surface import surfaces
 __all__ = ["attach_diagnoses", "gather"]
 
 Progress = Callable[[str], None]
+SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
+"""What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
 ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
 
@@ -117,7 +119,7 @@ def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
     files = [*sorted(out.glob("*/diagnosis/diagnosis.json")), *sorted(out.glob("diagnosis/*/diagnosis.json"))]
     for path in files:
         document = read_json(path)
-        if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.diagnosis/"):
+        if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith(SCHEMAS):
             continue
         name = path.parent.parent.name if path.parent.name == "diagnosis" else path.parent.name
         figures = []

@@ -15,6 +15,10 @@ NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight",
 """Sources in the order in which they are spoken of."""
 
 
+NOTHING_RECORDED = "nothing recorded"
+"""Words of the badge of a case without recordings."""
+
+
 def _n(value: Any, digits: int = 3) -> str:
     return number_text(float(value), digits) if _finite(value) else "unknown"
 
@@ -95,7 +99,7 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
         )
     lines = _thrusts(result)
     if not lines:
-        return "unknown", "nothing recorded", f"{words}. There is no recorded thrust to compare it with."
+        return "unknown", NOTHING_RECORDED, f"{words}. There is no recorded thrust to compare it with."
     parts = [f"{c['reference']} {c['E_pct']:+.1f} %" if _finite(c.get("E_pct")) else str(c["reference"]) for c in lines]
     told = [f"{words}. Difference from {'; '.join(parts)}."]
     judged = [c for c in lines if _finite(c.get("u_val"))]

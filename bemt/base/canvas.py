@@ -1,4 +1,4 @@
-"""Colours and blank figures of a diagnosis."""
+"""Colours, settings and blank figures of every picture drawn by matplotlib."""
 
 from __future__ import annotations
 
