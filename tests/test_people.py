@@ -6,6 +6,7 @@ import ast
 import re
 import runpy
 import shlex
+import sys
 import shutil
 from pathlib import Path
 
@@ -70,6 +71,7 @@ def test_the_quick_start_runs_as_printed(
             assert main(words[1:]) == 0, command
         else:
             assert words[0] == "python" and words[1].startswith("docs/"), command
+            monkeypatch.setattr(sys, "argv", words[1:])
             runpy.run_path(str(ROOT / words[1]), run_name="__main__")
         shown += capsys.readouterr().out
     verdict = re.search(r"offset_deg ([\d.]+)", shown)
