@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
@@ -109,8 +110,9 @@ def compare_run(
         raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
     step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
     solved = propagate(
-        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows], progress=step
-    ).points
+        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
+        angle_deg=_angle(full, rows, made, name), progress=step,
+    ).points  # fmt: skip
     out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
     lines = []
     if imported.kind == "cfd" or conditions_of(imported):
@@ -133,6 +135,19 @@ def compare_run(
     }
 
 
+def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64] | None:
+    """Recorded angle between wind and shaft at some points [deg]; None, the case's, where none is recorded."""
+    for channel, factor in (("sideslip_deg", 1.0), ("sideslip_rad", 180.0 / math.pi)):
+        if channel in points and np.isfinite(points[channel][rows]).all():
+            angle = np.abs(points[channel][rows]) * factor
+            if np.any(angle > 180.0):
+                raise InputError(Fault(name, channel, f"{angle.max():g} deg", "0 to 180 deg"))
+            if case.ducted and np.any(angle):
+                raise InputError(Fault(name, channel, f"{angle.max():g} deg of a ducted rotor", "0 deg"))
+            return np.asarray(angle)
+    return None
+
+
 def _case(name: str) -> Case:
     from bemt.case import find_cases, load_case
 
@@ -150,7 +165,7 @@ def _with(d: Dataset, channel: str, value: float) -> Dataset:
 def _pitch(case: Case) -> float:
     from bemt.case.prepare import prepare_case
 
-    return float(prepare_case(case).pitch_m)
+    return float(prepare_case(case, oblique=True).pitch_m)
 
 
 def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> dict[str, Any]:
