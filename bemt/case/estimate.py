@@ -127,7 +127,8 @@ def document(
     found = propagate(case, rpm, V, angle_deg=angle)
     points, simple = found.points, k1k2_case(case, None, rpm, V, case.air(), angle)
     columns = {
-        "rpm": rpm, "airspeed_m_s": V, "angle_deg": angle, "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
+        "rpm": rpm, "airspeed_m_s": V, "angle_deg": angle,
+        "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
         "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
         "u95_power_W": found.half_width95("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,

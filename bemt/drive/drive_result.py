@@ -221,9 +221,9 @@ def _carried(
     speeds: Array = rotor_table.SPEEDS,
 ) -> tuple[Drive, dict[str, Band], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
-    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
     if airspeed_m_s:
         case.axial_only()
+    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
     found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
     rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
 
