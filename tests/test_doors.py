@@ -17,6 +17,7 @@ from bemt.case import Case, load_case
 from bemt.case.estimate import document as estimate
 from bemt.case.prepare import k1k2_case
 from bemt.case.propagate import propagate
+from bemt.compare.one_run import compare_run
 from bemt.dataset import Dataset
 from bemt.diagnose import assemble, record
 from bemt.drive import drive_result
@@ -243,6 +244,16 @@ def test_an_unknown_angle_widens_the_band_where_the_point_shares_it(oblique: Cas
     assert (moved.runs[0]["thrust_N"], moved.runs[1]["thrust_N"]) == (low, high) and moved.u["thrust_N"] > 0.0
     elsewhere = propagate(case, 6000.0, 8.0, angle_deg=10.0).moved
     assert {m.unknown.key: m for m in elsewhere}["operating.angle_deg"].u["thrust_N"] == 0.0
+
+
+@pytest.mark.parametrize(("channel", "factor"), [("sideslip_deg", 1.0), ("sideslip_rad", np.pi / 180.0)])
+def test_one_run_is_compared_at_its_recorded_angle(channel: str, factor: float, label: Case, tmp_path: Path) -> None:
+    angles = (0.0, 60.0)
+    rows = "".join(f"6000,10,1.225,{angle * factor:.12g},3,0.06\n" for angle in angles)
+    (tmp_path / "cfd.csv").write_text(f"rpm,airspeed_m_s,density_kg_m3,{channel},thrust_N,torque_Nm\n{rows}")
+    points = compare_run(tmp_path / "cfd.csv", label)["points"]
+    expected = propagate(label, 6000.0, 10.0, 1.225, angle_deg=angles, bands=False).points
+    assert [point["loads"]["thrust_N"]["bemt"] for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
 
 
 @pytest.mark.parametrize("table", ["operating]\nangle_deg = 30", "sweep]\nangle_deg = [0, 30]"])
