@@ -135,17 +135,18 @@ def compare_run(
     }
 
 
-def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64] | None:
-    """Recorded angle between wind and shaft at some points [deg]; None, the case's, where none is recorded."""
+def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64]:
+    """Angle between wind and shaft at some points [deg]: the recorded one, where there is none that of the case."""
     for channel, factor in (("sideslip_deg", 1.0), ("sideslip_rad", 180.0 / math.pi)):
-        if channel in points and np.isfinite(points[channel][rows]).all():
+        if channel in points:
             angle = np.abs(points[channel][rows]) * factor
-            if np.any(angle > 180.0):
-                raise InputError(Fault(name, channel, f"{angle.max():g} deg", "0 to 180 deg"))
-            if case.ducted and np.any(angle):
-                raise InputError(Fault(name, channel, f"{angle.max():g} deg of a ducted rotor", "0 deg"))
+            angle = np.where(np.isnan(angle), case.angle_deg, angle)
+            limit = 0.0 if case.ducted else 180.0
+            if np.any(angle > limit):
+                expected = "0 deg of a ducted rotor" if case.ducted else "0 to 180 deg"
+                raise InputError(Fault(name, channel, f"{angle.max():g} deg", expected))
             return np.asarray(angle)
-    return None
+    return np.full(rows.size, case.angle_deg)
 
 
 def _case(name: str) -> Case:
