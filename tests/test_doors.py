@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -11,19 +12,29 @@ import numpy as np
 import pytest
 
 import bemt
+from bemt.base.errors import InputError
 from bemt.case import Case, load_case
 from bemt.case.estimate import document as estimate
+from bemt.case.prepare import k1k2_case
 from bemt.case.propagate import propagate
+from bemt.compare.one_run import compare_run
 from bemt.dataset import Dataset
 from bemt.diagnose import assemble, record
 from bemt.drive import drive_result
-from bemt.exports.performance import band_of
+from bemt.drive.drive_result import solve as solve_drive
+from bemt.exports.base import Job
+from bemt.exports.openfoam.write import Run, settings_of
+from bemt.exports.performance import band_of, performance_of
 from bemt.report import curves
 from bemt.sweep.case import solve_case
+from bemt.sweep.grid.run import Grid, GridSolver
 
 LABEL, ROOT = "10x5", Path(__file__).resolve().parents[1]
 RPM, V = (6000.0, 6000.0, 100.0, 15000.0), (0.0, 8.0, 30.0, 5.0)
 """Hover, flight, far beyond zero thrust, and a tip faster than any that was measured."""
+ANGLE = 50.0
+READING = Dataset("bench", "run", {"rpm": [6000.0] * 3, "airspeed_m_s": [8.0] * 3, "density_kg_m3": [1.225] * 3,
+                                   "thrust_N": [3.0, 3.1, 3.0], "time_s": [0.0, 1.0, 2.0]})  # fmt: skip
 CONDITIONS = """
 [[assumptions]]
 key = "air.density_kg_m3"
@@ -112,7 +123,7 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
 
 
 def _estimate(case: Case, rpm: Any, V: Any) -> Answer:
-    rows = [estimate(LABEL, [n], [v])["rows"][0] for n, v in zip(rpm, V, strict=True)]
+    rows = [estimate(LABEL, [n], [v], angles=[case.angle_deg])["rows"][0] for n, v in zip(rpm, V, strict=True)]
     return [(r["thrust_N"], r["u_thrust_N"], np.nan, np.nan, tuple(r["flags"])) for r in rows]
 
 
@@ -125,6 +136,14 @@ DOORS: Mapping[str, Callable[[Case, Any, Any], Answer]] = {
 def label(tmp_path_factory: pytest.TempPathFactory) -> Case:
     """Case that `new` writes for a label."""
     return load_case(bemt.propeller(LABEL).write(tmp_path_factory.mktemp("label") / "case"))
+
+
+@pytest.fixture(scope="module")
+def oblique(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """The same, with wind at an angle."""
+    file = bemt.propeller(LABEL).write(tmp_path_factory.mktemp("oblique") / "case")
+    file.write_text(file.read_text().replace("[operating]", f"[operating]\nangle_deg = {ANGLE:g}"))
+    return load_case(file)
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +176,103 @@ def test_an_unknown_air_or_operating_point_acts_at_every_door(door: str, own: Ca
     rpm, V = (6000.0, 6000.0, 9000.0), (4.0, 0.0, 7.0)
     expected = _of(propagate(own, rpm, V).points)
     _same(DOORS[door](own, rpm, V), expected)
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_every_door_solves_at_the_angle_of_the_case(door: str, oblique: Case, label: Case) -> None:
+    rpm, V = (6000.0, 6000.0, 9000.0), (0.0, 8.0, 15.0)
+    expected = _of(propagate(label, rpm, V, angle_deg=ANGLE).points)
+    _same(DOORS[door](oblique, rpm, V), expected)
+    axial = _of(propagate(label, rpm, V).points)
+    assert expected[0] == axial[0] and all(a[0] > 1.2 * b[0] for a, b in zip(expected[1:], axial[1:], strict=True))
+
+
+def _in_flight(case: Case) -> Case:
+    return case.replaced({"operating.airspeed_m_s": 8.0})
+
+
+AXIAL: Mapping[str, Callable[[Case, Path], Any]] = {
+    "drive": lambda case, _: solve_drive(case, 8.0),
+    "performance table": lambda case, _: performance_of(case, 6000.0),
+    "airspeed of an export": lambda case, _: Job(case).airspeed,
+    "openfoam": lambda case, _: settings_of(case, Run()),
+    "along the blade": lambda case, _: curves.radial_curves(case),
+    "gradient": lambda case, _: bemt.load(case.path).gradient(6000.0),
+    "diagnose": lambda case, _: assemble.build([record.from_series(READING, case)], [case]),
+}
+
+
+@pytest.mark.parametrize("door", AXIAL)
+def test_doors_that_know_axial_flow_only_refuse_an_angle(door: str, oblique: Case, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"operating\.angle_deg: got 50 deg"):
+        AXIAL[door](_in_flight(oblique), tmp_path)
+
+
+def test_a_drive_at_rest_has_no_wind_to_turn(oblique: Case, label: Case) -> None:
+    with_motor, other = (bemt.drive(c.path.as_posix(), kv=1000, cells=4).full for c in (oblique, label))
+    assert with_motor["thrust_N"] == other["thrust_N"]
+
+
+def test_k1k2_has_no_answer_at_an_angle(oblique: Case) -> None:
+    air, V = oblique.air(), np.array([0.0, 8.0])
+    found = k1k2_case(oblique, None, np.full(2, 6000.0), V, air)
+    axial = k1k2_case(oblique, None, np.full(2, 6000.0), V, air, 0.0)
+    assert found.thrust_N[0] == axial.thrust_N[0] and np.isnan(found.thrust_N[1]) and found.flags[1]
+
+
+def test_a_grid_over_the_angle_is_the_library_point_by_point(oblique: Case) -> None:
+    case = oblique.replaced({"operating.angle_deg": 0.0, "sweep.angle_deg": [0.0, 90.0, 180.0],
+                             "sweep.airspeed_m_s": [0.0, 8.0]})  # fmt: skip
+    grid = Grid.of(case)
+    assert grid is not None and grid.names == ("airspeed_m_s", "angle_deg")
+    got = GridSolver(case, grid).block(np.arange(grid.size)).columns
+    V, angle = np.repeat([0.0, 8.0], 3), np.tile([0.0, 90.0, 180.0], 2)
+    expected = bemt.load(oblique.path).solve(case.rpm, V, angle_deg=angle, bands=False)
+    for name in ("thrust_N", "torque_Nm", "J", "H_force_N"):
+        np.testing.assert_allclose(got[name], expected[name], rtol=1e-6, atol=1e-9)  # tables of other speeds
+    alone = GridSolver(case, grid).block(np.array([5])).columns  # descent without oblique company
+    assert alone["J"] == pytest.approx(expected["J"][5]) and alone["H_force_N"] == 0.0
+
+
+def test_an_unknown_angle_widens_the_band_where_the_point_shares_it(oblique: Case, tmp_path: Path) -> None:
+    text = oblique.path.read_text().replace('references = "references.csv"', "")
+    more = '\n[[assumptions]]\nkey = "operating.angle_deg"\nlow = 40\nhigh = 60\nwhy = "pitch of the vehicle"\n'
+    (tmp_path / "case.toml").write_text(text + more)
+    case = load_case(tmp_path / "case.toml")
+    moved = {m.unknown.key: m for m in propagate(case, 6000.0, 8.0).moved}["operating.angle_deg"]
+    low, high = (propagate(oblique, 6000.0, 8.0, angle_deg=a, bands=False).points.thrust_N for a in (40.0, 60.0))
+    assert (moved.runs[0]["thrust_N"], moved.runs[1]["thrust_N"]) == (low, high) and moved.u["thrust_N"] > 0.0
+    elsewhere = propagate(case, 6000.0, 8.0, angle_deg=10.0).moved
+    assert {m.unknown.key: m for m in elsewhere}["operating.angle_deg"].u["thrust_N"] == 0.0
+
+
+@pytest.mark.parametrize(("channel", "factor"), [("sideslip_deg", 1.0), ("sideslip_rad", np.pi / 180.0)])
+def test_one_run_is_compared_at_its_recorded_angle(channel: str, factor: float, label: Case, tmp_path: Path) -> None:
+    angles = (0.0, 60.0)
+    rows = "".join(f"6000,10,1.225,{angle * factor:.12g},3,0.06\n" for angle in angles)
+    (tmp_path / "cfd.csv").write_text(f"rpm,airspeed_m_s,density_kg_m3,{channel},thrust_N,torque_Nm\n{rows}")
+    points = compare_run(tmp_path / "cfd.csv", label)["points"]
+    expected = propagate(label, 6000.0, 10.0, 1.225, angle_deg=angles, bands=False).points
+    assert [point["loads"]["thrust_N"]["bemt"] for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
+
+
+@pytest.mark.parametrize("table", ["operating]\nangle_deg = 30", "sweep]\nangle_deg = [0, 30]"])
+def test_a_ducted_rotor_at_an_angle_is_refused(table: str, tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "cases" / "ds30", tmp_path / "ds30")
+    file, (name, _, line) = tmp_path / "ds30" / "case.toml", table.partition("]\n")
+    text = file.read_text()
+    head = f"[{name}]"
+    file.write_text(text.replace(head, f"{head}\n{line}") if head in text else f"{text}\n{head}\n{line}\n")
+    with pytest.raises(InputError, match=rf"{name}\.angle_deg: got 30 deg on a ducted rotor"):
+        load_case(file)
+
+
+@pytest.mark.parametrize("value", ["-1", "181", '"30"'])
+def test_an_angle_that_is_none_is_refused(value: str, oblique: Case, tmp_path: Path) -> None:
+    text = oblique.path.read_text().replace('references = "references.csv"', "")
+    (tmp_path / "case.toml").write_text(text.replace("angle_deg = 50", f"angle_deg = {value}"))
+    with pytest.raises(InputError, match=r"operating\.angle_deg"):
+        load_case(tmp_path / "case.toml")
 
 
 def test_parts_of_a_band_are_those_unknowns_that_the_point_shares_with_the_case(own: Case) -> None:

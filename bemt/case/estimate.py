@@ -15,7 +15,7 @@ from bemt.case import Case, case_of, fresh
 from bemt.case.load import with_changes
 from bemt.case.prepare import k1k2_case
 from bemt.case.propagate import propagate
-from bemt.case.schema import AIRSPEED, RPM
+from bemt.case.schema import AIRSPEED, ANGLE, RPM
 from bemt.readers._uiuc_names import find_family
 from geometry.designation import Designation
 
@@ -85,8 +85,11 @@ def document(
     measured_pitch_in: float | None = None,
     series: str | None = None,
     density: float | None = None,
+    angles: Sequence[float] = (),
 ) -> dict[str, Any]:
-    """Estimate every speed [rev/min] with every airspeed [m/s]: ``bemt.estimate/2``; unknown numbers are null.
+    """Estimate every speed [rev/min] with every airspeed [m/s] at every angle between wind and shaft [deg].
+
+    ``bemt.estimate/2``; unknown numbers are null.
 
     An unreadable label, impossible numbers and an unknown series are refused, all at once.
     """
@@ -103,6 +106,7 @@ def document(
         faults.append(Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
     rows: tuple[tuple[str, Sequence[float], float, float, str], ...] = (
         ("--rpm", speeds, RPM.low, RPM.high, "rev/min"), ("--airspeed", airspeeds, AIRSPEED.low, AIRSPEED.high, "m/s"),
+        ("--angle", angles, ANGLE.low, ANGLE.high, "deg"),
     )  # fmt: skip
     faults += [
         Fault(option, "", f"{value:g}", f"{low:g} to {high:g} {unit}")
@@ -118,14 +122,17 @@ def document(
     if faults or told is None:
         raise InputError(faults)
     case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density)
-    rpm, V = (v.ravel() for v in np.meshgrid(speeds, list(airspeeds) or [0.0], indexing="ij"))
-    found = propagate(case, rpm, V)
-    points, simple = found.points, k1k2_case(case, None, rpm, V, case.air())
+    axes = (speeds, list(airspeeds) or [0.0], list(angles) or [0.0])
+    rpm, V, angle = (v.ravel() for v in np.meshgrid(*axes, indexing="ij"))
+    found = propagate(case, rpm, V, angle_deg=angle)
+    points, simple = found.points, k1k2_case(case, None, rpm, V, case.air(), angle)
     columns = {
-        "rpm": rpm, "airspeed_m_s": V, "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
+        "rpm": rpm, "airspeed_m_s": V, "angle_deg": angle,
+        "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
         "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
         "u95_power_W": found.half_width95("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
+        "H_force_N": points["H_force_N"] if "H_force_N" in points else np.where(points.converged, 0.0, np.nan),
     }  # fmt: skip
     given = {"label": label, "diameter_in": told.diameter_in, "pitch_in": told.pitch_in, "blades": told.blades,
              "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,
@@ -150,8 +157,10 @@ def text(doc: dict[str, Any]) -> str:
         return number_text(math.nan if value is None else value, digits)
 
     head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "P [W]", "± 68 %", "± 95 %", "K1/K2 [N]", "J", "M tip"]
-    keys = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W", "u95_power_W",
-            "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
+    keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W",
+                             "u95_power_W", "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
+    if any(row["angle_deg"] for row in doc["rows"]):
+        head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
     table = [
         [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
     ]

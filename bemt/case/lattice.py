@@ -34,10 +34,10 @@ _POWERS = {"thrust_N": 2, "torque_Nm": 2, "power_W": 3, "exhaust_speed_m_s": 1} 
 
 def solve(
     case: Case, rpm: Array, airspeed_m_s: Array, density_kg_m3: float | None, bands: bool = True,
-    angle_deg: Array | float = 0.0,
+    angle_deg: Array | float | None = None,
 ) -> Dataset:  # fmt: skip
     """Solve points [rev/min], [m/s], [deg] between wind and shaft, (P,), in one air [kg/m3], with bands and flags."""
-    if np.any(angle_deg):
+    if case.angle_deg or np.any(0.0 if angle_deg is None else angle_deg):
         return propagate(case, rpm, airspeed_m_s, density_kg_m3, angle_deg=angle_deg, bands=bands).points
     own = any(item.key.startswith("operating.") for item in case.assumptions)
     if not bands or own or rpm.size <= FEW:

@@ -116,8 +116,22 @@ class Case:
 
     @property
     def airspeed_m_s(self) -> float:
-        """Axial speed of flight. [m/s]"""
+        """Speed of flight, against the wind that :attr:`angle_deg` turns. [m/s]"""
         return self.file.operating.airspeed_m_s
+
+    @property
+    def angle_deg(self) -> float:
+        """Angle between wind and shaft. [deg]"""
+        return self.file.operating.angle_deg
+
+    def axial_only(self) -> None:
+        """Refuse an angle between wind and shaft, for what knows axial flow only."""
+        if self.angle_deg:
+            hint = "sweep, estimate and the library's solve take an angle"
+            expected = "0 deg: this knows axial flow only"
+            raise InputError(
+                Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
+            )
 
     @property
     def references_path(self) -> Path | None:

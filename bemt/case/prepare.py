@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt import effects
 from bemt.base import cache
@@ -102,9 +102,17 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
 
 
-def prepare_case(case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None) -> Model:
-    """Rotor, section tables, duct and effects of a case; InputError if the changed values make none."""
+def prepare_case(
+    case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None, oblique: bool = False
+) -> Model:
+    """Rotor, section tables, duct and effects of a case; InputError if the changed values make none.
+
+    ``oblique`` says that the caller solves at the angle of the case. All others know axial flow only: a case with an
+    angle is refused, lest its wind is taken as axial.
+    """
     case = case.replaced(overrides)
+    if not oblique:
+        case.axial_only()
     if case.file.polars or case.file.blade.as_built is not None or cache.watched():
         return _model(case, n_stations)  # of files that may have changed
     return case.once(("model", n_stations), lambda: _model(case, n_stations))
@@ -119,11 +127,26 @@ def _model(case: Case, n_stations: int | None) -> Model:
     return Model(rotor, tables, duct, n, effects=(*_effects(case), *case.stated_effects()), notes=notes)
 
 
-def k1k2_case(case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air) -> Dataset:
-    """K1/K2 at points [rev/min], [m/s], for the stated pitch, else that at 0.75 R; a duct counts its annulus only."""
+def k1k2_case(
+    case: Case, overrides: Mapping[str, Any] | None, rpm: Array, airspeed_m_s: Array, air: Air,
+    angle_deg: ArrayLike | None = None,
+) -> Dataset:  # fmt: skip
+    """K1/K2 at points [rev/min], [m/s], for the stated pitch, else that at 0.75 R; a duct counts its annulus only.
+
+    It knows axial flow only: NaN and flagged where the wind, at an angle [deg], is not along the shaft.
+    """
     case = case.replaced(overrides)
     pitch = case.stated_pitch_m
     if np.isnan(pitch):
         pitch = case.rotor().blade.pitch_m()
     hub = case.hub_diameter_m if case.ducted else 0.0
-    return k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)
+    found = k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)
+    angle = np.asarray(case.angle_deg if angle_deg is None else angle_deg, dtype=float)
+    skewed = np.broadcast_to((angle != 0.0) & (np.asarray(airspeed_m_s) != 0.0), (len(found),))
+    if not np.any(skewed):
+        return found
+    nan = np.where(skewed, np.nan, 1.0)
+    values = {key: v * nan if key in ("thrust_N", "CT") else v for key, v in found.values.items()}
+    words = (("K1/K2 knows axial flow only",) if one else () for one in skewed)
+    flags = tuple((*f, *more) for f, more in zip(found.flags, words, strict=True))
+    return dataclasses.replace(found, values=values, u={"thrust_N": found.u["thrust_N"] * nan}, flags=flags)

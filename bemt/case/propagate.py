@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import air_arrays
+from bemt.bem.model import HUB_LOADS
 from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "spread", "validity_of", "vary"]
+__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "solve_at", "spread", "validity_of", "vary"]
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
@@ -55,24 +56,23 @@ class Points:
     @staticmethod
     def of(
         case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
-        density_kg_m3: ArrayLike | None = None, angle_deg: ArrayLike = 0.0,
+        density_kg_m3: ArrayLike | None = None, angle_deg: ArrayLike | None = None,
     ) -> Points:  # fmt: skip
         """Points that broadcast together; what is not given is the case's own."""
-        own = (case.rpm, case.airspeed_m_s, case.air().rho)
-        given = (own[i] if v is None else v for i, v in enumerate((rpm, airspeed_m_s, density_kg_m3)))
-        n, V, rho, angle = np.broadcast_arrays(
-            *(np.atleast_1d(np.asarray(v, dtype=float)) for v in (*given, angle_deg))
-        )
+        own = (case.rpm, case.airspeed_m_s, case.air().rho, case.angle_deg)
+        given = (own[i] if v is None else v for i, v in enumerate((rpm, airspeed_m_s, density_kg_m3, angle_deg)))
+        n, V, rho, angle = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
     def solve(self, model: Model, changed: Case, threads: int) -> Dataset:
         """A model of a changed case solved at the points."""
         rpm, V, air = at = self.conditions(changed)
         model = model.at_speeds(*at)
-        if not np.any(self.angle_deg):
-            return model.solve(rpm, V, air, threads)
-        along, side = parted(V, self.angle_deg)
-        return model.solve(rpm, along, air, threads, side)
+        return solve_at(model, rpm, V, self.angles(changed), air, threads)
+
+    def angles(self, changed: Case) -> Array:
+        """Angle between wind and shaft at the points in a changed case [deg]."""
+        return np.where(self.angle_deg == self.case.angle_deg, changed.angle_deg, self.angle_deg)
 
     def conditions(self, changed: Case) -> tuple[Array, Array, Air]:
         """Speed, airspeed and air at the points in a changed case."""
@@ -84,6 +84,22 @@ class Points:
         states, which = np.unique(self.density_kg_m3, return_inverse=True)
         airs = [air if rho == own else changed.air({"air.density_kg_m3": float(rho)}) for rho in states]
         return rpm, V, air_arrays(airs, which.reshape(-1))
+
+
+def solve_at(model: Model, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1) -> Dataset:
+    """A model at points (P,) with their angle between wind and shaft [deg].
+
+    With any angle, airspeed and J are those given, and the loads of the hub are there, 0 in axial flow.
+    """
+    if not np.any(angle_deg):
+        return model.solve(rpm, airspeed_m_s, air, threads)
+    along, side = parted(airspeed_m_s, angle_deg)
+    found = model.solve(rpm, along, air, threads, side)
+    J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
+    none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
+    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(J, found.CT, found.CP),
+           "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
+    return replace(found, values={**none, **found.values, **own})
 
 
 def parted(airspeed_m_s: Array, angle_deg: Array) -> tuple[Array, Array]:
@@ -177,7 +193,7 @@ def vary(
 
 def propagate(
     case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
-    density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike = 0.0,
+    density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike | None = None,
     unknowns: Sequence[Assumption] | None = None, bands: bool = True, threads: int = 1,
     progress: Progress | None = None,
 ) -> Propagated:  # fmt: skip
@@ -185,8 +201,8 @@ def propagate(
 
     ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. No measured rotor tells of the
     solver's error in oblique flow: its band is that of axial flow at the speed along the shaft, and the point flagged.
-    Whatever a point shares with the case - speed, airspeed, air - follows an unknown that is that quantity. ``bands``
-    False leaves the uncertainties unknown; the flags stay.
+    Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
+    ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
     from bemt.case.prepare import prepare_case
 
@@ -198,7 +214,7 @@ def propagate(
 
     def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
         nonlocal done
-        model = prepare_case(changed, None, stations).at_speeds(*points.conditions(changed))
+        model = prepare_case(changed, None, stations, oblique=True).at_speeds(*points.conditions(changed))
         found = points.solve(model, changed, threads)
         done += 1
         if progress is not None:
@@ -209,7 +225,7 @@ def propagate(
         return {key: np.asarray(found[key], dtype=float) for key in BANDED}
 
     model, found = solved(case, "nominal")
-    beside, skewed = found, points.angle_deg % 360.0 != 0.0
+    beside, skewed = found, (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
     if np.any(skewed):  # axial flow at the speed along the shaft
         at = points.conditions(case)
         beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
@@ -255,7 +271,7 @@ def _zero_thrust_J(case: Case) -> float:
     def find() -> float:
         from bemt.case.prepare import prepare_case
 
-        return zero_thrust(coefficients(prepare_case(case), case.air()), case.as_built().drawn, case.rpm)
+        return zero_thrust(coefficients(prepare_case(case, oblique=True), case.air()), case.as_built().drawn, case.rpm)
 
     return case.kept("J of zero thrust", find)
 

@@ -223,6 +223,10 @@ def _check_duct(out: Collector, case: CaseFile) -> None:
     duct, diameter = case.duct, case.rotor.diameter_m
     if duct is None:
         return
+    angles = [case.operating.angle_deg, *case.sweep.axes().get("angle_deg", ())]
+    if any(angles):
+        where = "operating.angle_deg" if angles[0] else "sweep.angle_deg"
+        out.add(where, f"{max(angles):g} deg on a ducted rotor", "0 deg", "Oblique flow is solved for open rotors only")
     if duct.inner_diameter_m < diameter:
         (key,) = _given(duct, "inner_diameter_mm", "inner_diameter_in")
         out.add(f"duct.{key}", shown(getattr(duct, key)), f"at least the rotor diameter, {diameter * 1e3:.6g} mm")

@@ -22,6 +22,7 @@ from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = [
     "AIRSPEED",
+    "ANGLE",
     "AXES",
     "GROUPS",
     "INCH",
@@ -73,6 +74,7 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
 
 RPM = Limits("rev/min", 10, 300_000, _looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))
 AIRSPEED = Limits("m/s", -100, 300, _looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
+ANGLE = Limits("deg", 0, 180)
 _DENSITY = Limits("kg/m3", 0.01, LIQUID[1], _looks(
     (1100.01, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
@@ -238,7 +240,8 @@ class OperatingTable(Table):
     """[operating]: operating point of the case."""
 
     rpm: float = entry("speed of rotation", RPM, required=True)
-    airspeed_m_s: float = entry("axial flight speed", AIRSPEED, default=0.0)
+    airspeed_m_s: float = entry("flight speed, along the shaft unless angle_deg is given", AIRSPEED, default=0.0)
+    angle_deg: float = entry("angle between wind and shaft: 0 climb, 90 edgewise, 180 descent", ANGLE, default=0.0)
 
 
 class AirTable(Table):
@@ -284,6 +287,7 @@ class SweepTable(Table):
 
     rpm: Axis = entry("speeds of rotation", RPM)
     airspeed_m_s: Axis = entry("flight speeds", AIRSPEED)
+    angle_deg: Axis = entry("angles between wind and shaft", ANGLE)
     altitude_m: Axis = entry("altitudes", _ALTITUDE)
     density_kg_m3: Axis = entry("densities", _DENSITY)
     temperature_C: Axis = entry("temperatures", _TEMPERATURE)
@@ -340,6 +344,7 @@ class CaseFile(Table):
 AXES = {
     "rpm": "operating.rpm",
     "airspeed_m_s": "operating.airspeed_m_s",
+    "angle_deg": "operating.angle_deg",
     "altitude_m": "air.altitude_m",
     "density_kg_m3": "air.density_kg_m3",
     "temperature_C": "air.temperature_C",

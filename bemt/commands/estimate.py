@@ -19,6 +19,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     speed = {"type": float, **_options.MANY}
     parser.add_argument("--rpm", required=True, metavar="N", help="one or more [rev/min]", **speed)
     parser.add_argument("--airspeed", metavar="V", help="one or more (default 0) [m/s]", **speed)
+    parser.add_argument("--angle", metavar="A", help="wind and shaft, 0 to 180, one or more (default 0) [deg]", **speed)
     blades = "number of blades (default: from the label, else 2)"
     parser.add_argument("--blades", type=_options.positive, metavar="B", help=blades)
     parser.add_argument("--chord-mm", type=float, metavar="C", help="chord at 0.75 R; narrows the band most")
@@ -36,6 +37,6 @@ def run(args: argparse.Namespace) -> int:
     from bemt.case.estimate import document, text
 
     found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,
-                     args.series, args.density)  # fmt: skip
+                     args.series, args.density, args.angle or ())  # fmt: skip
     print(json_text(found) if args.json else text(found), end="")
     return EXIT_OK

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
@@ -105,8 +106,9 @@ def compare_run(
         raise InputError(Fault(name, "", "no point with a speed and a load", "one or more"))
     step = None if progress is None else (lambda i, n, what: progress(f"{what} ({i}/{n})"))
     solved = propagate(
-        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows], progress=step
-    ).points
+        made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
+        angle_deg=_angle(full, rows, made, name), progress=step,
+    ).points  # fmt: skip
     out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
     lines = []
     if imported.kind == "cfd" or conditions_of(imported):
@@ -129,6 +131,20 @@ def compare_run(
     }
 
 
+def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64]:
+    """Angle between wind and shaft at some points [deg]: the recorded one, where there is none that of the case."""
+    for channel, factor in (("sideslip_deg", 1.0), ("sideslip_rad", 180.0 / math.pi)):
+        if channel in points:
+            angle = np.abs(points[channel][rows]) * factor
+            angle = np.where(np.isnan(angle), case.angle_deg, angle)
+            limit = 0.0 if case.ducted else 180.0
+            if np.any(angle > limit):
+                expected = "0 deg of a ducted rotor" if case.ducted else "0 to 180 deg"
+                raise InputError(Fault(name, channel, f"{angle.max():g} deg", expected))
+            return np.asarray(angle)
+    return np.full(rows.size, case.angle_deg)
+
+
 def _case(name: str) -> Case:
     from bemt.case import find_cases, load_case
 
@@ -146,7 +162,7 @@ def _with(d: Dataset, channel: str, value: float) -> Dataset:
 def _pitch(case: Case) -> float:
     from bemt.case.prepare import prepare_case
 
-    return float(prepare_case(case).pitch_m)
+    return float(prepare_case(case, oblique=True).pitch_m)
 
 
 def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> dict[str, Any]:

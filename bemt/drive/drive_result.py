@@ -221,8 +221,10 @@ def _carried(
     speeds: Array = rotor_table.SPEEDS,
 ) -> tuple[Drive, dict[str, Band], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
+    if airspeed_m_s:
+        case.axial_only()
     rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
-    found = propagate(case, rpm, V, bands=bands)
+    found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
     rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
 
     def rotor(loads: Mapping[str, Array]) -> RotorMap:
@@ -282,7 +284,7 @@ def _validity(case: Case, rpm: float, airspeed_m_s: float) -> tuple[str, ...]:
     """Flags of the rotor at full throttle."""
     if not math.isfinite(rpm):
         return ()
-    return propagate(case, rpm, airspeed_m_s, bands=False).points.flags[0]
+    return propagate(case, rpm, airspeed_m_s, angle_deg=0.0, bands=False).points.flags[0]
 
 
 def _unusual(case: Case) -> list[str]:

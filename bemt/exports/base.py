@@ -93,7 +93,8 @@ class Job:
 
     @property
     def airspeed(self) -> float:
-        """Axial speed of the single point. [m/s]"""
+        """Axial speed of the single point; a case with an angle is refused. [m/s]"""
+        self.case.axial_only()
         return self.case.airspeed_m_s if self.airspeed_m_s is None else float(self.airspeed_m_s)
 
     @property

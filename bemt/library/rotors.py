@@ -115,7 +115,7 @@ class Propeller:
 
     def solve(
         self, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None, *, J: ArrayLike | None = None,
-        angle_deg: ArrayLike = 0.0, density_kg_m3: float | None = None, bands: bool = True,
+        angle_deg: ArrayLike | None = None, density_kg_m3: float | None = None, bands: bool = True,
     ) -> Dataset:  # fmt: skip
         """Solve operating points one by one.
 
@@ -127,8 +127,9 @@ class Propeller:
             Airspeed; from the case by default. Broadcast with `rpm`. [m/s]
         J : array_like, optional
             Advance ratio V/(n D) instead of `airspeed_m_s`. [-]
-        angle_deg : array_like
-            Angle between wind and shaft: 0 climb, 90 edgewise, 180 descent; open rotors only. [deg]
+        angle_deg : array_like, optional
+            Angle between wind and shaft: 0 climb, 90 edgewise, 180 descent; open rotors only. From the case by
+            default. [deg]
         density_kg_m3 : float, optional
             Air density; from the case by default. [kg/m3]
         bands : bool
@@ -378,7 +379,8 @@ class Propeller:
 
     def _turned(self, n: Array, V: Array, angle_deg: Any) -> tuple[Array, Array, Array]:
         """Points with their angle between wind and shaft [deg]."""
-        angle = np.atleast_1d(numbers("angle_deg", angle_deg)).astype(float)
+        given = self.case.angle_deg if angle_deg is None else angle_deg
+        angle = np.atleast_1d(numbers("angle_deg", given)).astype(float)
         if np.any((angle < 0.0) | (angle > 180.0)):
             odd = float(angle[(angle < 0.0) | (angle > 180.0)][0])
             raise InputError(Fault("", "angle_deg", f"{odd:g}", "0 (climb) to 180 deg (descent)"))

@@ -76,6 +76,8 @@ def _compare(
     if channel not in values or recorded is None or math.isnan(recorded):
         return None
     S = float(values[channel][at])
+    if model == "k1k2" and math.isnan(S):  # oblique flow
+        return None
     E = S - recorded
     u_num, u_input, u_model = (_part(values, origin, channel, at) for origin in ("numerics", "input", "model"))
     u_val = math.sqrt(u_num**2 + u_input**2 + u_model**2 + u_D**2)
@@ -93,10 +95,10 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
     from bemt.case.prepare import k1k2_case
 
     def area(changed: Case, _: str = "") -> dict[str, Array]:
-        found = k1k2_case(changed, None, *at.conditions(changed))
+        found = k1k2_case(changed, None, *at.conditions(changed), at.angles(changed))
         return {"thrust_N": found.thrust_N, "CT": found.CT}
 
-    simple = k1k2_case(case, None, *at.conditions(case))
+    simple = k1k2_case(case, None, *at.conditions(case), at.angles(case))
     nominal = {"thrust_N": simple.thrust_N, "CT": simple.CT}
     moved = vary(case, nominal, area)
     u = simple.u["thrust_N"]  # unknown in flight and in a duct
@@ -123,12 +125,13 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     if without:
         off = case.replaced({"model.effects_off": (*case.file.model.effects_off, *without)})
         conditions = at.conditions(off)
-        less = prepare_case(off).at_speeds(*conditions).solve(*conditions, threads)
+        less = at.solve(prepare_case(off, oblique=True).at_speeds(*conditions), off, threads)
 
     rows: list[dict[str, Any]] = []
     variants: list[dict[str, Any]] = []
     for i, (w, v, rho) in enumerate(points):
-        state = {"rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "M_tip": nominal.M_tip[i], "Re": nominal.Re75[i]}
+        state = {"rpm": w, "airspeed_m_s": v, "density_kg_m3": rho, "M_tip": nominal.M_tip[i], "Re": nominal.Re75[i],
+                 "angle_deg": case.angle_deg}  # fmt: skip
         runs = [nominal.thrust_N[i], *(run["thrust_N"][i] for one in found.moved for run in one.runs)]
         rows.append(_row(
             "bemt", "bemt", nominal.thrust_N[i], torque_Nm=nominal.torque_Nm[i], power_W=nominal.power_W[i],
@@ -137,6 +140,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=[np.fmin.reduce(runs), np.fmax.reduce(runs)],
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else None,
             duct_share=nominal.duct_share[i] if case.ducted else None, converged=bool(nominal.converged[i]),
+            H_force_N=nominal["H_force_N"][i] if "H_force_N" in nominal else None,
             J=nominal.J[i], flags=list(nominal.flags[i]), **state,
         ))  # fmt: skip
         rows.append(_row(
@@ -236,7 +240,7 @@ def _assumption(moved: Moved) -> dict[str, Any]:
 def _description(case: Case, ready: Model, stations: int) -> dict[str, Any]:
     air = case.air()
     return {
-        "rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": air.rho,
+        "rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "angle_deg": case.angle_deg, "density_kg_m3": air.rho,
         "temperature_C": air.temperature_K - 273.15, "a_sound_m_s": air.a_sound, "air": air.source,
         "diameter_m": ready.diameter_m, "hub_diameter_m": ready.hub_diameter_m, "blades": case.file.rotor.blades,
         "pitch_075R_m": ready.pitch_m, "solidity": ready.solidity, "stations": stations,

@@ -14,7 +14,8 @@ WIDTH = 118
 CSV_COLUMNS = (
     "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",
     "u_input", "u_model", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
-    "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags", "origin", "remark",
+    "angle_deg", "H_force_N", "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags",
+    "origin", "remark",
 )  # fmt: skip
 
 
@@ -56,6 +57,10 @@ def _main_table(result: Mapping[str, Any]) -> str:
             _n(row["CT"]), _n(row["CP"]), _n(row["M_tip"], 3), _n(row["Re"], 3), _pct(row.get("bemt_error_pct")),
             _pct(row.get("k1k2_error_pct")), _u_val(row), ",".join(marks),
         ])  # fmt: skip
+    if angle := result["conditions"].get("angle_deg"):
+        header[3:3] = ["angle deg", "H N"]
+        for cells, row in zip(body, [*result["rows"], *result["variants"], *result["other_rows"]], strict=True):
+            cells[3:3] = [f"{angle:g}", _n(row.get("H_force_N"))]
     table = text_table(header, body, left=(0, len(header) - 1), indent="  ")
     return "\n".join([table, *(_wrap(note, "    ", f"{i}: ") for i, note in enumerate(notes, 1))])
 

@@ -118,6 +118,9 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     rotor, whole, air = case.rotor(), case.duct(), case.air()
     rpm = case.rpm if run.rpm is None else run.rpm
     V = case.airspeed_m_s if run.airspeed_m_s is None else run.airspeed_m_s
+    if case.angle_deg and run.sideslip_deg != case.angle_deg:
+        got, hint = f"{case.angle_deg:g} deg", f"The run has {run.sideslip_deg:g} deg: give both the same angle"
+        raise InputError(Fault(file, "operating.angle_deg", got, "0, or that of the run", hint))
     sideslip = math.radians(run.sideslip_deg)
     sector = run.sector or sector_choice(rotor.B, sideslip)
     parts = {"half": 2, "blade": rotor.B}.get(sector, 1)

@@ -1,6 +1,6 @@
 """Parameter sweeps: every combination of the axes of a case, in batches, as one file that survives a kill.
 
-Rows run over the axes in the order geometry (pitch, diameter, gap), air, then rpm and airspeed, the last one fastest.
+Rows run over the axes in the order geometry (pitch, diameter, gap), air, rpm, airspeed, angle, the last one fastest.
 The grid is cut into chunks whose edges depend on the axes alone, and a chunk depends on nothing but its number; each
 finished chunk is a file, so an interrupted run goes on where it stopped and gives the same bytes, whoever solves them.
 """
@@ -13,7 +13,7 @@ import math
 import shutil
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
+from bemt.case.propagate import solve_at
 from bemt.sweep.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
@@ -38,11 +39,22 @@ MAX_GEOMETRIES = 16
 """Geometries per chunk, about, at most: each takes longer than many points."""
 GEOMETRY = ("diameter_in", "pitch_in", "tip_gap_mm")
 AIR = ("altitude_m", "density_kg_m3", "temperature_C")
-FLOW = ("rpm", "airspeed_m_s")
+FLOW = ("rpm", "airspeed_m_s", "angle_deg")
 
 VALUES = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "J", "eta", "M_tip", "Re75")
+OBLIQUE_VALUES = ("H_force_N",)
 DUCT_VALUES = ("rotor_thrust_N", "duct_thrust_N", "exhaust_speed_m_s")
 STATISTICS = ("thrust_N", "torque_Nm", "M_tip")
+
+
+def _turned(case: Case) -> bool:
+    """Whether any point of a case's grid has an angle between wind and shaft."""
+    return bool(np.any(case.axes().get("angle_deg", case.angle_deg)))
+
+
+def _columns(case: Case) -> tuple[str, ...]:
+    """What is written of each point."""
+    return (*VALUES, *(DUCT_VALUES if case.ducted else ()), *(OBLIQUE_VALUES if _turned(case) else ()))
 
 
 @dataclass(frozen=True)
@@ -92,7 +104,7 @@ class GridSolver:
 
     def __init__(self, case: Case, grid: Grid, threads: int = 1, form: str | None = "csv") -> None:
         self.case, self.grid, self.threads, self.form = case, grid, threads, form
-        self.columns = (*VALUES, *(DUCT_VALUES if case.ducted else ()))
+        self.columns = _columns(case)
         self._axes = dict(zip(grid.names, grid.values, strict=True))
         self._last: tuple[int, Any] = (-1, None)
         self._air_names = [name for name in grid.names if name in AIR]
@@ -100,7 +112,7 @@ class GridSolver:
 
     def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
         if self._last[0] != geometry:
-            self._last = (geometry, prepare_case(self.case, overrides))
+            self._last = (geometry, prepare_case(self.case, overrides, oblique=True))
         return self._last[1]
 
     def _state(self, flat: int) -> Air:
@@ -124,12 +136,14 @@ class GridSolver:
             which = which * axes[name].size + index[name]
         flow = [
             axes[n][index[n]] if n in axes else np.full(size, default)
-            for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s), strict=True)
+            for n, default in zip(FLOW, (self.case.rpm, self.case.airspeed_m_s, self.case.angle_deg), strict=True)
         ]
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)
-        found: Dataset = self._ready(geometry, overrides).solve(flow[0], flow[1], air, self.threads)
+        found = solve_at(self._ready(geometry, overrides), flow[0], flow[1], flow[2], air, self.threads)
+        if _turned(self.case) and not np.any(flow[2]):  # axial points of an oblique grid
+            return replace(found, values={**found.values, "H_force_N": np.where(found.converged, 0.0, np.nan)})
         return found
 
     def block(self, flat: NDArray[np.intp]) -> Block:
@@ -224,7 +238,7 @@ def run_grid(
                 write_atomic(path.with_suffix(".json"), json.dumps(record))
             count(number, made)
     digest = None
-    names = (*grid.names, *VALUES, *(DUCT_VALUES if case.ducted else ()), "converged")
+    names = (*grid.names, *_columns(case), "converged")
     if folder is not None and parts is not None:
         files = [_part(parts, number, form) for number in range(grid.chunks)]
         digest = join(folder / f"grid.{form}", names, grid.names, files, form)
