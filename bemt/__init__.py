@@ -16,6 +16,7 @@ __version__ = "0.3.0"
 if TYPE_CHECKING:
     from bemt.base.errors import InputError as InputError
     from bemt.dataset import Dataset as Dataset
+    from bemt.design import choose as choose
     from bemt.library import Answer as Answer
     from bemt.library import Propeller as Propeller
     from bemt.library import calibrate_rotor as calibrate_rotor
@@ -32,11 +33,11 @@ if TYPE_CHECKING:
     from bemt.library import report as report
     from bemt.library import validate as validate
 
-_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset"}
+_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset", "choose": "bemt.design"}
 _ROOMS = ("compare", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
 _NAMES = (
-    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "cite", "compare", "diagnose", "drive",
-    "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
+    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "diagnose",
+    "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
 )  # fmt: skip
 __all__ = ["__version__", *_NAMES]
 
