@@ -6,8 +6,8 @@ import ast
 import re
 import runpy
 import shlex
-import sys
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
