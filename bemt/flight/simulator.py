@@ -105,11 +105,12 @@ def motor_lag(log: FlightLog) -> Constant | None:
 
     every = np.arange(t.size)
     tau = best(every)
-    half = _half(np.array([best(p) for p in np.array_split(every, _BLOCKS)]))
-    moved = sum(_misfit(t, None, rpm[:, i], tau, step, every) for i in range(rpm.shape[1]))
     late = max(log.join_s.get("rpm", 0.0), log.join_s.get("command", 0.0), step)
-    seen = half < 0.5 * tau and late < tau < 0.9 * _SLOWEST_S and left(tau, every) < (1.0 - _LEAST_SEEN) * moved
-    return Constant(tau, half, "s") if seen else None
+    moved = sum(_misfit(t, None, rpm[:, i], tau, step, every) for i in range(rpm.shape[1]))
+    if not late < tau < 0.9 * _SLOWEST_S or left(tau, every) > (1.0 - _LEAST_SEEN) * moved:
+        return None
+    half = _half(np.array([best(p) for p in np.array_split(every, _BLOCKS)]))
+    return Constant(tau, half, "s") if half < 0.5 * tau else None
 
 
 def _misfit(t: Array, drive: Array | None, rpm: Array, tau: float, step: float, part: NDArray[np.intp]) -> float:
