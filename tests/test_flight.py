@@ -239,6 +239,22 @@ def test_damaged_recordings_never_raise_anything_else(count: int, shared_data: P
     broken_copies(samples, count, tmp_path / "log")
 
 
+def test_a_file_that_cannot_be_indexed_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The library leaves it open: on some systems it could not be deleted."""
+    library = pytest.importorskip("pymavlink.DFReader")
+
+    def fails(self: Any, progress_callback: object = None) -> None:
+        opened.append(self.filehandle)
+        raise IndexError
+
+    opened: list[Any] = []
+    monkeypatch.setattr(library.DFReader_binary, "init_arrays", fails)
+    (tmp_path / "log").write_bytes(b"\xa3\x95\x80\x80" + bytes(200))
+    with pytest.raises(InputError):
+        read_log(tmp_path / "log")
+    assert opened and opened[0].closed
+
+
 def test_a_cut_log_says_where_it_ends(flights: Path, tmp_path: Path) -> None:
     """With the place."""
     data = (flights / "after.usdlog").read_bytes()
