@@ -319,7 +319,7 @@ def test_recorded_thrust_constants_repeat(shared_data: Path) -> None:
 
 
 def test_recorded_quadrotor_with_cut_blades(shared_data: Path) -> None:
-    """No healthy or taped flight accused; from 3 mm in all the right motor in most, and never another one."""
+    """No healthy or taped flight accused; from 3 mm in all motor 3 in half or more, never another one."""
     folder = shared_data / "flight_logs" / "crazypad_E8"
     calm = [features(read_log(p)) for p in sorted(folder.glob("normal*"))]
     layout, read = layout_of("crazyflie", 4), [c for c in calm if c is not None]
