@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bemt.base.errors import EXIT_OK
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.commands import _options
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--healthy-mass", type=_mass, metavar="KG", help=known)
     alarm = "accepted share of healthy flights that are accused (default 0.01); more finds smaller damage"
     parser.add_argument("--false-alarm", type=_share, default=0.01, metavar="P", help=alarm)
+    learnt = "write the case of --case with the rotor as these flights show it to this folder; needs --mass"
+    parser.add_argument("--out-case", metavar="DIR", help=learnt)
     parser.add_argument("--out", metavar="PNG", help="write a picture of the first log to this file")
     _options.add_json(parser, "bemt.flight/1")
     _options.add_quiet(parser, "no answer")
@@ -73,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
         others = [log for name, log in healthy.items() if name != path]
         answer = answer_on(found[path], others, args.mass, args.layout, args.healthy_mass, args.false_alarm)
         answers.append(_with_model(answer, args.case) if args.case else answer)
+    learnt, code = _learn(args, answers) if args.out_case else ("", EXIT_OK)
     if args.out:
         from bemt.flight.picture import flight_picture
 
@@ -84,8 +87,28 @@ def run(args: argparse.Namespace) -> int:
             end="",
         )
     elif not args.quiet:
-        print("\n\n".join(a.text() for a in answers))
-    return EXIT_OK
+        print("\n\n".join([*(a.text() for a in answers), *([learnt] if learnt else [])]))
+    return code
+
+
+def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, int]:
+    """Write the case with the rotor as the flights show it; gives what to print, and the exit code."""
+    import shlex
+
+    from bemt.base.errors import Fault, InputError
+    from bemt.diagnose.rotor_calibration import document, text, write
+    from bemt.flight.rotor_case import learn_from_flights
+    from bemt.library.rotors import rotor_of
+
+    if not args.case:
+        raise InputError(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
+    case = rotor_of(args.case).case
+    found = learn_from_flights(case, args.logs, [a.found for a in answers])
+    written = write(case, found, args.logs, args.out_case, NAME, "--out-case")
+    folder = Path(args.out_case).as_posix()
+    lines = [text(document(case, found, args.logs)), f"{folder}: {', '.join(written)}"]
+    code = EXIT_OK if found.found.converged else EXIT_UNCONVERGED
+    return "\n".join([*lines, f"next: bemt sweep {shlex.quote(folder)}"]), code
 
 
 def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:

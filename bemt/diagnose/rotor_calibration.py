@@ -59,9 +59,16 @@ def calibrate(
     gains = [max(g) if g else SESSION for g in stated]
     if not any(np.isfinite(v).any() for v in y):
         raise InputError(Fault(paths[0], "", "neither thrust nor torque", "one of them, or coefficients"))
-    _this_rotor(case, paths, y, rpm, V, air_of_points(air))
-    found = as_measured(case, rpm, V, air_of_points(air), y[0], y[1], u[0], u[1], (gains[0], gains[1]))
-    return case, found
+    return case, learn(case, paths, y, u, rpm, V, air_of_points(air), (gains[0], gains[1]))
+
+
+def learn(
+    case: Case, paths: Sequence[str], y: Sequence[Any], u: Sequence[Any], rpm: Any, V: Any, air: Air,
+    gains: tuple[float, float],
+) -> AsMeasured:  # fmt: skip
+    """Condition the rotor of a case on thrust and torque coefficients ``y`` with uncertainties ``u``, two (P,) each."""
+    _this_rotor(case, paths, y, rpm, V, air)
+    return as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains)
 
 
 def _this_rotor(case: Case, paths: Sequence[str], y: Sequence[Any], rpm: Any, V: Any, air: Air) -> None:
@@ -128,11 +135,14 @@ def text(doc: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Path) -> list[str]:
+def write(
+    case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Path, command: str = "calibrate-rotor",
+    option: str = "--out",
+) -> list[str]:  # fmt: skip
     """Write the case with the rotor as measured, under a name of its own, and the files beside it: their names."""
     out = Path(folder)
-    if out.resolve() == case.folder.resolve():
-        raise InputError(Fault("--out", "", "the folder of the case itself", "another folder", "It would be replaced"))
+    if case.path.is_file() and out.resolve() == case.folder.resolve():
+        raise InputError(Fault(option, "", "the folder of the case itself", "another folder", "It would be replaced"))
     source = _source(case)
     source["name"] = measured_name(case.name)
     blade: Any = source["blade"]
@@ -149,7 +159,7 @@ def write(case: Case, found: AsMeasured, paths: Sequence[str], folder: str | Pat
         source["assumptions"] = array
     elsewhere(source, case)
     names = ", ".join(Path(p).name for p in paths)
-    head = f"# {case.name} with its rotor as `bemt calibrate-rotor` found it from {names}"
+    head = f"# {case.name} with its rotor as `bemt {command}` found it from {names}"
     files = {file.relative_to(case.folder): file.read_bytes() for file in beside(case) if file.name != POSTERIOR}
     for name, data in files.items():
         write_atomic(out / name, data)
@@ -172,6 +182,8 @@ def measured_name(name: str) -> str:
 
 def _source(case: Case) -> Any:
     """Document of the case file, with its comments; a short case in full, or its unknowns would come back."""
+    if not case.path.is_file():  # a label
+        return copy.deepcopy(dict(case.written))
     source: Any = tomlkit.parse(case.path.read_text(encoding="utf-8-sig"))
     return source if source.unwrap() == case.written else copy.deepcopy(dict(case.written))
 

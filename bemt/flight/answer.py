@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,15 @@ from bemt.flight.identify import Constant, Identified, identify
 from bemt.flight.judge import FALSE_ALARM, FlightVerdict, features, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.repeat import flight_scatter
+from bemt.flight.simulator import simulator_constants
 from bemt.flight.wind import Wind, wind
 
 __all__ = ["FlightAnswer", "answer_on"]
+
+SPEED_POWER = 0.1
+"""Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
+8,000 or 15,000 rev/min on three benches of a Crazyflie (IMRCLab/crazyflie-data-collection @ 4d777a5a) [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +42,8 @@ class FlightAnswer:
         Mass from healthy flights of known mass [kg].
     predicted : tuple of float or None
         Thrust constant of the case at the mean speed, and its standard uncertainty [N/rpm^2].
+    simulator : dict of str to Constant
+        Constants in the units of simulators; the band of the thrust constant holds what flights differ by.
     """
 
     log: FlightLog
@@ -44,6 +52,7 @@ class FlightAnswer:
     wind: Wind
     mass: Constant | None = None
     predicted: tuple[float, float] | None = None
+    simulator: dict[str, Constant] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1."""
@@ -56,6 +65,7 @@ class FlightAnswer:
                 "join_s": log.join_s, "ends": log.ends,
             },
             "constants": {k: asdict(c) for k, c in f.constants.items()},
+            "simulator": {k: asdict(c) for k, c in self.simulator.items()},
             "rotors": {k: list(v) for k, v in f.rotors.items()},
             "mass_kg": None if self.mass is None else asdict(self.mass),
             "baseline": None if self.predicted is None else
@@ -108,6 +118,9 @@ class FlightAnswer:
             lines.append(
                 f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)"
             )
+        if self.simulator:
+            lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
+            lines += [f"  {name:<34} {_number(c)}" for name, c in self.simulator.items()]
         lines += ["", "Not visible here"] if f.unseen else []
         lines += [f"  {u}" for u in f.unseen]
         return "\n".join(lines)
@@ -180,16 +193,19 @@ def answer_on(
         judged = judge(mine, [x for h in healthy if (x := features(h)) is not None], placed, false_alarm)
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
-        known = [w for h in healthy if (w := identify(h).weight_per_drive) is not None]
+        same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
+        known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
         if known:
-            mass = _mass(found.weight_per_drive, known, healthy_mass_kg)
-    return FlightAnswer(log, found, judged, wind(log, healthy), mass)
+            mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
+    return FlightAnswer(log, found, judged, wind(log, healthy), mass, simulator=simulator_constants(log, found))
 
 
-def _mass(mine: Constant, known: Sequence[Constant], healthy_mass: float) -> Constant:
-    """Mass at which this flight's thrust constant is that of the healthy ones."""
-    values = np.array([k.value for k in known])
+def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:
+    """Mass at which this flight's thrust constant is that of the healthy ones, with what flights differ by."""
+    values = np.array([k.value for _, k in known])
     m = healthy_mass * float(values.mean()) / mine.value
-    own = mine.half / mine.value
-    between = float(values.std(ddof=1) / values.mean()) if values.size > 1 else known[0].half / known[0].value
-    return Constant(m, m * float(np.hypot(own, 2.0 * between)), "kg")
+    sd, factor = flight_scatter(values)
+    between = factor * sd * np.sqrt(1.0 + 1.0 / values.size)
+    speeds = [float(h.rpm[h.flying].mean()) for h, _ in known if h.rpm is not None]
+    slope = 0.0 if log.rpm is None else SPEED_POWER * float(np.log(log.rpm[log.flying].mean() / np.mean(speeds)))
+    return Constant(m, m * float(np.hypot(np.hypot(mine.half / mine.value, between), slope)), "kg")

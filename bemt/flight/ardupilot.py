@@ -34,7 +34,18 @@ def read(path: Path) -> FlightLog:
     base = needs("pymavlink.DFReader", "flight").DFReader_binary
     # The compiled index prints past Python's streams; the other one tells of damage where it can be heard.
     slow = {"init_arrays_fast": lambda self, progress_callback=None: self.init_arrays(progress_callback)}
-    reader = type("DataFlash", (base,), slow)
+
+    def made(self: Any, file: str) -> None:
+        try:
+            base.__init__(self, file)
+        except Exception:
+            # The library leaves the file open when it cannot index it.
+            for held in ("data_map", "filehandle"):
+                if hasattr(self, held):
+                    getattr(self, held).close()
+            raise
+
+    reader = type("DataFlash", (base,), {"__init__": made, **slow})
     rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
     noise = io.StringIO()
     stopped, params = "", {}
