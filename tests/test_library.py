@@ -197,6 +197,10 @@ def test_estimate_is_the_answer_of_the_propeller() -> None:
     np.testing.assert_allclose(points.thrust_N, own.thrust_N, rtol=1e-9)
     np.testing.assert_allclose(points.u["thrust_N"], own.u["thrust_N"], rtol=1e-9)
     assert list(points.to_pandas().rpm) == [4000, 4000, 6000, 6000]
+    oblique = bemt.estimate("10x5", 6000, 10.0, angle_deg=[0, 60])
+    own = bemt.propeller("10x5").solve(6000, 10.0, angle_deg=[0, 60])
+    np.testing.assert_allclose(oblique.thrust_N, own.thrust_N, rtol=1e-9)
+    np.testing.assert_allclose(oblique["H_force_N"], own["H_force_N"], rtol=1e-9)
 
 
 def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:

@@ -33,9 +33,9 @@ Recording = str | os.PathLike[str]
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: int | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
-    density_kg_m3: float | None = None,
+    density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0,
 ) -> Dataset:  # fmt: skip
-    """Estimate thrust and power from a label, every speed of rotation with every airspeed.
+    """Estimate thrust and power from a label, every speed of rotation with every airspeed at every angle.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def estimate(
     rpm : array_like
         Speeds of rotation. [rev/min]
     airspeed_m_s : array_like
-        Axial speeds. [m/s]
+        Speeds of the wind. [m/s]
     blades : int, optional
         Number of blades; from the label by default, else 2.
     chord_mm : float, optional
@@ -55,6 +55,8 @@ def estimate(
         Maker and series, such as ``"APC Thin Electric"`` or ``"apce"``.
     density_kg_m3 : float, optional
         Air density; 1.225 by default, with 1.16 to 1.29 in the band. [kg/m3]
+    angle_deg : array_like
+        Angles between wind and shaft: 0 climb, 90 edgewise, 180 descent. [deg]
 
     Returns
     -------
@@ -79,14 +81,17 @@ def estimate(
     """
     from bemt.case import estimate as estimating
 
-    n, V = (np.atleast_1d(numbers(*pair)) for pair in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)))
+    asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
+    n, V, angle = (np.atleast_1d(numbers(*pair)).tolist() for pair in asked)
     density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
     with in_words_of_the_library():
-        found = estimating.document(label, n.tolist(), V.tolist(), blades, chord_mm, measured_pitch_in, series, density)
+        found = estimating.document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
     rows: list[dict[str, Any]] = found["rows"]
     columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
     u = {k[2:]: v for k, v in columns.items() if k.startswith("u_")}
     values = {k: v for k, v in columns.items() if not k.startswith(("u_", "u95_"))}
+    if (sideslip := np.radians(values.pop("angle_deg"))).any():
+        values["sideslip_rad"] = sideslip
     return Dataset("bemt", found["case"], values, u, flags=tuple(tuple(r["flags"]) for r in rows))
 
 
