@@ -75,6 +75,9 @@ class Model:
         Physics that is on.
     notes : tuple of str
         Remarks of the section tables.
+    learned : callable or None
+        What a run of this rotor adds to CT and CP, (2, P), at advance ratios along the shaft and Reynolds numbers at
+        0.75 R of the rotation alone, (P,) each [1].
     """
 
     rotor: Rotor
@@ -85,6 +88,7 @@ class Model:
     re_range: tuple[float, float] | None = None
     effects: tuple[Effect, ...] = field(default_factory=standard)
     notes: tuple[str, ...] = ()
+    learned: Callable[[Array, Array], Array] | None = None
     _reaching: dict[Any, Model] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -210,6 +214,11 @@ class Model:
             T_rotor = T - s.T_stator - T_duct
             more = ((), ("unconverged with the effects that act on points",))
             flags = tuple((*f, *more[int(not good)]) for f, good in zip(s.flags, ok, strict=True))
+        if self.learned is not None:
+            change = self.learned(s.J, np.asarray(co.Re75(self.chord75_m, n, D, 0.0, rho, mu)))
+            more_T = np.asarray(co.thrust(change[0], rho, n, D))
+            T, T_rotor = T + more_T, T_rotor + more_T
+            Q = Q + np.asarray(co.power(change[1], rho, n, D)) / (2.0 * np.pi * n)
         wind = s.V if s.side is None else np.hypot(s.V, s.side)
         CT, CQ, J = co.CT(T, rho, n, D), co.CQ(Q, rho, n, D), s.J if s.side is None else wind / (n * D)
         CP = 2.0 * np.pi * np.asarray(CQ)

@@ -16,6 +16,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.bem.model import Model
 from bemt.rotors import k1k2
+from bemt.rotors.learned import with_run
 from bemt.sections import polars
 from bemt.sections.neuralfoil import neuralfoil_polar
 
@@ -124,7 +125,11 @@ def _model(case: Case, n_stations: int | None) -> Model:
     duct = None if "duct" in case.file.model.effects_off else _duct_flow(case, rotor)
     n = case.file.model.stations if n_stations is None else n_stations
     notes = tuple(dict.fromkeys(note for _, polar in tables for note in polar.notes))
-    return Model(rotor, tables, duct, n, effects=(*_effects(case), *case.stated_effects()), notes=notes)
+    model = Model(rotor, tables, duct, n, effects=(*_effects(case), *case.stated_effects()), notes=notes)
+    known = case.as_built()
+    if known.reference is None:
+        return model
+    return with_run(model, case.air(), known.prior, known.drawn, known.reference)
 
 
 def k1k2_case(

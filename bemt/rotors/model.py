@@ -35,7 +35,8 @@ def air_of_points(fields: Mapping[str, Array]) -> Air:
 
 
 def coefficients(model: Model, air: Air) -> Solve:
-    """CT and CP of a model with any latent numbers; air of one state or one per point."""
+    """CT and CP of a model with any latent numbers, without what a run has taught; air of one state or one per point."""
+    model = model if model.learned is None else replace(model, learned=None)
     drawn = tuple(e for e in model.effects if not isinstance(e, AsBuilt))
     states = air_fields(air)
 
