@@ -35,7 +35,7 @@ def air_of_points(fields: Mapping[str, Array]) -> Air:
 
 
 def coefficients(model: Model, air: Air) -> Solve:
-    """CT and CP of a model with any latent numbers and without what a run taught; one state of the air or one a point."""
+    """CT and CP of a model with any latent numbers, without what a run taught; air of one state or one a point."""
     model = model if model.learned is None else replace(model, learned=None)
     drawn = tuple(e for e in model.effects if not isinstance(e, AsBuilt))
     states = air_fields(air)
