@@ -320,7 +320,7 @@ def test_interpreted_points_equal_compiled_ones(rotor: Rotor, polar: Polar, duct
     duct = DuctFlow(0.95, wall_loss=0.05, lip_loss=0.1, stator=0.5, gap=1e-3) if ducted else None
     prep = solver.prepare(rotor, [(0.7, polar)], None, duct, n_stations=10)
     entry, *constant = prep.kernel
-    assert isinstance(entry, kernel.Entry)
+    assert isinstance(entry, kernel.KernelEntry)
     rpm, V = np.array([500.0, 4000.0, 9000.0, 6000.0, 3000.0]), np.array([0.0, 2.0, -4.0, 30.0, 12.0])
     points = np.column_stack([rpm * np.pi / 30.0, V, *(np.full(5, v) for v in (AIR.rho, AIR.mu, AIR.a_sound))])
     found = []

@@ -446,7 +446,7 @@ def interpret(ducted: bool, tables: str, points, st, tab, par, out, radial) -> N
             space["_point"](element, guess, lookup, w, points[p], st, tab, par, out[p], radial[p])
 
 
-class Entry:
+class KernelEntry:
     """Entry point of the kernel for one kind of rotor and tables.
 
     Compiling takes seconds, more than all that a first question needs: as long as no compiled code lies on the disk,
@@ -477,9 +477,9 @@ def _on_disk(compiled) -> bool:
         return False
 
 
-_ENTRIES = {kind: Entry(*kind, made) for kind, made in _entries(fingerprint(residual, vecmath)).items()}
+_ENTRIES = {kind: KernelEntry(*kind, made) for kind, made in _entries(fingerprint(residual, vecmath)).items()}
 
 
-def entry(ducted: bool, tables: str) -> Entry:
+def entry(ducted: bool, tables: str) -> KernelEntry:
     """Entry point that solves a batch of operating points."""
     return _ENTRIES[ducted, tables]

@@ -37,7 +37,7 @@ class RawPolar(NamedTuple):
     confidence: Array
 
 
-class Table(NamedTuple):
+class ShippedTable(NamedTuple):
     """The whole table."""
 
     axes: tuple[Array, ...]  # Nodes of `AXES` [1]
@@ -74,11 +74,11 @@ def unpack(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 @cache
-def table() -> Table:
+def table() -> ShippedTable:
     """The shipped table, read once."""
     found = shipped_arrays("bemt.sections", FILE)
     axes = tuple(found[name] for name in AXES)
-    return Table(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
+    return ShippedTable(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
 
 
 def covers(shape: tuple[float, float, float] | None, n_crit: float) -> bool:
