@@ -1,9 +1,9 @@
 """The judge asks for a run, the hidden stand makes it, the judge answers again: up to so many times.
 
 The command that an answer recommends is run as printed. A reference is the run that was sealed with the item; a run of
-new points is measured on the item's own rotor and stand. A check by hand ("hang dead weights on the cells") is not made:
-the loop ends there. The other road is the fixed programme: a reference, then runs at rest, then runs in wind, whatever
-the first answer was.
+new points is measured on the item's own rotor and stand; a check by hand ("hang dead weights on the cells") says if it
+is there. The other road is the fixed programme: a reference, then runs at rest, then runs in wind, whatever the
+first answer was.
 """
 
 from __future__ import annotations
@@ -21,18 +21,17 @@ from typing import Any
 import numpy as np
 
 from bemt.base.tables import json_text, text_table, write_atomic
+from bemt.diagnose.suggest import minutes
 from bemt.proof import draw, prove, score, seal
 from bemt.proof.items import Bench, further_run
 from bemt.proof.rigs import Rig
 
-__all__ = ["SCHEMA", "Course", "loop", "minutes", "text"]
+__all__ = ["SCHEMA", "Course", "loop", "text"]
 
 SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
 _DONE = ("named", "sensor")
 _NEW, _REFERENCE = "new_run.csv", "reference.csv"
-# Time of a stand [min]: to set up a run, to take one point, to put the rotor back as it was before.
-SET_UP_MIN, POINT_MIN, RESTORE_MIN = 4.0, 0.2, 15.0
 _FIXED_POINTS = 6
 
 
@@ -47,11 +46,12 @@ class Course:
     answers : list of dict
         First answer, then one after each run.
     steps : list of str
-        What each run was: ``reference`` or ``run``.
+        What each step was: ``reference``, ``run`` or ``look``.
     minutes : list of float
         Time of the stand for each run. [min]
     end : str
-        Why it ended: "named", a kind of step that is no run, "no run", "runs used up", "failed".
+        Why it ended: "named", "confirmed" by a check, a kind of step that is none of the above, "no run", "used up",
+        "failed".
     """
 
     folder: str
@@ -59,11 +59,6 @@ class Course:
     steps: list[str] = field(default_factory=list)
     minutes: list[float] = field(default_factory=list)
     end: str = ""
-
-
-def minutes(kind: str, points: int) -> float:
-    """Time that a stand needs for a run of so many points. [min]"""
-    return (RESTORE_MIN if kind == "reference" else SET_UP_MIN) + POINT_MIN * points
 
 
 @dataclass
@@ -105,9 +100,12 @@ def _recommended(item: _Item, answer: Mapping[str, Any]) -> tuple[str, int, list
     if answer["verdict"] in _DONE:
         return "named"
     commands = step.get("commands") or ()
-    if answer["verdict"] == "none" or kind not in ("run", "reference") or not commands:
+    if answer["verdict"] == "none" or kind not in ("run", "reference", "look") or not commands:
         return kind or "no run"
     words = shlex.split(commands[0])[1:]
+    if kind == "look":
+        there = step.get("checks") in item.entry["causes"]
+        return ("look", 0, [] if there else words) if step.get("checks") else "no run"
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
         return ("reference", points, words) if points else "no run"
@@ -145,7 +143,7 @@ def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, 
         item = _Item(out, entry, bench, Path(box))
         for file in (out / "items" / course.folder).iterdir():
             write_atomic(item.box / file.name, file.read_text("utf-8"))
-        end = "runs used up"
+        end = "used up"
         for number in range(runs):
             made = _fixed(item, number) if fixed else _recommended(item, course.answers[-1])
             if isinstance(made, str):
@@ -154,9 +152,14 @@ def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, 
                 end = made
                 break
             kind, points, words = made
-            answer, _ = prove.asked(item.box, words)
             course.steps.append(kind)
             course.minutes.append(minutes(kind, points))
+            if not words:  # the check has found it
+                looked_for = course.answers[-1]["next_measurement"]["checks"]
+                course.answers.append({**course.answers[-1], "verdict": "named", "effects": [looked_for]})
+                end = "confirmed"
+                break
+            answer, _ = prove.asked(item.box, words)
             if answer is None:
                 end = "failed"
                 break
