@@ -170,22 +170,28 @@ def _next(
 ) -> suggestion.Suggestion:
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
+    other = chosen.otherwise
+    if other is not None:
+        other = replace(other, commands=_commands(other, given))
+    return replace(chosen, commands=_commands(chosen, given), otherwise=other)
+
+
+def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[str, ...]:
+    """What to type after a step."""
     if chosen.kind == "reference":
         file = "reference.csv"
-        commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
-    elif chosen.kind == "run":
-        commands = (given.command(run="new_run.csv"),)
-    elif chosen.kind == "look":
-        commands = (given.command(ruled_out=chosen.checks),)
-    elif chosen.kind == "air":
-        commands = given.of_days()
-    elif chosen.kind == "rotor":
-        commands = (f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE"))
-    elif chosen.kind == "mend":
-        commands = tuple(f"bemt import {f}" for f in given.recordings)
-    else:
-        commands = ()
-    return replace(chosen, commands=commands)
+        return given.command(reference=file), given.comparison(file)
+    if chosen.kind == "run":
+        return (given.command(run="new_run.csv"),)
+    if chosen.kind == "look":
+        return (given.command(ruled_out=chosen.checks),)
+    if chosen.kind == "air":
+        return given.of_days()
+    if chosen.kind == "rotor":
+        return f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
+    if chosen.kind == "mend":
+        return tuple(f"bemt import {f}" for f in given.recordings)
+    return ()
 
 
 def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion:

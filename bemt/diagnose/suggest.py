@@ -120,6 +120,8 @@ class Suggestion:
         Time that it takes on a stand [min].
     gain : float
         Expected share of the doubt between the explanations that it takes away [1].
+    otherwise : Suggestion or None
+        What to do if there can be no such reference.
     """
 
     text: str
@@ -132,13 +134,14 @@ class Suggestion:
     checks: str = ""
     minutes: float = 0.0
     gain: float = 0.0
+    otherwise: Suggestion | None = None
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
                 "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes,
-                "gain": self.gain}  # fmt: skip
+                "gain": self.gain, "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -341,17 +344,18 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
         choices.append(choice(REFERENCE, (), _with_reference(part), "reference", time))
     # a run that leaves the two leading explanations alike is not worth it; what is told apart is rather looked at
     able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
-    best = max(able, key=lambda c: c.gain / c.minutes, default=None)
+    able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
     look = _look(names, part.record)
-    if best is not None and not (look and certain):
-        return best
+    if able and not (look and certain):
+        run = next((c for c in able if c.kind == "run"), look)
+        return replace(able[0], otherwise=run) if able[0].kind == "reference" else able[0]
     if look:
         return replace(look, before=before, after=before)
     if certain:
         return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
     if reference and not _referenced(found):
-        return choices[-1]
+        return replace(choices[-1], otherwise=look)
     return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), before,
                       before)  # fmt: skip
 

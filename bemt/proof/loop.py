@@ -95,12 +95,21 @@ class _Item:
 
 def _recommended(item: _Item, answer: Mapping[str, Any]) -> tuple[str, int, list[str]] | str:
     """Take the step that an answer recommends: its kind, points and the command to run; else why there is none."""
-    step = answer.get("next_measurement") or {}
-    kind = str(step.get("kind", ""))
     if answer["verdict"] in _DONE:
         return "named"
-    commands = step.get("commands") or ()
-    if answer["verdict"] == "none" or kind not in ("run", "reference", "look") or not commands:
+    step = answer.get("next_measurement") or {}
+    if answer["verdict"] == "none":
+        return str(step.get("kind") or "no run")
+    taken = _step(item, step)
+    if taken == "no reference" and step.get("otherwise"):
+        return _step(item, step["otherwise"])
+    return taken
+
+
+def _step(item: _Item, step: Mapping[str, Any]) -> tuple[str, int, list[str]] | str:
+    """Take one step."""
+    kind, commands = str(step.get("kind", "")), step.get("commands") or ()
+    if kind not in ("run", "reference", "look") or not commands:
         return kind or "no run"
     words = shlex.split(commands[0])[1:]
     if kind == "look":
@@ -108,7 +117,7 @@ def _recommended(item: _Item, answer: Mapping[str, Any]) -> tuple[str, int, list
         return ("look", 0, [] if there else words) if step.get("checks") else "no run"
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
-        return ("reference", points, words) if points else "no run"
+        return ("reference", points, words) if points else "no reference"
     name = item.run(step["points"])
     return ("run", len(step["points"]), [name if w == _NEW else w for w in words]) if name else "no run"
 
@@ -155,7 +164,8 @@ def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, 
             course.steps.append(kind)
             course.minutes.append(minutes(kind, points))
             if not words:  # the check has found it
-                looked_for = course.answers[-1]["next_measurement"]["checks"]
+                step = course.answers[-1]["next_measurement"]
+                looked_for = step["checks"] or step["otherwise"]["checks"]
                 course.answers.append({**course.answers[-1], "verdict": "named", "effects": [looked_for]})
                 end = "confirmed"
                 break
