@@ -277,8 +277,8 @@ def _next(d: Diagnosis) -> list[str]:
     if step.minutes and step.gain:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
     other = [] if step.otherwise is None else [f"  without such a reference: {step.otherwise.text}"]
-    unless = f"  if {step.checks} is ruled out:" if step.checks and step.commands else ""
-    return [f"Next: {step.text}{gain}.{cost}", *([unless] if unless else []), *(f"  {c}" for c in step.commands), *other]
+    unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
+    return [f"Next: {step.text}{gain}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
 def _not_tried(d: Diagnosis) -> list[str]:

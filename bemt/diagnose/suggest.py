@@ -141,7 +141,8 @@ class Suggestion:
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
                 "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes,
-                "gain": self.gain, "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
+                "gain": self.gain,
+                "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
 
 
 @dataclass(frozen=True)
