@@ -25,9 +25,10 @@ from bemt.air import Air
 from bemt.bem import duct as duct_model
 from bemt.bem import solver
 from bemt.bem.duct_stream import jet_area
-from bemt.bem.model import Model
+from bemt.bem.model import Model, flow_of, respond
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
+from bemt.effects.oblique_inflow import ObliqueInflow
 from geometry.duct import Duct
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -304,3 +305,13 @@ density_kg_m3 = 1.225
     some = K > 0.15 * K[0]
     assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.05
     assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.038  # the swirl sucks on the hub: not on the nozzle
+
+
+def test_a_turned_wind_on_a_ducted_rotor_has_no_answer(project: Path) -> None:
+    """An effect that turns the wind next to one that adds a duct: the point is lost, not the diagnosis."""
+    case = load_case(project / "cases" / "ds30")
+    model, air = prepare_case(case), case.air()
+    flow = dataclasses.replace(flow_of(model.prep, [40000.0, 40000.0], [0.0, 10.0], air), ducted=False)  # the case leaves it out
+    loads, _, ok = respond(model.prepared, (*model.effects, ObliqueInflow(30.0)), flow)
+    assert ok.tolist() == [True, False]
+    assert np.isfinite(loads.T[0]) and np.isnan(loads.T[1]) and np.isnan(loads.Q[1])

@@ -115,26 +115,52 @@ def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found:
 
 
 @pytest.mark.parametrize(
-    ("now", "after", "kind", "lead"),
-    [(15.1, 15.7, "look", "cross_talk"), (15.1, 60.0, "look", "cross_talk"), (2.5, 9.0, "run", "cross_talk"),
-     (2.5, 2.9, "look", "cross_talk"), (7.6, 9.0, "", "compressibility"), (7.6, 12.0, "run", "compressibility")],
+    ("now", "after", "odds", "kind", "lead"),
+    [
+        (15.1, 15.7, 0.5, "look", "cross_talk"), (15.1, 60.0, 0.5, "look", "cross_talk"),
+        (2.5, 9.0, 0.5, "run", "cross_talk"), (2.5, 2.6, 0.5, "look", "cross_talk"),
+        (7.6, 7.61, 0.001, "", "compressibility"), (7.6, 12.0, 0.001, "", "compressibility"),
+        (7.6, 12.0, 0.5, "run", "compressibility"),
+    ],
 )  # fmt: skip
 def test_a_run_is_recommended_where_it_is_worth_its_time(
-    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis, now: float, after: float, kind: str, lead: str
-) -> None:
+    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis, now: float, after: float, odds: float, kind: str,
+    lead: str,
+) -> None:  # fmt: skip
+    """Two explanations so far apart now and with a run; the second is that likely."""
     alone = len(compared.problem.parts[0].record)
     monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])
     monkeypatch.setattr(
-        suggest, "_distance", lambda problem, *_: now if problem.covariates["rpm"].size == alone else after
+        suggest, "_distances",
+        lambda plan, *_: (now if plan.covariates["rpm"].size == alone else after) * (1.0 - np.eye(2)),
     )
     rival = "hub_loss" if lead == "compressibility" else "rpm_scale"
     settings = {"rpm_scale": {"factor": 1.02, "eps": 0.0}}
-    chosen = suggest.suggest(compared.found, (lead, {}), (rival, settings.get(rival, {})))
+    pair = [suggest.Rival(lead, {}, 1.0 - odds), suggest.Rival(rival, settings.get(rival, {}), odds)]
+    chosen = suggest.suggest(compared.found, pair)
     assert chosen.kind == kind
     if kind == "run":
-        assert chosen.separates == (lead, rival) and chosen.points
+        assert chosen.separates == (lead, rival) and chosen.points and 0.0 < chosen.gain <= 1.0
     else:
         assert not chosen.separates and not chosen.points
+
+
+def test_the_unknown_asks_for_a_reference_and_a_cheap_run_goes_before_a_dear_one(
+    monkeypatch: pytest.MonkeyPatch, compared: chain.Diagnosis
+) -> None:
+    """Where a run and a reference tell as much, the shorter one is chosen, unless nothing listed may be at work."""
+    record = replace(compared.problem.parts[0].record, reference=False)
+    problem = suggest.assemble((replace(compared.problem.parts[0], record=record),))
+    alone = problem.y.size
+    monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])
+    monkeypatch.setattr(suggest, "_check", lambda *_: "")
+    monkeypatch.setattr(
+        suggest, "_distances", lambda plan, *_: (2.0 if plan.y.size == alone else 9.0) * (1.0 - np.eye(2))
+    )
+    found = replace(compared.found, problem=problem)
+    pair = [suggest.Rival("compressibility", {}, 0.5), suggest.Rival("hub_loss", {}, 0.5)]
+    assert suggest.suggest(found, pair, 0.0, reference=True).kind == "run"
+    assert suggest.suggest(found, pair, 99.0, reference=True).kind == "reference"
 
 
 def asked(part: Part) -> str:

@@ -295,7 +295,12 @@ def only_reads(effect: Effect) -> bool:
 
 def _solve(prep: solver.Prepared, flow: Flow) -> solver.Solution:
     air = cast("Air", SimpleNamespace(rho=flow.rho, mu=flow.mu, a_sound=flow.a_sound))
-    return solver.solve(prep, flow.rpm, flow.V, air, side=0.0 if flow.side is None else flow.side)
+    if prep.duct is None or flow.side is None or not np.any(flow.side):
+        return solver.solve(prep, flow.rpm, flow.V, air, side=0.0 if flow.side is None else flow.side)
+    # an effect that turns the wind, with one that adds a duct: nobody solves that
+    axial, turned = solver.solve(prep, flow.rpm, flow.V, air), flow.side != 0.0
+    lost = {k: np.where(turned, np.nan, getattr(axial, k)) for k in ("T", "Q", "T_duct")}
+    return replace(axial, **lost, converged=axial.converged & ~turned)
 
 
 def flow_of(

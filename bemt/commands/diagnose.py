@@ -35,6 +35,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
     only = "consider only these effects (default: all)"
     parser.add_argument("--only", metavar="EFFECT", help=only, **_options.MANY)
+    gone = "effects that a check has ruled out"
+    parser.add_argument("--ruled-out", default=[], metavar="EFFECT", help=gone, **_options.MANY)
     blade = "blade loads (radial.csv of a campaign), compared with the first case"
     parser.add_argument("--along", metavar="FILE", help=blade)
     seen = "use only these channels (default: all that were measured)"
@@ -75,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     _both_there(args)
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
                                  before=lambda found: folder.check(args.out, found), rpm=args.rpm,
-                                 airspeed_m_s=args.airspeed)  # fmt: skip
+                                 airspeed_m_s=args.airspeed, ruled_out=args.ruled_out)  # fmt: skip
     if args.repeatability is not None:
         recordings = [replace(r, repeatability=args.repeatability) for r in recordings]
     with _terminal.progress(args.quiet or args.json) as say:
@@ -135,4 +137,5 @@ def _given(args: argparse.Namespace) -> Given:
         words += ["--repeatability", f"{100.0 * args.repeatability:g}"]
     if args.baseline != "bemt":
         words += ["--baseline", args.baseline]
-    return Given(tuple(map(shlex.quote, args.recordings)), tuple(map(shlex.quote, args.reference)), shlex.join(words))
+    return Given(tuple(map(shlex.quote, args.recordings)), tuple(map(shlex.quote, args.reference)), shlex.join(words),
+                 tuple(args.ruled_out))

@@ -26,6 +26,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=_options.positive, metavar="N", help=jobs)
     steps = "with --size real and --out: also take the steps that open answers recommend, if the data allow"
     parser.add_argument("--follow", action="store_true", help=steps)
+    more = "then take the runs that open answers recommend, up to N each, on the hidden stand"
+    parser.add_argument("--loop", type=_options.positive, metavar="N", help=more)
+    parser.add_argument("--fixed", action="store_true", help="with --loop: a fixed programme of runs instead")
     kept = "folders of kept proofs made with the current interval factors: write new factors to --out instead"
     parser.add_argument("--calibrate-intervals", metavar="DIR", help=kept, **_options.MANY)
     _options.add_json(parser, "bemt.proof/1")
@@ -35,12 +38,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Hide, diagnose, score; 0 if every target is met, 1 if some are missed."""
     from bemt.base.tables import json_text
-    from bemt.proof import follow, proof_text
+    from bemt.proof import follow, loop, proof_text
     from bemt.proof.prove import prove
 
     if args.follow and not (args.out and args.size == "real"):
         got = f"--size {args.size}" + ("" if args.out else " without --out")
         raise InputError(Fault("--follow", "", got, "--size real and --out DIR"))
+    if args.loop and (not args.out or args.size == "real"):
+        got = f"--size {args.size}" + ("" if args.out else " without --out")
+        raise InputError(Fault("--loop", "", got, "generated items and --out DIR"))
     taken = ""
     with _terminal.progress() as say:
         if args.calibrate_intervals:
@@ -48,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
         found = prove(args.out, args.size, args.seed, args.jobs, say, _terminal.complain)
         if args.follow:
             taken = follow.text(follow.follow(Path(args.out), args.jobs or os.cpu_count() or 1, say))
+        if args.loop:
+            taken = loop.text(loop.loop(Path(args.out), args.loop, args.jobs or os.cpu_count() or 1, args.fixed, say))
     if args.json:
         print(json_text(found), end="")
     elif not args.quiet:

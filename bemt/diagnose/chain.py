@@ -27,7 +27,7 @@ from bemt.diagnose import locate as location
 from bemt.diagnose import suggest as suggestion
 from bemt.diagnose.answer import Diagnosis
 from bemt.diagnose.assemble import build
-from bemt.diagnose.explanation import NONE, Explanation
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 __all__ = ["Diagnosis", "diagnose"]
 
 Array = NDArray[np.float64]
+# Explanations that the next run is to tell apart.
+_MOST_RIVALS = 5
 
 
 def diagnose(
@@ -108,6 +110,8 @@ def _diagnose(
     if question := wrong_rotor_check.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
+    candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
+    absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")
@@ -166,22 +170,28 @@ def _next(
 ) -> suggestion.Suggestion:
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
+    other = chosen.otherwise
+    if other is not None:
+        other = replace(other, commands=_commands(other, given))
+    return replace(chosen, commands=_commands(chosen, given), otherwise=other)
+
+
+def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[str, ...]:
+    """What to type after a step."""
     if chosen.kind == "reference":
         file = "reference.csv"
-        commands: tuple[str, ...] = (given.command(reference=file), given.comparison(file))
-    elif chosen.kind == "run":
-        commands = (given.command(run="new_run.csv"),)
-    elif chosen.kind == "look":
-        commands = (given.command(),)
-    elif chosen.kind == "air":
-        commands = given.of_days()
-    elif chosen.kind == "rotor":
-        commands = (f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE"))
-    elif chosen.kind == "mend":
-        commands = tuple(f"bemt import {f}" for f in given.recordings)
-    else:
-        commands = ()
-    return replace(chosen, commands=commands)
+        return given.command(reference=file), given.comparison(file)
+    if chosen.kind == "run":
+        return (given.command(run="new_run.csv"),)
+    if chosen.kind == "look":
+        return (given.command(ruled_out=chosen.checks),)
+    if chosen.kind == "air":
+        return given.of_days()
+    if chosen.kind == "rotor":
+        return f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
+    if chosen.kind == "mend":
+        return tuple(f"bemt import {f}" for f in given.recordings)
+    return ()
 
 
 def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion:
@@ -208,11 +218,18 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
         return mended
     lead = best.ids[0] if best.ids else singles[0]
     listed = (*decision.effects, *(j for g in decision.classes for j in g), *singles)
-    rivals = [i for i in listed if i != lead and i in found.spans]
-    first = (lead, fitting.fit(found, Explanation.of(lead)).settings[0])
-    likelier = bool(rivals) and single[rivals[0]] > found.probability[NONE]
+    rivals = [i for i in dict.fromkeys(listed) if i != lead and i in found.spans]
+    none = found.probability[NONE]
+    likelier = bool(rivals) and single[rivals[0]] > none
+    if not rivals or (decision.verdict == "insufficient" and not likelier):
+        rivals.insert(0, "")
+    else:
+        rivals.append("")
+    weight = single | {"": none}
+    order = [lead, rivals[0], *sorted(rivals[1:], key=lambda i: -weight[i])][:_MOST_RIVALS]
     open_ = decision.verdict in ("class", "unknown", "insufficient")
-    second = None
-    if rivals and (decision.verdict != "insufficient" or likelier):
-        second = (rivals[0], fitting.fit(found, Explanation.of(rivals[0])).settings[0])
-    return suggestion.suggest(found, first, second, reference=open_)
+    return suggestion.suggest(
+        found,
+        [suggestion.Rival(i, fitting.fit(found, Explanation.of(i)).settings[0] if i else {}, weight[i]) for i in order],
+        found.probability[UNKNOWN], reference=open_,
+    )  # fmt: skip

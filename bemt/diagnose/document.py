@@ -273,7 +273,12 @@ def _next(d: Diagnosis) -> list[str]:
     if step.separates:
         both = f"{step.after:.1f} instead of {step.before:.1f}"
         gain = f" (tells {' from '.join(step.separates)} at {both} standard deviations)"
-    return [f"Next: {step.text}{gain}.", *(f"  {command}" for command in step.commands)]
+    cost = ""
+    if step.minutes and step.gain:
+        cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
+    other = [] if step.otherwise is None else [f"  without such a reference: {step.otherwise.text}"]
+    unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
+    return [f"Next: {step.text}{gain}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
 def _not_tried(d: Diagnosis) -> list[str]:

@@ -235,10 +235,10 @@ def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
 def load_all(
     recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
-    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (),
+    rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), ruled_out: Sequence[str] = (),
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
     """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
-    _told_twice([*recordings, *references], only)
+    _told_twice([*recordings, *references], only, ruled_out)
     found = _together(
         lambda: cases_of(cases, off, len(recordings)), *(partial(_there, p) for p in (*recordings, *references))
     )[0]
@@ -286,12 +286,12 @@ def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[
     return [*map(float, given), *[None] * (n - len(given))]
 
 
-def _told_twice(paths: Sequence[str], only: Sequence[str]) -> None:
+def _told_twice(paths: Sequence[str], only: Sequence[str], ruled_out: Sequence[str]) -> None:
     """Refuse recordings that count twice and effects that nobody knows."""
     files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
-    faults += _unknown(only)
+    faults += [*_unknown(only), *_unknown(ruled_out, "--ruled-out")]
     if faults:
         raise InputError(faults)
 
@@ -302,13 +302,13 @@ def check_effects(only: Sequence[str]) -> None:
         raise InputError(faults)
 
 
-def _unknown(only: Sequence[str]) -> list[Fault]:
+def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
     known, faults = effects.catalogue(), []
     for name in only:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"Did you mean {near[0]}?" if near else ""
-            faults.append(Fault("--only", name, "an unknown effect", f"one of {', '.join(known)}", hint))
+            faults.append(Fault(option, name, "an unknown effect", f"one of {', '.join(known)}", hint))
     return faults
 
 

@@ -135,7 +135,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
     if groups:
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
-        added = suggestion.suggest(found, (a, settings[a]), (b, settings[b]))
+        added = suggestion.suggest(found, [suggestion.Rival(i, settings[i], 0.5) for i in (a, b)])
     weight = prior.prior_weights(whole, alike.ids)
     bar = np.array([thresholds.EXPECTED if weight[i] > 1.0 else thresholds.ENOUGH for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
 
 __all__ = [
-    "LEVEL", "REFERENCE", "ROTOR", "Given", "Suggestion", "correction", "nothing_called_for", "suggest", "weather",
+    "LEVEL", "REFERENCE", "ROTOR", "Given", "Rival", "Suggestion", "correction", "minutes", "nothing_called_for",
+    "suggest", "weather",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -54,10 +55,8 @@ LEVEL = 0.1
 
 _POINTS = 4
 _ENOUGH = ALIKE
-# A run is worth its time if it takes two explanations this much farther apart, and out of the reach of being alike.
-_WORTH = 1.3
-# A reference does more than to separate two explanations: it is chosen unless a run separates them this much better.
-_BETTER = 1.5
+# A run is worth its time if it takes away this much doubt; no explanation counts less than the least.
+_WORTH, _LEAST = 0.02, 1e-6
 
 
 @dataclass(frozen=True)
@@ -70,18 +69,22 @@ class Given:
         Files.
     rest : str
         Options.
+    ruled_out : tuple of str
+        Effects that a check has ruled out.
     """
 
     recordings: tuple[str, ...] = ("RECORDING",)
     references: tuple[str, ...] = ()
     rest: str = "--case CASE"
+    ruled_out: tuple[str, ...] = ()
 
-    def command(self, run: str = "", reference: str = "") -> str:
-        """Command that diagnoses the same again, or with one more file."""
+    def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
+        """Command that diagnoses the same again, with one more file or one effect less."""
         files = [*self.recordings, *([run] if run else [])]
         known = [*self.references, *([reference] if reference else [])]
+        gone = [*self.ruled_out, *([ruled_out] if ruled_out else [])]
         words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
-        return " ".join(words)
+        return " ".join([*words, *(["--ruled-out", *gone] if gone else [])])
 
     def comparison(self, reference: str) -> str:
         """Command that sets the first recording beside a reference."""
@@ -110,7 +113,15 @@ class Suggestion:
         "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
         recording), "air" (write it down), or "" when nothing is called for.
     commands : tuple of str
-        What to type then.
+        What to type then; after a check, if the effect is not there.
+    checks : str
+        Effect that a check looks for.
+    minutes : float
+        Time that it takes on a stand [min].
+    gain : float
+        Expected share of the doubt between the explanations that it takes away [1].
+    otherwise : Suggestion or None
+        What to do if there can be no such reference.
     """
 
     text: str
@@ -120,12 +131,18 @@ class Suggestion:
     after: float
     kind: str = "run"
     commands: tuple[str, ...] = ()
+    checks: str = ""
+    minutes: float = 0.0
+    gain: float = 0.0
+    otherwise: Suggestion | None = None
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
-                "commands": list(self.commands)}  # fmt: skip
+                "commands": list(self.commands), "checks": self.checks, "minutes": self.minutes,
+                "gain": self.gain,
+                "otherwise": None if self.otherwise is None else self.otherwise.document()}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -229,11 +246,6 @@ def _relative(u: Array, y: Array) -> float:
     return float(np.median(u[known] / np.maximum(np.abs(y[known]), 1e-12))) if known.any() else float("nan")
 
 
-def _distance(problem: Problem, covariance_of: noise.Hyper, a: Array, b: Array) -> float:
-    d = whitener(noise.covariance(problem, covariance_of), problem.u)(a - b)
-    return float(np.sqrt(d @ d))
-
-
 def nothing_called_for(found: Evidence) -> Suggestion:
     """What is left to say after "none": nothing to do, and what would show fainter causes."""
     if _referenced(found):
@@ -277,58 +289,98 @@ def _with_reference(part: Part) -> Problem:
     return assemble((part, replace(part, record=replace(part.record, measured=measured, reference=True))))
 
 
-def suggest(
-    found: Evidence, first: tuple[str, dict[str, Any]], second: tuple[str, dict[str, Any]] | None,
-    reference: bool = False,
-) -> Suggestion:  # fmt: skip
-    """Choose the run that separates two explanations best, or a check where no run is worth its time.
+@dataclass(frozen=True)
+class Rival:
+    """An explanation that a run may tell from others: effect ("" for nothing), settings, probability [1]."""
 
-    With ``reference`` the question is open: a run without the cause may settle more than any other.
+    effect: str
+    settings: Mapping[str, Any]
+    probability: float
+
+
+def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, reference: bool = False) -> Suggestion:
+    """Choose the run that takes away most doubt between explanations a minute, or a check where no run is worth it.
+
+    With ``reference`` a run without the cause is one of the choices. ``unknown`` is the probability that nothing listed
+    explains the readings: only a reference tells that from the listed ones.
+
+    Notes
+    -----
+    The doubt is the probability that two draws of the explanation differ, sum over pairs of 2 p_i p_j. A run that takes
+    the pair d standard deviations further apart leaves the share 2 Phi(-d/2) of it, the error of the best test (the
+    pairwise bound on Bayes' error; discrimination of rival models: Hunter and Reiner, Technometrics 7, 1965, p. 307;
+    Box and Hill, Technometrics 9, 1967, p. 57; neither checked). That a reference settles the unknown is an assumption.
     """
-    pair = [effect_of(*first)] + ([effect_of(*second)] if second else [])
-    names = (first[0], second[0] if second else "nothing")
-    hyper = found.states[0].hyper
-    problem = found.problem
+    from scipy.special import ndtr
 
-    def signatures(p: Problem) -> list[Array]:
-        s = [p.signature((e,)) for e in pair]
-        return s if len(s) == 2 else [s[0], np.zeros_like(s[0])]
+    hyper, problem = found.states[0].hyper, found.problem
+    effect = [None if not r.effect else effect_of(r.effect, dict(r.settings)) for r in rivals]
+    p = np.array([max(r.probability, _LEAST) for r in rivals])
+    share = p / (p.sum() + unknown)
+    doubt = np.outer(share, share) - np.diag(share**2)
+    of_unknown = 2.0 * float(share.sum()) * unknown / (p.sum() + unknown)
+    total = float(doubt.sum()) + of_unknown
 
-    alone = assemble_alone(problem)
-    now = _distance(alone, hyper, *signatures(alone))
-    best: tuple[float, _Option | None] = (now, None)
     part = problem.parts[0]
+    now = _distances(assemble_alone(problem), effect, hyper)
+    names = tuple(r.effect or "nothing" for r in rivals[:2])
+    before = float(now[0, 1])
+
+    def choice(text: str, points: tuple[dict[str, float], ...], plan: Problem, kind: str, time: float) -> Suggestion:
+        there = _distances(plan, effect, hyper)
+        told = np.sqrt(np.maximum(there**2 - now**2, 0.0))
+        taken = float(np.sum(doubt * (1.0 - 2.0 * ndtr(-0.5 * told))))
+        gain = (taken + (of_unknown if kind == "reference" else 0.0)) / total if total > 0.0 else 0.0
+        return Suggestion(text, points, names, before, float(there[0, 1]), kind, minutes=time, gain=gain)
+
+    choices = []
     for tried in _options(part):
         try:
-            extended = _extended(part, tried)
-            a, b = signatures(extended)
+            choices.append(choice(tried.text, _points(part.record, tried), _extended(part, tried), "run",
+                                  minutes("run", tried.rpm.size)))  # fmt: skip
         except (ValueError, FloatingPointError):
             continue
-        if not (np.isfinite(a).all() and np.isfinite(b).all()):
-            continue
-        gained = _distance(extended, hyper, a, b)
-        if gained > best[0]:
-            best = (gained, tried)
     if reference and not _referenced(found):
-        known = _with_reference(part)
-        a, b = signatures(known)
-        gained = _distance(known, hyper, a, b) if np.isfinite(a).all() and np.isfinite(b).all() else now
-        if best[0] < _BETTER * max(gained, now) or best[0] < _ENOUGH:
-            return Suggestion(REFERENCE, (), names, now, max(gained, now), "reference")
-    after, option = best
-    apart, worth = now >= _ENOUGH and not reference, after >= _WORTH * now
-    aims = ("confirm", "rule out")
-    look = next(
-        (f"to {aim} {n}, {check}" for aim, n in zip(aims, names, strict=True) if (check := _check(n, part.record))), ""
-    )
-    # what is told apart already, or would still be alike, is rather looked at than run
-    if option is not None and worth and not (look and (apart or after < _ENOUGH)):
-        return Suggestion(option.text, _points(problem.parts[0].record, option), names, now, after)
+        time = minutes("reference", len(part.record))
+        choices.append(choice(REFERENCE, (), _with_reference(part), "reference", time))
+    # a run that leaves the two leading explanations alike is not worth it; what is told apart is rather looked at
+    able = [c for c in choices if c.gain * total >= _WORTH and (c.kind == "reference" or c.after >= _ENOUGH)]
+    able.sort(key=lambda c: -c.gain / c.minutes)
+    certain = before >= _ENOUGH and not reference
+    look = _look(names, part.record)
+    if able and not (look and certain):
+        run = next((c for c in able if c.kind == "run"), look)
+        return replace(able[0], otherwise=run) if able[0].kind == "reference" else able[0]
     if look:
-        return Suggestion(look, (), (), now, now, "look")
-    if apart:
-        return Suggestion("no further run is needed; none would tell more", (), (), now, now, "")
-    return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), now, now)
+        return replace(look, before=before, after=before)
+    if certain:
+        return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
+    if reference and not _referenced(found):
+        return replace(choices[-1], otherwise=look)
+    return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), before,
+                      before)  # fmt: skip
+
+
+def _distances(plan: Problem, of: Sequence[effects.Effect | None], hyper: noise.Hyper) -> Array:
+    """Distances between explanations in a plan, in standard deviations, (N, N); zero where one has no solution."""
+    shown = [np.zeros(plan.y.size) if e is None else plan.signature((e,)) for e in of]
+    white = whitener(noise.covariance(plan, hyper), plan.u)
+    y = np.array([white(s) if np.isfinite(s).all() else np.full(s.size, np.nan) for s in shown])
+    return np.asarray(np.nan_to_num(np.linalg.norm(y[:, None] - y[None], axis=-1)))
+
+
+def _look(names: Sequence[str], record: Record) -> Suggestion | None:
+    """A check by hand that confirms the first explanation or rules out the second, whichever there is."""
+    for aim, name in zip(("confirm", "rule out"), names, strict=False):
+        if check := _check(name, record):
+            return Suggestion(f"to {aim} {name}, {check}", (), (), 0.0, 0.0, "look", checks=name,
+                              minutes=minutes("look", 0))  # fmt: skip
+    return None
+
+
+def minutes(kind: str, points: int) -> float:
+    """Time that a stand needs for a step [min]; declared, by experience with benches: a reference undoes the cause."""
+    return {"run": 4.0, "reference": 15.0, "look": 10.0}[kind] + 0.2 * points
 
 
 def correction(names: Sequence[str], settings: Mapping[str, Mapping[str, Any]], record: Record) -> Suggestion | None:

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
-from bemt.proof.rigs import Rig, conditions
+from bemt.proof.rigs import Rig, conditions, extended
 from bemt.proof.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.proof.stand import Stand, record
+from bemt.proof.stand import Stand, full_scales, record
 from bemt.proof.truth import TrueAnswer
 from bemt.proof.truth_ccblade import EXPRESSIBLE
 from bemt.proof.truth_section import SectionPhysics
 from bemt.proof.truth_world import Conditions, TrueLoads, World, loads
 
-__all__ = ["Bench", "Item", "case_text", "make_item", "recording_text", "stations_text"]
+__all__ = ["Bench", "Item", "case_text", "further_run", "make_item", "recording_text", "stations_text"]
 
 Array = NDArray[np.float64]
 _DIGITS = 6
@@ -147,11 +147,24 @@ def _quality(rng: np.random.Generator, quiet: bool) -> Stand:
     )  # fmt: skip
 
 
-def make_item(
-    bench: Bench, ids: tuple[str, ...], strengths: tuple[float, ...], seed: int, kind: str,
-    known: Collection[str] = (), standard: Collection[str] = (),
-) -> Item:  # fmt: skip
-    """Measure a truth with concealed causes."""
+@dataclass(frozen=True)
+class Hidden:
+    """Rotor and stand of an item, with and without their causes, and the random numbers that are still to be drawn."""
+
+    causes: list[Cause]
+    changes: list[Change]
+    world: World
+    stand: Stand
+    own_world: World
+    own_stand: Stand
+    stated: bool
+    referenced: bool
+    rng: np.random.Generator
+    more: np.random.Generator
+
+
+def hidden(bench: Bench, ids: Sequence[str], strengths: Sequence[float], seed: int, kind: str) -> Hidden:
+    """Draw rotor and stand of an item from its seed; the same whenever it is asked."""
     rng = np.random.default_rng(seed)
     causes = [CAUSES[i] for i in ids]
     changes = [c.make(f, bench.rig, bench.rows, rng) for c, f in zip(causes, strengths, strict=True)]
@@ -179,6 +192,17 @@ def make_item(
         if "camber" in shape:
             shape["camber"] += world.section.camber
         world, stand = applied(world, stand, replace(change, world=own, section=shape))
+    return Hidden(causes, changes, world, stand, own_world, own_stand, stated, referenced, rng, more)
+
+
+def make_item(
+    bench: Bench, ids: tuple[str, ...], strengths: tuple[float, ...], seed: int, kind: str,
+    known: Collection[str] = (), standard: Collection[str] = (),
+) -> Item:  # fmt: skip
+    """Measure a truth with concealed causes."""
+    h = hidden(bench, ids, strengths, seed, kind)
+    causes, changes, world, stand, stated, referenced = h.causes, h.changes, h.world, h.stand, h.stated, h.referenced
+    own_world, own_stand, rng, more = h.own_world, h.own_stand, h.rng, h.more
     real, columns = bench.measure(world, stand, rng)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     if np.mean(good) < 0.8:
@@ -229,6 +253,7 @@ def make_item(
         "seed": seed,
         "referenced": "reference.csv" in files,
         "stated": stated,
+        "air_known": air_known,
         "rows": int(np.count_nonzero(good)),
         "stand": {k: v for k, v in vars(stand).items() if k in _QUALITY},
     }
@@ -259,6 +284,24 @@ def _shown(
         full = float(np.nanmax(np.abs(value)))
         shown[name] = np.hypot(np.hypot(stand.noise, stand.session) * np.abs(value), stand.floor * full)
     return shown
+
+
+def further_run(bench: Bench, entry: Mapping[str, Any], runs: Sequence[Sequence[Mapping[str, float]]]) -> str:
+    """The last of the runs that were asked for, as CSV, on the rotor and stand of an item; "" if it has no solution."""
+    h = hidden(bench, entry["causes"], entry["strengths"], int(entry["seed"]), entry["set"])
+    rows = bench.rows
+    for points in runs:
+        rows = extended(rows, points)
+    wider = Bench(bench.rig, bench.plan, rows)
+    # each cell keeps the full scale that it had
+    scales = full_scales(bench.measure(h.world, h.stand)[0])
+    rng = np.random.default_rng((int(entry["seed"]), 2, len(runs)))
+    real, columns = wider.measure(h.world, h.stand, rng, scales=scales)
+    air_known = "air_density" not in entry["causes"] and any("pressure_Pa" in p for p in runs[-1])
+    shown = _shown(wider, real, columns, h.stand, air_known or bool(entry.get("air_known")), rng, h.stated)
+    last = np.arange(rows.rpm.size) >= rows.rpm.size - len(runs[-1])
+    good = last & np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
+    return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
 
 
 def _removable(causes: Sequence[Cause]) -> bool:

@@ -24,7 +24,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
-__all__ = ["SCHEMA", "conceal", "diagnose_all", "diagnose_folder", "proof", "prove"]
+__all__ = ["SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "proof", "prove"]
 
 SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
 REAL = "real"
@@ -78,22 +78,25 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
         given = [name for name in _GIVEN if (folder / name).exists()]
         for name in given:
             shutil.copy(folder / name, box)
-        command = [sys.executable, "-m", "bemt", *_question(folder), "--json"]
-        # the numerical libraries' own threads would fight over the cores that --jobs shares out
-        one = {
-            name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-        }
-        found = str(Path(__file__).resolve().parents[2])
-        path = os.pathsep.join(p for p in (found, os.environ.get("PYTHONPATH", "")) if p)
-        try:
-            ran = subprocess.run(command, cwd=box, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
-                                 text=True, timeout=TIME_LIMIT_S, check=False)  # fmt: skip
-            answer = json.loads(ran.stdout)
-            return (answer if "verdict" in answer else None), ran.stderr.strip()
-        except subprocess.TimeoutExpired:
-            return None, f"no answer within {TIME_LIMIT_S:g} s"
-        except ValueError:
-            return None, ran.stderr.strip() or "no JSON document on the output"
+        return asked(Path(box), _question(folder))
+
+
+def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
+    """Answer to a command in a folder, and what went wrong where there is none."""
+    command = [sys.executable, "-m", "bemt", *words, "--json"]
+    # the numerical libraries' own threads would fight over the cores that --jobs shares out
+    one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+    found = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(p for p in (found, os.environ.get("PYTHONPATH", "")) if p)
+    try:
+        ran = subprocess.run(command, cwd=folder, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
+                             text=True, timeout=TIME_LIMIT_S, check=False)  # fmt: skip
+        answer = json.loads(ran.stdout)
+        return (answer if "verdict" in answer else None), ran.stderr.strip()
+    except subprocess.TimeoutExpired:
+        return None, f"no answer within {TIME_LIMIT_S:g} s"
+    except ValueError:
+        return None, ran.stderr.strip() or "no JSON document on the output"
 
 
 def _question(folder: Path) -> list[str]:

@@ -2,40 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from bemt.proof.causes import CAUSES
 from bemt.proof.items import Bench
+from bemt.proof.rigs import extended
 from bemt.proof.separation import yardstick
 from bemt.proof.stand import Stand
-from bemt.proof.truth_world import Conditions
 
-__all__ = ["extended", "resolves"]
+__all__ = ["resolves"]
 
 _ENOUGH = 3.0
-
-
-def extended(rows: Conditions, points: Sequence[Mapping[str, float]]) -> Conditions:
-    """Rows of a plan with recommended points behind them, as a run of its own."""
-
-    def column(name: str, key: str, usual: float, scale: float = 1.0) -> np.ndarray[Any, np.dtype[np.float64]]:
-        new = [float(p[key]) * scale if key in p else usual for p in points]
-        return np.concatenate((getattr(rows, name), new))
-
-    last = float(rows.time[-1]) + 240.0
-    moment = np.concatenate((rows.time, [float(p.get("time_s", last + 12.0 * k)) for k, p in enumerate(points)]))
-    wall, gap = (float(np.median(v)) for v in (rows.wall, rows.gap))
-    return Conditions(
-        column("rpm", "rpm", float(np.median(rows.rpm))), column("airspeed", "airspeed_m_s", 0.0),
-        column("temperature_C", "temperature_C", float(np.median(rows.temperature_C))),
-        column("pressure_Pa", "pressure_Pa", float(np.median(rows.pressure_Pa))), moment,
-        np.concatenate((rows.since_start, np.full(len(points), 600.0))), column("wall", "wall_distance_m", wall),
-        column("gap", "tip_gap_mm", gap, 1e-3), np.concatenate((rows.run, np.full(len(points), rows.run.max() + 1))),
-        rows.transient,
-    )  # fmt: skip
 
 
 def resolves(bench: Bench, entry: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
