@@ -123,6 +123,8 @@ class DuctFlow:
         Drag of the outer wall over 1/2 rho V^2 [m2].
     contraction, capture : float
         Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1].
+    bend : float
+        Departure of the jet's speed from a straight line between the two, see :mod:`bemt.bem.duct_stream` [1].
     area : float
         Swept annulus, pi (R^2 - Rhub^2) [m2].
     exit_hub : float
@@ -138,6 +140,7 @@ class DuctFlow:
     drag_area: float = 0.0
     contraction: float = 1.0
     capture: float = 1.0
+    bend: float = 0.0
     area: float = float("nan")
     exit_hub: float = float("nan")
 
@@ -195,6 +198,7 @@ def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
         drag_area=WALL_FRICTION * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
         contraction=jet.at_rest,
         capture=jet.in_stream + left * (jet.at_rest - jet.in_stream),
+        bend=(1.0 - left) * jet.bend,
         area=rotor.annulus_area,
         exit_hub=duct.exit_hub_radius,
     )

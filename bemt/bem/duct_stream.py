@@ -19,7 +19,7 @@ with exit ratios of 0.85 to 1.15 (reports/studies/duct_jet.py).
 With nu = V / V_j the flow through the exit is, to within the bend's fit, ::
 
     w_exit = c_V V + c_0 (V_j - V)            for a sheet of gamma = V_j - V
-    V_j = V + (w_exit - c_V V) (1 / c_0 + bend V / sqrt(w_exit^2 + V^2))
+    V_j = V + (y - c_V / c_0 V) (1 + bend V / sqrt(y^2 + V^2))        y = w_exit / c_0
 """
 
 from __future__ import annotations
@@ -79,11 +79,10 @@ def _solved(
                 bore_end, te)  # fmt: skip
     stream = _Stream.around(duct, hub)
     in_stream, at_rest = (float(np.clip(stream.through(nu) / duct.exit_area, *_RANGE)) for nu in (1.0, 0.0))
-    # excess of V_j over the straight line, per what the bend multiplies
-    w = np.array([stream.through(nu) for nu in _NU]) / duct.exit_area
     nu = np.array(_NU)
-    gained = w - in_stream * nu
-    off, per = 1.0 - nu - gained / at_rest, gained * nu / np.hypot(w, nu)
+    y = np.array([stream.through(v) for v in _NU]) / duct.exit_area / at_rest
+    straight = y - in_stream / at_rest * nu
+    off, per = 1.0 - nu - straight, straight * nu / np.hypot(y, nu)
     return JetArea(at_rest, in_stream, float(np.clip(off @ per / (per @ per), -0.5, 0.5)))
 
 
