@@ -7,7 +7,7 @@ faults: no separation, no friction, its own pressure integral lies 4 % below its
 X-22A: NASA TN D-4142, full scale, as digitised (``shared/data/x22a``); sections and exit are not known: assumed.
 Ka 4-70 in nozzle 19A: Oosterveld (1970), regression in water (``shared/data/ducted_marine``); the nozzle is taken as
 lip, bore and cone of its ordinates, the blades as face-pitch sections of half their thickness as camber; its torque
-is 18 to 49 % too large here, see reports/ds30_fan.md.
+is 13 to 43 % too large here, see docs/duct.md.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import pytest
 from bemt.air import Air
 from bemt.bem import duct as duct_model
 from bemt.bem import solver
-from bemt.bem.duct_stream import jet_area
+from bemt.bem.duct_stream import Stream, jet_area
 from bemt.bem.model import Model
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
@@ -75,6 +75,33 @@ def test_nozzles_squeeze_the_jet_and_the_stream_does_where_the_duct_tapers() -> 
     assert all(jet.in_stream < jet.at_rest for jet in at)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_bend_reproduces_the_potential_flow_of_any_duct(seed: int) -> None:
+    """Rest, flight and free flow: the jet's speed from the flow through the exit, against the solved sheet."""
+    rng = np.random.default_rng(seed)
+    lip, hub = rng.uniform(0.03, 0.2), rng.uniform(0.0, 0.4)
+    duct = Duct(1.0, rng.uniform(lip + 0.4, 1.6), lip, exit_radius=rng.uniform(0.93, 1.1), exit_hub_radius=hub * 0.9,
+                te_thickness=0.02)  # fmt: skip
+    jet, stream = jet_area(duct, hub), Stream.around(duct, hub)
+    for nu in np.linspace(0.0, 1.0, 11):
+        y = stream.through(nu) / duct.exit_area / jet.at_rest
+        found = nu + (y - jet.in_stream / jet.at_rest * nu) * (1.0 + jet.bend * nu / math.hypot(y, nu))
+        assert found == pytest.approx(1.0, abs=0.005)
+
+
+def test_the_sheet_is_strongest_at_the_exit_and_sucks_more_than_one_of_its_final_strength() -> None:
+    """Bernoulli's equation along the sheet: gamma V_m is the same everywhere."""
+    stream = Stream.around(Duct(1.0, 0.9, 0.12, exit_radius=1.0, te_thickness=0.015), 0.22)
+    for nu in (0.0, 0.5):
+        gamma = stream.strength(nu)
+        mean = np.hypot(*(nu * stream.sheet_in_stream + np.einsum("sjx,j->sx", stream.sheet_of_sheet, gamma)).T)
+        near = ~stream.settled
+        assert (gamma * mean)[near] == pytest.approx(0.5 * (1.0 - nu * nu), rel=1e-6)
+        assert gamma[near].max() > 1.03 * (1.0 - nu)
+        uniform = nu * stream.exit_in_stream + stream.exit_of_sheet.sum() * (1.0 - nu)
+        assert stream.through(nu) > 1.01 * 2.0 * math.pi * uniform
+
+
 def test_the_stream_leaves_a_steep_boattail() -> None:
     """Outer walls that fall by 18 to 24 degrees: from attached to left, with base pressure on what faces back."""
     found = []
@@ -84,12 +111,14 @@ def test_the_stream_leaves_a_steep_boattail() -> None:
         x = np.linspace(0.0, duct.length, 201)
         r = duct.outer(x)
         assert math.degrees(math.atan2(r.max() - r[-1], x[-1] - x[r.argmax()])) == pytest.approx(angle, abs=1.0)
-        flow = duct_model.duct_flow(duct, Rotor(helix(0.2, 0.1), 4))
+        rotor = Rotor(helix(0.2, 0.1), 4)
+        flow = duct_model.duct_flow(duct, rotor)
         skin = duct_model.WALL_FRICTION * duct_model.FORM_FACTOR * 2.0 * math.pi * 0.11 * duct.length
         base = duct_model.BASE_PRESSURE * math.pi * float(r.max() ** 2 - r[-1] ** 2)
-        jet = jet_area(duct, 0.0)
+        jet = jet_area(duct, rotor.Rhub)
         found.append((flow.drag_area - skin) / base)
-        assert flow.capture == pytest.approx(jet.in_stream + found[-1] * (jet.at_rest - jet.in_stream), abs=5e-3)
+        assert flow.capture == pytest.approx(jet.in_stream + found[-1] * (jet.at_rest - jet.in_stream))
+        assert flow.bend == pytest.approx((1.0 - found[-1]) * jet.bend, abs=1e-12)
     assert found == pytest.approx([0.0, 0.5, 1.0, 1.0], abs=1e-6)
 
 
@@ -138,11 +167,11 @@ def f1(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Model:
     return ready(tmp_path_factory.mktemp("f1"), F1, files)
 
 
-@pytest.mark.parametrize(("friction", "limits"), [(False, (0.02, 0.025, 0.025)), (True, (0.03, 0.05, 0.03))])
+@pytest.mark.parametrize(("friction", "limits"), [(False, (0.03, 0.012, 0.03)), (True, (0.06, 0.04, 0.03))])
 def test_f1_under_the_conditions_of_dfdc(
     f1: Model, shared_data: Path, friction: bool, limits: tuple[float, float, float]
 ) -> None:
-    """No gap and no lip loss; DFDC has no friction either, which is 2 points of share at rest, 5 in flight."""
+    """No gap and no lip loss; DFDC has no friction either, which is 0.6 points of share at rest, 4 at J 0.55."""
     found = [
         r
         for r in rows(shared_data / "dfdc" / "reference.csv")
@@ -253,13 +282,13 @@ density_kg_m3 = 1.225
     measured = [
         [float(v) for v in list(r.values())[:4]] for r in rows(shared_data / "x22a" / "x22a_measured_CT_CP_vs_J.csv")
     ]
-    for angle, limits in ((19, (0.012, 0.030)), (29, (0.022, 0.115))):
+    for angle, CP_limit in ((19, 0.08), (29, 0.10)):
         table = stations([(x, c, b + angle - 20.0) for x, c, b in shape if x <= 1.0])
         fan = ready(tmp_path / str(angle), body, {"stations.csv": table})
         q = np.array([m for m in measured if m[0] == angle])
         p = fan.solve(1200.0, q[:, 1] * 20.0 * 2.0 * R, Air.from_density(1.225))
-        for got, known, limit in ((p.CT, q[:, 2], limits[0]), (p.CP, q[:, 3], limits[1])):
-            assert np.median(np.abs(got / known - 1.0)) < limit
+        assert np.max(np.abs(p.CT / q[:, 2] - 1.0)[q[:, 1] < 0.56]) < 0.05
+        assert np.median(np.abs(p.CP / q[:, 3] - 1.0)) < CP_limit
 
 
 @pytest.mark.parametrize("pitch", [0.6, 0.8, 1.0, 1.2, 1.4])
@@ -302,5 +331,5 @@ density_kg_m3 = 1.225
     J, K, N = (np.array([float(r[k]) for r in found]) for k in ("J", "KT_total", "KT_nozzle"))
     p = fan.solve(9000.0, J * 150.0 * D, Air.from_density(1.225))
     some = K > 0.15 * K[0]
-    assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.05
-    assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.038  # the swirl sucks on the hub: not on the nozzle
+    assert np.median(np.abs(p.CT / K - 1.0)[some]) < 0.02
+    assert np.median(np.abs(p.duct_share - N / K)[some]) < 0.02

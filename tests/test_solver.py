@@ -93,7 +93,7 @@ def compiled_residual(ducted: bool, layout: str) -> Any:
     @njit
     def run(phi: float, k: int, Omega: float, V: float, st: Any, tab: Any, par: Any) -> Any:
         fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12],
-              par[13])
+              par[13])  # fmt: skip
         o = R.N_NUM
         g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
              par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip

@@ -71,7 +71,7 @@ BASE_PRESSURE = 0.15
 _CORE_STEPS = 12
 
 # Turbulent skin friction of duct walls at Re of 1e5 to 1e7, Prandtl's 0.455/log10(Re)^2.58 between 0.007 and 0.003.
-WALL_FRICTION = 0.005
+WALL_FRICTION, WALL_FRICTION_RANGE = 0.005, (0.003, 0.007)
 # Profile drag of a ring aerofoil over friction of its wetted side: Hoerner (1965), Fluid-Dynamic Drag, ch. 6,
 # 1 + 2 t/c for t/c about 0.12.
 FORM_FACTOR = 1.25
@@ -181,21 +181,26 @@ class DuctFlow:
         return np.asarray(np.pi * rho * D)
 
 
-def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
-    """Momentum numbers of a duct around a rotor."""
+def hydraulic_diameter(duct: Duct, rotor: Rotor) -> float:
+    """Twice the height of the passage [m]."""
+    return 2.0 * (duct.inner_radius - rotor.Rhub)
+
+
+def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) -> DuctFlow:
+    """Momentum numbers of a duct around a rotor, with the friction coefficient of its walls [1]."""
     duct.check(rotor)
-    hydraulic = 2.0 * (duct.inner_radius - rotor.Rhub)
+    hydraulic = hydraulic_diameter(duct, rotor)
     outer = duct.inner_radius + duct.lip_radius
     jet = jet_area(duct, rotor.Rhub)
     left, base = _boattail(duct)
     return DuctFlow(
         wake_ratio=duct.exit_area / rotor.annulus_area,
-        wall_loss=WALL_FRICTION * 4.0 * duct.length / hydraulic,
+        wall_loss=wall_friction * 4.0 * duct.length / hydraulic,
         lip_loss=lip_loss(duct.lip_radius / hydraulic).nominal,
         stator=STATOR_RECOVERY if duct.stator is not None else 0.0,
         gap=duct.gap,
         span=rotor.R - rotor.Rhub,
-        drag_area=WALL_FRICTION * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
+        drag_area=wall_friction * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
         contraction=jet.at_rest,
         capture=jet.in_stream + left * (jet.at_rest - jet.in_stream),
         bend=(1.0 - left) * jet.bend,

@@ -43,6 +43,8 @@ _SETTLED = 10.0
 # Speed ratios V / V_j at which the bend is fitted, and steps in which the sheet finds its strength.
 _NU = (0.2, 0.4, 0.6, 0.8)
 _STEPS, _TOL = 200, 1e-9
+# A sheet is never slower than this share of the sum of both speeds: keeps the first steps bounded.
+_SLOWEST = 0.15
 # Noses of hubs over their radius, tails beyond the exit over the radius there: declared.
 NOSE, TAIL = 1.5, 3.0
 # Outside of these no duct is known; the potential flow of a shape that closes its own exit.
@@ -77,7 +79,7 @@ def _solved(
 ) -> JetArea:  # fmt: skip
     duct = Duct(1.0, length, lip, 0.0, exit_radius, exit_hub, rotor_x, None, lip_length / lip if lip > 0.0 else 1.0,
                 bore_end, te)  # fmt: skip
-    stream = _Stream.around(duct, hub)
+    stream = Stream.around(duct, hub)
     in_stream, at_rest = (float(np.clip(stream.through(nu) / duct.exit_area, *_RANGE)) for nu in (1.0, 0.0))
     nu = np.array(_NU)
     y = np.array([stream.through(v) for v in _NU]) / duct.exit_area / at_rest
@@ -86,7 +88,7 @@ def _solved(
     return JetArea(at_rest, in_stream, float(np.clip(off @ per / (per @ per), -0.5, 0.5)))
 
 
-class _Stream(NamedTuple):
+class Stream(NamedTuple):
     """Flow through a duct as far as it is linear: what the stream and each ring of the jet's sheet do."""
 
     exit_in_stream: float  # Stream function of the duct's wall in a stream of 1, no jet
@@ -96,7 +98,7 @@ class _Stream(NamedTuple):
     settled: Array  # Panels far behind, (S,)
 
     @classmethod
-    def around(cls, duct: Duct, hub: float) -> _Stream:
+    def around(cls, duct: Duct, hub: float) -> Stream:
         """Solve walls and body for the stream and for each panel of the sheet."""
         wall = _wall(duct)
         bodies = [wall] + ([_body(duct, hub)] if hub > 0.0 else [])
@@ -120,20 +122,25 @@ class _Stream(NamedTuple):
         by_walls = np.einsum("skx,kc->scx", np.concatenate([_velocity(on, b) for b in bodies], axis=1), found[:n])
         by_walls[:, 0, 0] += 1.0
         by_walls[:, 1:] += _velocity(on, sheet)
-        return cls(float(found[n, 0]), found[n, 1:], by_walls[:, 0], by_walls[:, 1:], on[:, 0] - x[0] > _SETTLED * radius)
+        settled = on[:, 0] - x[0] > _SETTLED * radius
+        return cls(float(found[n, 0]), found[n, 1:], by_walls[:, 0], by_walls[:, 1:], settled)
 
-    def through(self, nu: float) -> float:
-        """Volume flow through the exit in a stream of ``nu`` with a jet of 1."""
+    def strength(self, nu: float) -> Array:
+        """Strength of the sheet's panels in a stream of ``nu`` with a jet of 1, (S,)."""
         head, far = 0.5 * (1.0 - nu * nu), 1.0 - nu
         gamma = np.full(self.settled.size, far)
         for _ in range(_STEPS):
             mean = np.hypot(*(nu * self.sheet_in_stream + np.einsum("sjx,j->sx", self.sheet_of_sheet, gamma)).T)
-            new = np.where(self.settled, far, head / np.maximum(mean, 0.15 * (1.0 + nu)))
+            new = np.where(self.settled, far, head / np.maximum(mean, _SLOWEST * (1.0 + nu)))
             step = 0.5 * (new - gamma)
             gamma = gamma + step
             if np.max(np.abs(step)) < _TOL:
                 break
-        return float(2.0 * np.pi * (nu * self.exit_in_stream + self.exit_of_sheet @ gamma))
+        return gamma
+
+    def through(self, nu: float) -> float:
+        """Volume flow through the exit in a stream of ``nu`` with a jet of 1."""
+        return float(2.0 * np.pi * (nu * self.exit_in_stream + self.exit_of_sheet @ self.strength(nu)))
 
 
 def _wall(duct: Duct) -> Array:
@@ -203,7 +210,7 @@ def _ring(x: Array, r: Array, x1: Array, r1: Array) -> Array:
 
 
 def _velocity(at: Array, nodes: Array) -> Array:
-    """Axial and radial velocity at (M, 2) points per unit strength of each panel, mean of both sides on it, (M, N, 2)."""
+    """Axial and radial velocity at (M, 2) points per unit strength of each panel, on it the mean, (M, N, 2)."""
     a, b = nodes[:-1], nodes[1:]
     L = np.hypot(*(b - a).T)
     middle = 0.5 * (a + b)

@@ -219,7 +219,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     """Solve every station of one operating point and integrate."""
     wide()
     fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12],
-          par[13])
+          par[13])  # fmt: skip
     o = N_NUM
     mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
     g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],

@@ -58,7 +58,8 @@ import numpy as np
 from bemt.bem.vecmath import inlined, log, sincos
 
 # Indices of the numbers that effects and duct may set (array ``num``).
-N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM, N_BEND = range(14)
+N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM = range(13)
+N_BEND = 13
 N_NUM = 14
 
 _EPS = 1e-9
@@ -268,7 +269,9 @@ def jet_speed(w, V, fx):
     i_size = 1.0 / math.sqrt(y * y + V * V + 1e-30)
     part = fx[N_BEND] * i_size if V > 0.0 else 0.0
     over = part * V * rise * i_size * i_size
-    return V + rise * (1.0 + part * V), k_w * (1.0 + part * V - over * y), 1.0 - idle + part * (rise - idle * V) - over * V
+    by_w = k_w * (1.0 + part * V - over * y)
+    by_V = 1.0 - idle + part * (rise - idle * V) - over * V
+    return V + rise * (1.0 + part * V), by_w, by_V
 
 
 @inlined

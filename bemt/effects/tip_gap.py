@@ -9,6 +9,9 @@ import numpy as np
 
 from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
 
+GAP_LOSS = 1.0, 2.0
+"""Points of pressure rise lost per point of gap over span, as measured on compressor rotors [1]."""
+
 
 @dataclass(frozen=True)
 class TipGap(Effect):
@@ -34,7 +37,7 @@ class TipGap(Effect):
     along = ("tip_gap_m",)
     sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
     parameters = (
-        Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),
+        Parameter("loss", "1", *GAP_LOSS, "Wisler 1985; Cumpsty 1989, not checked", 3),
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),
     )
 
