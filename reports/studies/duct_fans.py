@@ -10,7 +10,7 @@ import csv
 import math
 import os
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +149,8 @@ def x22a(data: Path, folder: Path, angle: int) -> Known:
     shape = [(float(r["r_over_R"]), float(r["chord_m"]) / 1.0668, float(r["beta_geom_deg(beta75=20)"]))
              for r in rows(data / "x22a" / "x22a_geometry.csv")]  # fmt: skip
     table = stations([(x, c, b + angle - 20.0) for x, c, b in shape if x <= 1.0])
-    q = np.array([[float(v) for v in list(r.values())[:4]] for r in rows(data / "x22a" / "x22a_measured_CT_CP_vs_J.csv")])
+    found = rows(data / "x22a" / "x22a_measured_CT_CP_vs_J.csv")
+    q = np.array([[float(v) for v in list(r.values())[:4]] for r in found])
     q = q[q[:, 0] == angle]
     case = made(folder, X22A, stations=table)
     return Known(f"X-22A, {angle} deg", case, q[:, 1], q[:, 2], q[:, 3] / (2.0 * math.pi), np.full(len(q), math.nan))
@@ -226,11 +227,10 @@ def table_of(known: Known, case: Case | None = None) -> list[str]:
     out = []
     for i, J in enumerate(known.J):
         share = f"{100 * known.share[i]:.1f}" if math.isfinite(known.share[i]) else "-"
-        CQ = p.CP[i] / (2.0 * math.pi)
-        out.append(
-            f"| {known.name} | {J:.2f} | {p.CT[i]:.4f} | {known.CT[i]:.4f} | {100 * (p.CT[i] / known.CT[i] - 1):+.1f} | "
-            f"{CQ:.5f} | {known.CQ[i]:.5f} | {100 * (CQ / known.CQ[i] - 1):+.1f} | {100 * p.duct_share[i]:.1f} | {share} |"
-        )
+        CT, CQ = (p.CT[i], known.CT[i]), (p.CP[i] / (2.0 * math.pi), known.CQ[i])
+        off = [f"{100 * (ours / other - 1):+.1f}" for ours, other in (CT, CQ)]
+        cells = [known.name, f"{J:.2f}", *(f"{v:.4f}" for v in CT), off[0], *(f"{v:.5f}" for v in CQ), off[1]]
+        out.append(f"| {' | '.join(cells)} | {100 * p.duct_share[i]:.1f} | {share} |")
     return out
 
 
@@ -247,7 +247,8 @@ def draw(panels: list[list[Known]], to: Path) -> None:
             J = np.linspace(0.0, known.J[known.CT > 0.12 * known.CT[0]].max(), 25)
             found = propagate(known.case, known.case.rpm, known.airspeed(J)).points
             seen = known.J <= J.max() + 1e-9
-            for ax, key, scale, reference in ((column[0], "CT", 1.0, known.CT), (column[1], "duct_share", 100.0, known.share)):
+            shown = ("CT", 1.0, known.CT), ("duct_share", 100.0, known.share)
+            for ax, (key, scale, reference) in zip(column, shown, strict=True):
                 y, u = scale * found[key], scale * found.u[key]
                 ax.plot(J, y, color=f"C{k}", label=f"bemt: {known.name}")
                 ax.fill_between(J, y - u, y + u, color=f"C{k}", alpha=0.2, lw=0)
@@ -256,8 +257,9 @@ def draw(panels: list[list[Known]], to: Path) -> None:
         column[0].set(ylabel="thrust coefficient CT", ylim=(0, None))
         column[1].set(xlabel="advance ratio J", ylabel="share of the duct [%]", ylim=(-25, 65))
         column[1].axhline(0.0, color="0.6", lw=0.8)
-    for ax, title in zip(axes[0], ("points: DFDC, a panel code", "points: measured (NASA TN D-4142)", "points: measured (Oosterveld 1970)"), strict=True):
-        ax.set_title(title, fontsize=10)
+    sources = "DFDC, a panel code", "NASA TN D-4142, measured", "Oosterveld 1970, measured"
+    for ax, source in zip(axes[0], sources, strict=True):
+        ax.set_title(f"points: {source}", fontsize=10)
     fig.savefig(to, dpi=110)
 
 
@@ -271,7 +273,7 @@ def main() -> None:
         ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in (0.6, 0.8, 1.0, 1.2, 1.4)]
         print("| rotor | J | CT | reference | % | CQ | reference | % | share % | reference |")
         print("|---|---|---|---|---|---|---|---|---|---|")
-        smooth = Known("F1, no friction", first.case.replaced({"duct.wall_friction": 0.0}), *(first.J, first.CT, first.CQ, first.share))
+        smooth = replace(first, name="F1, no friction", case=first.case.replaced({"duct.wall_friction": 0.0}))
         print("\n".join(line for known in (first, smooth, *x, ka[1], ka[3]) for line in table_of(known)))
         print("\n19A, medians: pitch, |KT|, share in points, |KQ|")
         for known in ka:
@@ -283,8 +285,8 @@ def main() -> None:
         for value in (70.0, pitch):
             for duct in (False, True):
                 off = over_measured(*fan_76(data, at / "76", value, duct)) - 1.0
-                words = "; ".join(f"{100 * np.median(v):+.1f} ({100 * v.min():+.1f} to {100 * v.max():+.1f})" for v in off)
-                print(f"76 mm, pitch {value:.1f} mm, {'ducted' if duct else 'open'}: thrust, torque {words} %")
+                parts = (f"{np.median(v):+.1f} ({v.min():+.1f} to {v.max():+.1f})" for v in 100.0 * off)
+                print(f"76 mm, pitch {value:.1f} mm, {'ducted' if duct else 'open'}: T, Q {'; '.join(parts)} %")
         draw([[first], x, [ka[1], ka[3]]], HOME / "docs" / "img" / "duct.png")
 
 

@@ -1,8 +1,9 @@
 """Jet of a duct with a sheet that follows its stream: ``python reports/studies/duct_jet.py`` (two minutes).
 
-`bemt.bem.duct_stream` leaves the sheet between jet and stream a cylinder.  Here its shape is iterated as well, until the
-stream function is the same all along it, and two things are asked: how far the mass flow through the exit is from that
-of the cylinder, and whether the pressures on duct and body, added to the rotor's force, are the momentum of the jet.
+`bemt.bem.duct_stream` leaves the sheet between jet and stream a cylinder.  Here its shape is iterated as well, until
+the stream function is the same all along it, and two things are asked: how far the mass flow through the exit is from
+that of the cylinder, and whether the pressures on duct and body, added to the rotor's force, are the momentum of the
+jet.
 """
 
 from __future__ import annotations
@@ -28,7 +29,6 @@ class Settled(NamedTuple):
 
     volume: float  # Volume flow through the exit
     force: float  # Force of the pressures on duct and body over density, forward
-    miss: float  # How far the sheet is from its streamline, over the bore's radius
 
 
 def ducts() -> dict[str, tuple[Duct, float]]:
@@ -77,11 +77,12 @@ def follow(duct: Duct, hub: float, nu: float) -> Settled:
         gamma = gamma + RELAX * (wanted - gamma)
         if np.max(np.abs(off)) < TOL * radius and np.max(np.abs(wanted - gamma)) < TOL:
             break
-    return Settled(2.0 * math.pi * float(found[n]), _force(duct, wall, body, found[:n], nu), float(np.max(np.abs(off))) / radius)
+    force = _force(duct, wall, body, found[:n], nu)
+    return Settled(2.0 * math.pi * float(found[n]), force)
 
 
 def _force(duct: Duct, wall: Array, body: Array, speed: Array, nu: float) -> float:
-    """Pressure on duct and body: a ring's strength is the speed outside of it, and behind the disk the head is higher."""
+    """Pressure on duct and body: a ring is as strong as the flow along it is fast; the disk adds head behind it."""
     nodes = np.concatenate([wall[:-1], body[:-1]]), np.concatenate([wall[1:], body[1:]])
     middle = 0.5 * (nodes[0] + nodes[1])
     lip = int(np.argmin(wall[:, 0]))
@@ -94,7 +95,8 @@ def _force(duct: Duct, wall: Array, body: Array, speed: Array, nu: float) -> flo
 
 def main() -> None:
     """Print a table."""
-    print("duct, V / V_j: flow with a cylinder over that with a free sheet - 1; pressures over momentum - 1; largest gamma / (V_j - V)")
+    print("duct, V / V_j: flow with a cylinder over that with a free sheet - 1; pressures over momentum - 1;")
+    print("largest strength of the sheet over V_j - V")
     for name, (duct, hub) in ducts().items():
         stream = ds.Stream.around(duct, hub)
         swept = math.pi * (duct.inner_radius**2 - hub**2)
@@ -103,8 +105,8 @@ def main() -> None:
             total = free.force + 0.5 * (1.0 - nu * nu) * swept
             momentum = free.volume * (1.0 - nu)
             strongest = stream.strength(nu)[~stream.settled].max() / (1.0 - nu)
-            print(f"{name:24s} {nu:4.1f} {100 * (stream.through(nu) / free.volume - 1):+6.2f} % "
-                  f"{100 * (total / momentum - 1):+6.2f} % {strongest:5.2f}   (sheet off by {free.miss:.0e})")  # fmt: skip
+            flow, pressure = 100.0 * (stream.through(nu) / free.volume - 1.0), 100.0 * (total / momentum - 1.0)
+            print(f"{name:24s} {nu:4.1f} {flow:+6.2f} % {pressure:+6.2f} % {strongest:5.2f}")
 
 
 if __name__ == "__main__":
