@@ -4,12 +4,13 @@ Control volume (McCormick 1967, "Aerodynamics of V/STOL Flight", ch. 9; Pereira 
 sec. 2.2, eq. 2.20-2.40; notation ours).  With ``w`` the mean axial speed of an annulus of the disk, ``sigma_w =
 A_exit / A_disk`` and the jet far behind, at the pressure of the stream, at ``V_j``::
 
-    w = sigma_w (c_V V + c_0 (V_j - V))                   continuity
+    w = sigma_w q(V, V_j)                                 continuity
     dT_rotor + dT_stator = 1/2 rho (V_j^2 - V^2) dA       Bernoulli on both sides of the disk
     dT_total = rho w (V_j - V) dA                         momentum of the whole system
 
-The jet's area is ``c_0 A_exit`` at rest and comes to ``c_V A_exit`` where the rotor adds nothing to the stream; both
-are 1 for a long straight pipe and follow from the walls else (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
+The mean speed q through the exit is ``c_0 V_j`` at rest and ``c_V V`` where the rotor adds nothing to the stream: the
+jet's area there is that share of the exit's.  Both are 1 for a long straight pipe; else they and what lies between
+follow from the walls (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
 = 1 / (2 sigma_w c_0); 1/2 gives back the open rotor.  Losses enter Bernoulli as ``1/2 rho (K_wall w^2 + K_lip (w -
 V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure, ``dT_stator = eta_s 1/2 rho (2 v_t)^2
 dA``.  The annuli are independent of each other, as in the open rotor.

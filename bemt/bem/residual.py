@@ -27,9 +27,8 @@ Without swirl v_t = 0, W = UT / cos(phi), and the terms of ``ct`` drop; the brac
 
 Ducted rotor (:mod:`bemt.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque balance
 reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w = G s +
-(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t``
-with the bend of :mod:`bemt.bem.duct_stream`; and Bernoulli's equation across the disk,
-times (t / UT)^2, becomes::
+(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t`` with the bend of
+:mod:`bemt.bem.duct_stream`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
 
     g = j |j| + K_wall w |w| + K_lip max(w - lam t, 0)^2 - lam |lam| t^2 - 4 eta (F max(x, 0) s / w)^2
         - sigma cn (1 - leak)
@@ -39,7 +38,7 @@ half of the difference, in a duct as in the open, and the speed that walls induc
 
     w_b - w = (1/F - 1) (V_j - V) / 2,   so   w - w_V V = G (w_b - w_V V),   1/G = 1 + (1/F - 1) k_w / 2
 
-which is F for the open rotor (k_w = 2, k_V = 1) and 2 F / (1 + F) in a pipe.
+which is F for the open rotor (k_w = 2, k_V = 1) and 2 F / (1 + F) in a pipe; the bend is left out of G.
 The stator's vanes are set for the swirl of a driving rotor and turn no other.  t > 0 around phi = 0; where it reaches
 zero (W grows without bound) g is positive for phi > 0 and negative for phi < 0, so here too a root always exists; a
 negative one is flow reversed through the duct.
