@@ -227,10 +227,9 @@ def table_of(known: Known, case: Case | None = None) -> list[str]:
     out = []
     for i, J in enumerate(known.J):
         share = f"{100 * known.share[i]:.1f}" if math.isfinite(known.share[i]) else "-"
-        CT, CQ = (p.CT[i], known.CT[i]), (p.CP[i] / (2.0 * math.pi), known.CQ[i])
-        off = [f"{100 * (ours / other - 1):+.1f}" for ours, other in (CT, CQ)]
-        cells = [known.name, f"{J:.2f}", *(f"{v:.4f}" for v in CT), off[0], *(f"{v:.5f}" for v in CQ), off[1]]
-        out.append(f"| {' | '.join(cells)} | {100 * p.duct_share[i]:.1f} | {share} |")
+        off = (100.0 * (p.CT[i] / known.CT[i] - 1.0), 100.0 * (p.CP[i] / (2.0 * math.pi) / known.CQ[i] - 1.0))
+        thrust = f"{p.CT[i]:.4f} / {known.CT[i]:.4f} | {off[0]:+.1f}"
+        out.append(f"| {known.name} | {J:.2f} | {thrust} | {off[1]:+.1f} | {100 * p.duct_share[i]:.1f} / {share} |")
     return out
 
 
@@ -271,8 +270,8 @@ def main() -> None:
         first = f1(data, at / "f1")
         x = [x22a(data, at / str(angle), angle) for angle in (19, 29)]
         ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in (0.6, 0.8, 1.0, 1.2, 1.4)]
-        print("| rotor | J | CT | reference | % | CQ | reference | % | share % | reference |")
-        print("|---|---|---|---|---|---|---|---|---|---|")
+        print("| rotor | J | CT: ours / known | % | CQ, % | share of the duct, %: ours / known |")
+        print("|---|---|---|---|---|---|")
         smooth = replace(first, name="F1, no friction", case=first.case.replaced({"duct.wall_friction": 0.0}))
         print("\n".join(line for known in (first, smooth, *x, ka[1], ka[3]) for line in table_of(known)))
         print("\n19A, medians: pitch, |KT|, share in points, |KQ|")
