@@ -28,7 +28,10 @@ from bemt.bem import duct as duct_model
 from bemt.bem import solver
 from bemt.bem.duct_stream import Stream, jet_area
 from bemt.bem.model import Model
-from bemt.case.prepare import prepare_case
+from bemt.case import load_case
+from bemt.case.prepare import duct_unknowns, prepare_case
+from bemt.case.propagate import propagate
+from bemt.effects.tip_gap import TipGap
 from geometry.duct import Duct
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -242,3 +245,43 @@ def test_the_duct_of_the_76_mm_fan_changes_its_torque_as_measured(shared_data: P
     pitch = FANS.pitch_of_torque(shared_data, tmp_path)
     _, torque = FANS.over_measured(*FANS.fan_76(shared_data, tmp_path, pitch, True))
     assert np.max(np.abs(torque - 1.0)) < 0.1
+
+
+def test_the_ds30_beside_our_cfd_that_settled(project: Path) -> None:
+    """No vanes, gap closed by the cells, incompressible, mean of three grids (their spread: 5 % and 8 %)."""
+    found = [r for r in FANS.rows(project / "reports" / "cfd" / "ds30_spinner" / "recording.csv")
+             if r["converged"] == "1" and float(r["tip_gap_mm"]) < 0.1]  # fmt: skip
+    assert len(found) == 3
+    case = load_case(project / "cases" / "ds30").replaced({
+        "model.effects_off": ("compressibility", "drag_divergence"), "duct.stator.recovery": 0.0,
+        "duct.tip_gap_mm": float(found[0]["tip_gap_mm"]),
+    })  # fmt: skip
+    p = prepare_case(case).solve(case.rpm, 0.0, case.air())
+    assert p.thrust_N[0] == pytest.approx(np.mean([float(r["thrust_N"]) for r in found]), rel=0.08)
+    assert p.torque_Nm[0] == pytest.approx(np.mean([float(r["torque_Nm"]) for r in found]), rel=0.08)
+
+
+# Losses that a case may state ---------------------------------------------------------------------------------------
+
+
+def test_losses_that_a_case_does_not_state_are_in_its_bands(f1_case: Any) -> None:
+    case = f1_case.case.replaced({"duct.tip_gap_mm": 1.5})  # states its lip's loss
+    open_ones = {item.key: item for item in duct_unknowns(case)}
+    assert set(open_ones) == {"duct.wall_friction", "duct.gap_loss"}
+    assert all(item.values[0] < item.nominal < item.values[1] for item in open_ones.values())
+    assert {item.key for item in duct_unknowns(f1_case.case)} == {"duct.wall_friction"}  # no gap leaks nothing
+    assert duct_unknowns(case.replaced({key: 0.001 for key in open_ones})) == ()
+    V = f1_case.airspeed(np.array([0.0, 0.5]))
+    u = propagate(case, case.rpm, V).points.u_by["input"]["duct_share"]
+    assert 0.0 < u[0] < u[1]
+
+
+def test_what_a_case_states_of_its_losses_is_taken(f1_case: Any) -> None:
+    case = f1_case.case.replaced({"duct.tip_gap_mm": 1.5})
+    stated = {"duct.wall_friction": duct_model.WALL_FRICTION, "duct.gap_loss": TipGap().loss}
+    thrusts = []
+    for changes in ({}, stated, *({key: 2.0 * value} for key, value in stated.items())):
+        changed = case.replaced(changes)
+        thrusts.append(float(prepare_case(changed).solve(case.rpm, 5.0, case.air()).thrust_N[0]))
+    assert thrusts[0] == thrusts[1]
+    assert max(thrusts[2:]) < thrusts[0]
