@@ -15,7 +15,7 @@ from bemt.bem.model import Model
 from bemt.case import Case, load_case
 from bemt.case.prepare import prepare_case
 from bemt.cfd.schema import load_campaign
-from bemt.diagnose.along_blade import BladeLoads, along, compare_along, read_blade_loads
+from bemt.diagnose.along_blade import EXPLAINED, BladeLoads, along, compare_along, read_blade_loads
 
 AIR = Air.from_density(1.225)
 
@@ -54,13 +54,16 @@ def test_the_row_is_found_along_the_blade(project: Path, tmp_path: Path) -> None
     assert next(iter(found.left.values())) < 0.05
 
 
-@pytest.mark.parametrize("old", ['effects_on = ["cascade(zero_lift=0.0)"]', 'effects_off = ["cascade"]'])
-def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "sure"), [('effects_on = ["cascade(zero_lift=0.0)"]', 1), ('effects_off = ["cascade"]', 2)]
+)
+def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: str, sure: int) -> None:
+    """The single section's zero-lift angle alone looks much like a wider exit, which one of two sectors prefers."""
     path = project / "reports" / "cfd" / "ds30" / "radial.csv"
     runs = along(fan(project, tmp_path, old), path)
     assert len(runs) == 2  # the sector that leaks at its sides, and the mended one
-    for found in runs.values():
-        assert "cascade" in found.named, found.text()
+    assert all(found.left["cascade"] < EXPLAINED for found in runs.values())
+    assert sum("cascade" in found.named for found in runs.values()) >= sure
     assert all(now.named == () for now in along(fan(project, tmp_path), path).values())
 
 

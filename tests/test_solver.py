@@ -28,7 +28,7 @@ from geometry.blade import Stations
 from geometry.rotor import Rotor
 
 AIR = Air.from_density(1.2)
-DUCT = DuctFlow(0.95, 0.05, 0.2, 0.8, 0.001, 0.08, 0.01, contraction=1.02, capture=0.9)
+DUCT = DuctFlow(0.95, 0.05, 0.2, 0.8, 0.001, 0.08, 0.01, contraction=1.02, capture=0.9, bend=-0.2)
 R = residual
 
 
@@ -92,7 +92,8 @@ def compiled_residual(ducted: bool, layout: str) -> Any:
 
     @njit
     def run(phi: float, k: int, Omega: float, V: float, st: Any, tab: Any, par: Any) -> Any:
-        fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12])
+        fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12],
+              par[13])  # fmt: skip
         o = R.N_NUM
         g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
              par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
@@ -263,7 +264,8 @@ def test_bernoulli_and_blade_agree_at_every_station_of_a_fan(rotor: Rotor, polar
     r, dr = s.radial, prep.st[:, 1]
     area = 2.0 * np.pi * r["r"] * dr
     V_ = s.V[:, None]
-    jet = V_ + (r["w"] / DUCT.wake_ratio - DUCT.capture * V_) / DUCT.contraction
+    y = r["w"] / DUCT.wake_ratio / DUCT.contraction
+    jet = V_ + (y - DUCT.capture / DUCT.contraction * V_) * (1.0 + DUCT.bend * V_ / np.hypot(y, V_))
     sucked, turned = np.maximum(r["w"] - V_, 0.0), np.maximum(r["v_t"], 0.0)
     push = jet * np.abs(jet) + DUCT.wall_loss * r["w"] ** 2 - V_**2 + DUCT.lip_loss * sucked**2
     push -= 4.0 * DUCT.stator * turned**2

@@ -4,12 +4,13 @@ Control volume (McCormick 1967, "Aerodynamics of V/STOL Flight", ch. 9; Pereira 
 sec. 2.2, eq. 2.20-2.40; notation ours).  With ``w`` the mean axial speed of an annulus of the disk, ``sigma_w =
 A_exit / A_disk`` and the jet far behind, at the pressure of the stream, at ``V_j``::
 
-    w = sigma_w (c_V V + c_0 (V_j - V))                   continuity
+    w = sigma_w q(V, V_j)                                 continuity
     dT_rotor + dT_stator = 1/2 rho (V_j^2 - V^2) dA       Bernoulli on both sides of the disk
     dT_total = rho w (V_j - V) dA                         momentum of the whole system
 
-The jet's area is ``c_0 A_exit`` at rest and comes to ``c_V A_exit`` where the rotor adds nothing to the stream; both
-are 1 for a long straight pipe and follow from the walls else (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
+The mean speed q through the exit is ``c_0 V_j`` at rest and ``c_V V`` where the rotor adds nothing to the stream: the
+jet's area there is that share of the exit's.  Both are 1 for a long straight pipe; else they and what lies between
+follow from the walls (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
 = 1 / (2 sigma_w c_0); 1/2 gives back the open rotor.  Losses enter Bernoulli as ``1/2 rho (K_wall w^2 + K_lip (w -
 V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure, ``dT_stator = eta_s 1/2 rho (2 v_t)^2
 dA``.  The annuli are independent of each other, as in the open rotor.
@@ -71,7 +72,7 @@ BASE_PRESSURE = 0.15
 _CORE_STEPS = 12
 
 # Turbulent skin friction of duct walls at Re of 1e5 to 1e7, Prandtl's 0.455/log10(Re)^2.58 between 0.007 and 0.003.
-WALL_FRICTION = 0.005
+WALL_FRICTION, WALL_FRICTION_RANGE = 0.005, (0.003, 0.007)
 # Profile drag of a ring aerofoil over friction of its wetted side: Hoerner (1965), Fluid-Dynamic Drag, ch. 6,
 # 1 + 2 t/c for t/c about 0.12.
 FORM_FACTOR = 1.25
@@ -123,6 +124,8 @@ class DuctFlow:
         Drag of the outer wall over 1/2 rho V^2 [m2].
     contraction, capture : float
         Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1].
+    bend : float
+        Departure of the jet's speed from a straight line between the two, see :mod:`bemt.bem.duct_stream` [1].
     area : float
         Swept annulus, pi (R^2 - Rhub^2) [m2].
     exit_hub : float
@@ -138,6 +141,7 @@ class DuctFlow:
     drag_area: float = 0.0
     contraction: float = 1.0
     capture: float = 1.0
+    bend: float = 0.0
     area: float = float("nan")
     exit_hub: float = float("nan")
 
@@ -178,23 +182,29 @@ class DuctFlow:
         return np.asarray(np.pi * rho * D)
 
 
-def duct_flow(duct: Duct, rotor: Rotor) -> DuctFlow:
-    """Momentum numbers of a duct around a rotor."""
+def hydraulic_diameter(duct: Duct, rotor: Rotor) -> float:
+    """Twice the height of the passage [m]."""
+    return 2.0 * (duct.inner_radius - rotor.Rhub)
+
+
+def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) -> DuctFlow:
+    """Momentum numbers of a duct around a rotor, with the friction coefficient of its walls [1]."""
     duct.check(rotor)
-    hydraulic = 2.0 * (duct.inner_radius - rotor.Rhub)
+    hydraulic = hydraulic_diameter(duct, rotor)
     outer = duct.inner_radius + duct.lip_radius
     jet = jet_area(duct, rotor.Rhub)
     left, base = _boattail(duct)
     return DuctFlow(
         wake_ratio=duct.exit_area / rotor.annulus_area,
-        wall_loss=WALL_FRICTION * 4.0 * duct.length / hydraulic,
+        wall_loss=wall_friction * 4.0 * duct.length / hydraulic,
         lip_loss=lip_loss(duct.lip_radius / hydraulic).nominal,
         stator=STATOR_RECOVERY if duct.stator is not None else 0.0,
         gap=duct.gap,
         span=rotor.R - rotor.Rhub,
-        drag_area=WALL_FRICTION * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
+        drag_area=wall_friction * FORM_FACTOR * 2.0 * math.pi * outer * duct.length + left * BASE_PRESSURE * base,
         contraction=jet.at_rest,
         capture=jet.in_stream + left * (jet.at_rest - jet.in_stream),
+        bend=(1.0 - left) * jet.bend,
         area=rotor.annulus_area,
         exit_hub=duct.exit_hub_radius,
     )

@@ -36,6 +36,7 @@ from bemt.bem.residual import (
     N_SWIRL,
     N_WAKE,
     ducted_rotor,
+    jet_speed,
     lookup_factored,
     lookup_full,
     lookup_plain,
@@ -217,7 +218,8 @@ def _guess_ducted(w, n_pad, fx):
 def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     """Solve every station of one operating point and integrate."""
     wide()
-    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12])
+    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12],
+          par[13])  # fmt: skip
     o = N_NUM
     mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])
     g = (par[o], par[o + 1], par[o + 2], par[o + 3], par[o + 4], par[o + 5], par[o + 6], par[o + 7], par[o + 8],
@@ -305,7 +307,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
                 v_t *= F * mass_share(axial, mean)
                 axial = mean
                 flow = abs(axial)
-                leaves = fx[N_WAKE] * axial - fx[N_STREAM] * UP
+                leaves, _, _ = jet_speed(axial, UP, fx)
             lost = w[_BAD + k] > 0.0
             if not lost:
                 T += dT

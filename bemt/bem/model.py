@@ -299,8 +299,8 @@ def _solve(prep: solver.Prepared, flow: Flow) -> solver.Solution:
         return solver.solve(prep, flow.rpm, flow.V, air, side=0.0 if flow.side is None else flow.side)
     # an effect that turns the wind, with one that adds a duct: nobody solves that
     axial, turned = solver.solve(prep, flow.rpm, flow.V, air), flow.side != 0.0
-    lost = {k: np.where(turned, np.nan, getattr(axial, k)) for k in ("T", "Q", "T_duct")}
-    return replace(axial, **lost, converged=axial.converged & ~turned)
+    T, Q, T_duct = (np.where(turned, np.nan, v) for v in (axial.T, axial.Q, axial.T_duct))
+    return replace(axial, T=T, Q=Q, T_duct=T_duct, converged=axial.converged & ~turned)
 
 
 def flow_of(

@@ -27,8 +27,8 @@ Without swirl v_t = 0, W = UT / cos(phi), and the terms of ``ct`` drop; the brac
 
 Ducted rotor (:mod:`bemt.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque balance
 reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w = G s +
-(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t``; and Bernoulli's equation across the disk,
-times (t / UT)^2, becomes::
+(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t`` with the bend of
+:mod:`bemt.bem.duct_stream`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
 
     g = j |j| + K_wall w |w| + K_lip max(w - lam t, 0)^2 - lam |lam| t^2 - 4 eta (F max(x, 0) s / w)^2
         - sigma cn (1 - leak)
@@ -38,7 +38,7 @@ half of the difference, in a duct as in the open, and the speed that walls induc
 
     w_b - w = (1/F - 1) (V_j - V) / 2,   so   w - w_V V = G (w_b - w_V V),   1/G = 1 + (1/F - 1) k_w / 2
 
-which is F for the open rotor (k_w = 2, k_V = 1) and 2 F / (1 + F) in a pipe.
+which is F for the open rotor (k_w = 2, k_V = 1) and 2 F / (1 + F) in a pipe; the bend is left out of G.
 The stator's vanes are set for the swirl of a driving rotor and turn no other.  t > 0 around phi = 0; where it reaches
 zero (W grows without bound) g is positive for phi > 0 and negative for phi < 0, so here too a root always exists; a
 negative one is flow reversed through the duct.
@@ -58,7 +58,8 @@ from bemt.bem.vecmath import inlined, log, sincos
 
 # Indices of the numbers that effects and duct may set (array ``num``).
 N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM = range(13)
-N_NUM = 13
+N_BEND = 13
+N_NUM = 14
 
 _EPS = 1e-9
 _TWO_PI = 2.0 * math.pi
@@ -258,6 +259,21 @@ def mass_share(s, w):
 
 
 @inlined
+def jet_speed(w, V, fx):
+    """Speed of the jet far behind for a mean speed w of the annulus in a stream V, and its slopes in both."""
+    k_w = fx[N_WAKE]
+    idle = 1.0 + fx[N_STREAM]
+    y = k_w * w
+    rise = y - idle * V
+    i_size = 1.0 / math.sqrt(y * y + V * V + 1e-30)
+    part = fx[N_BEND] * i_size if V > 0.0 else 0.0
+    over = part * V * rise * i_size * i_size
+    by_w = k_w * (1.0 + part * V - over * y)
+    by_V = 1.0 - idle + part * (rise - idle * V) - over * V
+    return V + rise * (1.0 + part * V), by_w, by_V
+
+
+@inlined
 def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, g, fx):
     """Residual of an open rotor at one element. [m/s]"""
     s, c = sincos(phi)
@@ -378,7 +394,7 @@ def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab
     dw = dG * dF * (s - idle * t) + G * c + (1.0 - G) * idle * dt
     suck = w - lam * t
     suck = suck if suck > 0.0 else 0.0
-    jet = fx[N_WAKE] * w - fx[N_STREAM] * lam * t
+    jet, djet_w, djet_V = jet_speed(w, lam * t, fx)
     wall = fx[N_WALL]
     lip = fx[N_LIP]
     eta = 4.0 * fx[N_STATOR]
@@ -391,7 +407,7 @@ def ducted_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab
     turned = F * xp * q
     dturned = (F * dx + dF * xp) * q + F * xp * dq
     res = jet * abs(jet) + wall * w * abs(w) - eta * turned * turned + lip * suck * suck - ram * t * t - keep * cn
-    slope = abs(jet) * (fx[N_WAKE] * dw - fx[N_STREAM] * lam * dt) + wall * abs(w) * dw - eta * turned * dturned
+    slope = abs(jet) * (djet_w * dw + djet_V * lam * dt) + wall * abs(w) * dw - eta * turned * dturned
     slope = 2.0 * (slope + lip * suck * (dw - lam * dt) - ram * t * dt) - keep * dcn
     low = t < 1e-3
     res = sign if low else res

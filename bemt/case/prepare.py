@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import effects
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
-from bemt.bem.duct import DuctFlow, duct_flow
+from bemt.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
 from bemt.bem.model import Model
+from bemt.case.load import Assumption
+from bemt.effects.tip_gap import GAP_LOSS, TipGap
 from bemt.rotors import k1k2
 from bemt.rotors.learned import with_run
 from bemt.sections import polars
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from geometry.rotor import Rotor
 
-__all__ = ["k1k2_case", "prepare_case"]
+__all__ = ["duct_unknowns", "k1k2_case", "prepare_case"]
 
 Array = NDArray[np.float64]
 
@@ -55,6 +57,9 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
     if faults:
         raise InputError(faults)
+    gap_loss = case.get("duct.gap_loss") if case.ducted else None
+    if gap_loss is not None:
+        on.setdefault("tip_gap", TipGap(loss=float(gap_loss)))
     off = set(case.file.model.effects_off)
     standard = {effect.id for effect in effects.standard()}
     return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
@@ -98,9 +103,28 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     duct = case.duct()
     if duct is None:
         return None
-    flow = duct_flow(duct, rotor)
+    friction = case.get("duct.wall_friction")
+    flow = duct_flow(duct, rotor, WALL_FRICTION if friction is None else float(friction))
     given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
     return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
+
+
+def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
+    """Losses of a duct that a case leaves open, each with its value here and the range of its sources."""
+    duct = None if "duct" in case.file.model.effects_off else case.duct()
+    if duct is None:
+        return ()
+    lip = lip_loss(duct.lip_radius / hydraulic_diameter(duct, case.rotor()))
+    gap = next((effect.loss for effect in _effects(case) if isinstance(effect, TipGap)), None)
+    said = any(text.startswith("tip_gap") for text in case.file.model.effects_on)
+    found = [
+        Assumption("duct.lip_loss", lip.nominal, (lip.low, lip.high), False, "not stated; range of its sources"),
+        Assumption("duct.wall_friction", WALL_FRICTION, WALL_FRICTION_RANGE, False, "not stated; Re of 1e5 to 1e7"),
+    ]
+    if gap is not None and not said and duct.gap > 0.0:
+        found.append(Assumption("duct.gap_loss", gap, GAP_LOSS, False, "not stated; range measured on compressors"))
+    known = {item.key for item in case.assumptions}
+    return tuple(item for item in found if item.key not in known and case.get(item.key) is None)
 
 
 def prepare_case(

@@ -204,11 +204,11 @@ def propagate(
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
-    from bemt.case.prepare import prepare_case
+    from bemt.case.prepare import duct_unknowns, prepare_case
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3, angle_deg)
     # the motor's unknowns move no load at a given speed
-    own = tuple(item for item in case.assumptions if not item.key.startswith("drive."))
+    own = (*(item for item in case.assumptions if not item.key.startswith("drive.")), *duct_unknowns(case))
     declared = own if unknowns is None else tuple(unknowns)
     steps, done = 3 + sum(len(item.values) for item in declared), 0
 

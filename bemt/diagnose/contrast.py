@@ -235,9 +235,9 @@ def _given(asked: Invocation) -> Given:
     from bemt.diagnose.suggest import Given
 
     class _Pair(Given):
-        def command(self, run: str = "", reference: str = "") -> str:
-            if not asked.chosen:
-                return super().command(run, reference)
+        def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
+            if not asked.chosen or ruled_out:  # a comparison does not rule out: the diagnosis does
+                return super().command(run, reference, ruled_out)
             return asked.command(a=reference) if reference else asked.command(b=run or asked.b)
 
         def comparison(self, reference: str) -> str:

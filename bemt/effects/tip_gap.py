@@ -9,6 +9,9 @@ import numpy as np
 
 from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
 
+GAP_LOSS = 1.0, 2.0
+"""Points of pressure rise lost per point of gap over span, as measured on compressor rotors [1]."""
+
 
 @dataclass(frozen=True)
 class TipGap(Effect):
@@ -19,9 +22,9 @@ class TipGap(Effect):
     Two parts. The wall mirrors the tip vortex, so Prandtl's deficit 1 - F is scaled by 1 - exp(-gap / (scale R)): zero
     if sealed, full if the wall is far away (declared rule between two known limits). Leakage costs pressure rise in
     proportion to gap over span, ``loss`` points per point: 1 to 2 in Wisler (1985), J. Turbomach. 107:372, and Cumpsty
-    (1989), Compressor Aerodynamics, ch. 8 (not checked against the books). Off means a sealed tip. In a recording with
-    ``tip_gap_m`` the gap of the case corresponds to the largest recorded one, the others are in proportion; see
-    :meth:`share`.
+    (1989), Compressor Aerodynamics, ch. 8 (not checked against the books); a case states it as ``duct.gap_loss``. Off
+    means a sealed tip. In a recording with ``tip_gap_m`` the gap of the case corresponds to the largest recorded one,
+    the others are in proportion; see :meth:`share`.
     """
 
     loss: float = 1.5
@@ -34,7 +37,7 @@ class TipGap(Effect):
     along = ("tip_gap_m",)
     sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
     parameters = (
-        Parameter("loss", "1", 1.0, 2.0, "Wisler 1985; Cumpsty 1989, not checked", 3),
+        Parameter("loss", "1", *GAP_LOSS, "Wisler 1985; Cumpsty 1989, not checked", 3),
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),
     )
 

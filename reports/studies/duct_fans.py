@@ -1,0 +1,293 @@
+"""Ducted rotors beside what was measured or computed of them: ``python reports/studies/duct_fans.py``.
+
+Prints the tables of docs/duct.md and draws docs/img/duct.png. The folder of the recordings is named by the variable
+``BEMT_DATA``. Sources and faults of the recordings: tests/test_duct.py, which builds the same fans.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.units import KGF
+from bemt.case import Case
+from bemt.case.load import case_of
+from bemt.case.prepare import prepare_case
+from bemt.case.propagate import propagate
+
+Array = NDArray[np.float64]
+
+HEAD = 'schema = "bemt.case/1"\nname = "published"\n'
+HOME = Path(__file__).resolve().parents[2]
+
+F1 = """[rotor]
+kind = "fan"
+blades = 3
+diameter_mm = 300
+hub_ratio = 0.22
+[blade]
+stations = "stations.csv"
+[blade.section]
+camber = 0.0358
+thickness = 0.10
+[duct]
+tip_gap_mm = 0
+length_mm = 130
+lip_radius_mm = 18
+lip_loss = 0
+rotor_position_mm = 45
+exit_area_ratio = 1.0
+exit_hub_diameter_mm = 66
+[operating]
+rpm = 4898.98
+[air]
+density_kg_m3 = 1.225
+[[polars]]
+file = "polar.csv"
+r_over_R = 0.75
+"""
+X22A = """[rotor]
+kind = "fan"
+blades = 3
+diameter_m = 2.1336
+hub_ratio = 0.2
+[blade]
+stations = "stations.csv"
+[blade.section]
+camber = 0.02
+thickness = 0.08
+[duct]
+tip_gap_mm = 10.16
+length_mm = 1244.6
+lip_radius_mm = 128
+rotor_position_mm = 355.6
+exit_area_ratio = 1.27
+[operating]
+rpm = 1200
+[air]
+density_kg_m3 = 1.225
+"""
+FAN_76 = """[rotor]
+kind = "propeller"
+blades = 8
+diameter_mm = 76
+hub_ratio = 0.25
+[blade]
+pitch_mm = {pitch}
+chord_law = "fan"
+max_chord_over_R = 0.35
+[blade.section]
+camber = 0.05
+thickness = 0.09
+{duct}[operating]
+rpm = 20000
+[air]
+density_kg_m3 = 1.2
+"""
+DUCT_76 = """[duct]
+tip_gap_mm = 0.5
+length_mm = 25
+lip_radius_mm = 4
+exit_area_ratio = 1.0
+"""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a ducted rotor over the advance ratio; the duct's share is NaN where nobody measured it."""
+
+    name: str
+    case: Case
+    J: Array
+    CT: Array
+    CQ: Array
+    share: Array
+
+    def airspeed(self, J: Array) -> Array:
+        """Airspeed at advance ratios [m/s]."""
+        return J * self.case.rpm / 60.0 * self.case.diameter_m
+
+
+def rows(path: Path) -> list[dict[str, Any]]:
+    """Rows of a table."""
+    with path.open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def made(folder: Path, body: str, **files: str) -> Case:
+    """Case of a text and the tables that it names, by their name without ending."""
+    folder.mkdir(exist_ok=True, parents=True)
+    for name, text in files.items():
+        (folder / f"{name}.csv").write_text(text)
+    return case_of(HEAD + body, folder)
+
+
+def stations(table: list[tuple[float, float, float]]) -> str:
+    """Text of a table of r/R, chord/R and angle [deg]."""
+    return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in table)
+
+
+def f1(data: Path, folder: Path) -> Known:
+    """F1 as DFDC has it: no gap, no lip loss."""
+    tables = {name: (data / "dfdc" / f"F1_{name}.csv").read_text() for name in ("stations", "polar")}
+    found = [r for r in rows(data / "dfdc" / "reference.csv")
+             if (r["geometry"], float(r["tip_gap_mm"]), float(r["exit_ratio"])) == ("F1", 0.0, 1.0)]  # fmt: skip
+    J, CT, duct, CQ = (np.array([float(r[k]) for r in found]) for k in ("J", "CT_momentum", "CT_duct", "CQ"))
+    return Known("F1, DFDC", made(folder, F1, **tables), J, CT, CQ, duct / CT)
+
+
+def x22a(data: Path, folder: Path, angle: int) -> Known:
+    """X-22A at 19 or 29 deg."""
+    shape = [(float(r["r_over_R"]), float(r["chord_m"]) / 1.0668, float(r["beta_geom_deg(beta75=20)"]))
+             for r in rows(data / "x22a" / "x22a_geometry.csv")]  # fmt: skip
+    table = stations([(x, c, b + angle - 20.0) for x, c, b in shape if x <= 1.0])
+    found = rows(data / "x22a" / "x22a_measured_CT_CP_vs_J.csv")
+    q = np.array([[float(v) for v in list(r.values())[:4]] for r in found])
+    q = q[q[:, 0] == angle]
+    case = made(folder, X22A, stations=table)
+    return Known(f"X-22A, {angle} deg", case, q[:, 1], q[:, 2], q[:, 3] / (2.0 * math.pi), np.full(len(q), math.nan))
+
+
+def nozzle_19a(data: Path, folder: Path, pitch: float) -> Known:
+    """Ka 4-70 of a pitch over diameter in nozzle 19A, in air."""
+    D, L = 0.24, 0.12
+    g = [[float(v) for v in r.values()] for r in rows(data / "ducted_marine" / "ka4-55_geometry.csv")]
+    blade, thick = [], []
+    for x, chord_mm, t_over_D, _ in g:
+        chord = chord_mm / 1e3 * 70.0 / 55.0
+        blade.append((x, chord / (0.5 * D), math.degrees(math.atan2(pitch, math.pi * x))))
+        thick.append(t_over_D * D / chord)
+    bore = 0.5e3 * D + 0.8
+    body = f"""[rotor]
+kind = "fan"
+blades = 4
+diameter_mm = {1e3 * D}
+hub_ratio = 0.167
+[blade]
+stations = "stations.csv"
+[blade.section]
+r_over_R = {[r[0] for r in g]}
+camber = {[round(t / 2.0, 4) for t in thick]}
+camber_position = 0.5
+thickness = {[round(max(t, 0.02), 4) for t in thick]}
+[duct]
+tip_gap_mm = 0.8
+length_mm = {1e3 * L}
+lip_radius_mm = {182.5 * L}
+exit_diameter_mm = {2.0 * (bore + 23.6 * L)}
+rotor_position_mm = {500.0 * L}
+[operating]
+rpm = 9000
+[air]
+density_kg_m3 = 1.225
+"""
+    found = [r for r in rows(data / "ducted_marine" / "ka_19A_open_water_table.csv")
+             if r["series"] == "Ka4-70_19A" and float(r["P_over_D"]) == pitch]  # fmt: skip
+    J, K, N, Q = (np.array([float(r[k]) for r in found]) for k in ("J", "KT_total", "KT_nozzle", "10KQ"))
+    case = made(folder, body, stations=stations(blade))
+    return Known(f"Ka 4-70 in 19A, P/D {pitch:g}", case, J, K, Q / 10.0, N / K)
+
+
+def fan_76(data: Path, folder: Path, pitch_mm: float, duct: bool) -> tuple[Case, Array]:
+    """Fan of 76 mm with a guessed blade, and rows of rev/min, thrust [N] and torque [N m]."""
+    pattern = "grp01__f1507_hqprop76x8_4s_duct_table*.csv" if duct else "grp01__f1507_hqprop76x8_4s_table*.csv"
+    found = [[float(r["rpm"]), float(r["th"]) * KGF * 1e-3, float(r["tq"]) * KGF * 1e-5]
+             for path in sorted((data / "jmajew").glob(pattern)) for r in rows(path)]  # fmt: skip
+    return made(folder, FAN_76.format(pitch=pitch_mm, duct=DUCT_76 if duct else "")), np.array(found)
+
+
+def over_measured(case: Case, measured: Array) -> Array:
+    """Thrust and torque over the measured ones at rest, (2, N)."""
+    p = prepare_case(case).solve(measured[:, 0], np.zeros(len(measured)), case.air())
+    return np.array([p.thrust_N, p.torque_Nm]) / measured[:, 1:].T
+
+
+def pitch_of_torque(data: Path, folder: Path) -> float:
+    """Pitch of the 76 mm fan at which the torque of the open runs is right in the median [mm]."""
+    low, high = 50.0, 110.0
+    while high - low > 0.05:
+        middle = 0.5 * (low + high)
+        off = np.median(over_measured(*fan_76(data, folder, middle, False))[1]) - 1.0
+        low, high = (low, middle) if off > 0.0 else (middle, high)
+    return 0.5 * (low + high)
+
+
+def table_of(known: Known, case: Case | None = None) -> list[str]:
+    """Rows of a Markdown table: J; thrust, torque and share, ours and the reference."""
+    case = known.case if case is None else case
+    p = prepare_case(case).solve(case.rpm, known.airspeed(known.J), case.air())
+    out = []
+    for i, J in enumerate(known.J):
+        share = f"{100 * known.share[i]:.1f}" if math.isfinite(known.share[i]) else "-"
+        off = (100.0 * (p.CT[i] / known.CT[i] - 1.0), 100.0 * (p.CP[i] / (2.0 * math.pi) / known.CQ[i] - 1.0))
+        thrust = f"{p.CT[i]:.4f} / {known.CT[i]:.4f} | {off[0]:+.1f}"
+        out.append(f"| {known.name} | {J:.2f} | {thrust} | {off[1]:+.1f} | {100 * p.duct_share[i]:.1f} / {share} |")
+    return out
+
+
+def draw(panels: list[list[Known]], to: Path) -> None:
+    """CT and the duct's share over J, with the band of one standard deviation."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    fig, axes = plt.subplots(2, len(panels), figsize=(12.5, 6.6), layout="constrained", sharex="col")
+    for column, fans in zip(axes.T, panels, strict=True):
+        for k, known in enumerate(fans):
+            J = np.linspace(0.0, known.J[known.CT > 0.12 * known.CT[0]].max(), 25)
+            found = propagate(known.case, known.case.rpm, known.airspeed(J)).points
+            seen = known.J <= J.max() + 1e-9
+            shown = ("CT", 1.0, known.CT), ("duct_share", 100.0, known.share)
+            for ax, (key, scale, reference) in zip(column, shown, strict=True):
+                y, u = scale * found[key], scale * found.u[key]
+                ax.plot(J, y, color=f"C{k}", label=f"bemt: {known.name}")
+                ax.fill_between(J, y - u, y + u, color=f"C{k}", alpha=0.2, lw=0)
+                ax.plot(known.J[seen], scale * reference[seen], "o", color=f"C{k}", mec="k", ms=5)
+        column[0].legend(fontsize=8)
+        column[0].set(ylabel="thrust coefficient CT", ylim=(0, None))
+        column[1].set(xlabel="advance ratio J", ylabel="share of the duct [%]", ylim=(-25, 65))
+        column[1].axhline(0.0, color="0.6", lw=0.8)
+    sources = "DFDC, a panel code", "NASA TN D-4142, measured", "Oosterveld 1970, measured"
+    for ax, source in zip(axes[0], sources, strict=True):
+        ax.set_title(f"points: {source}", fontsize=10)
+    fig.savefig(to, dpi=110)
+
+
+def main() -> None:
+    """Print the tables and draw the picture."""
+    data = Path(os.environ["BEMT_DATA"])
+    with tempfile.TemporaryDirectory() as scratch:
+        at = Path(scratch)
+        first = f1(data, at / "f1")
+        x = [x22a(data, at / str(angle), angle) for angle in (19, 29)]
+        ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in (0.6, 0.8, 1.0, 1.2, 1.4)]
+        print("| rotor | J | CT: ours / known | % | CQ, % | share of the duct, %: ours / known |")
+        print("|---|---|---|---|---|---|")
+        smooth = replace(first, name="F1, no friction", case=first.case.replaced({"duct.wall_friction": 0.0}))
+        print("\n".join(line for known in (first, smooth, *x, ka[1], ka[3]) for line in table_of(known)))
+        print("\n19A, medians: pitch, |KT|, share in points, |KQ|")
+        for known in ka:
+            p = prepare_case(known.case).solve(known.case.rpm, known.airspeed(known.J), known.case.air())
+            some = known.CT > 0.15 * known.CT[0]
+            off = (p.CT / known.CT - 1.0, p.duct_share - known.share, p.CP / (2.0 * math.pi) / known.CQ - 1.0)
+            print(known.name, *(f"{100 * np.median(np.abs(v[some])):.1f}" for v in off))
+        pitch = pitch_of_torque(data, at / "76")
+        for value in (70.0, pitch):
+            for duct in (False, True):
+                off = over_measured(*fan_76(data, at / "76", value, duct)) - 1.0
+                parts = (f"{np.median(v):+.1f} ({v.min():+.1f} to {v.max():+.1f})" for v in 100.0 * off)
+                print(f"76 mm, pitch {value:.1f} mm, {'ducted' if duct else 'open'}: T, Q {'; '.join(parts)} %")
+        draw([[first], x, [ka[1], ka[3]]], HOME / "docs" / "img" / "duct.png")
+
+
+if __name__ == "__main__":
+    main()
