@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "gradient", "loads"]
+__all__ = ["Gradient", "element_tangents", "elements", "gradient", "loads"]
 
 Array = NDArray[np.float64]
 
@@ -148,8 +148,43 @@ def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
 
 
-def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air) -> Array:
-    """Thrust [N] and torque [N m] of each element, all blades, (2, P, N)."""
+def element_tangents(
+    model: Model,
+    effects: Sequence[Effect],
+    rpm: ArrayLike,
+    airspeed_m_s: ArrayLike,
+    air: Air,
+    stations: Stations,
+    names: Sequence[str],
+    step: float = STEP,
+) -> tuple[Array, Array, Array]:
+    """What each element does at points, and its derivatives by the element's own chord [1/m] and angle [1/rad].
+
+    ``names`` are those of :data:`bemt.bem.solver.RADIAL`; each of the three is (K, P, N). The points cost four more
+    solves, whatever their number.
+    """
+    moved = _moved(model, effects, stations, step)
+    points = np.atleast_1d(np.asarray(rpm, dtype=float)), airspeed_m_s, air.rho, air
+
+    def slopes(low: Prepared, high: Prepared, width: Array) -> Array:
+        return np.asarray((_elements(high, *points, names) - _elements(low, *points, names)) / width)
+
+    return _elements(moved.base, *points, names), slopes(*moved.chord), slopes(*moved.beta)
+
+
+def elements(
+    model: Model, effects: Sequence[Effect], rpm: ArrayLike, airspeed_m_s: ArrayLike, air: Air, stations: Stations,
+    names: Sequence[str],
+) -> Array:  # fmt: skip
+    """What each element does at points, (K, P, N): the first of :func:`element_tangents`, for a fifth of its price."""
+    prep = model.prepared(_inside(effects), stations=stations)
+    return _elements(prep, np.atleast_1d(np.asarray(rpm, dtype=float)), airspeed_m_s, air.rho, air, names)
+
+
+def _elements(
+    prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air, names: Sequence[str] = ("dT", "dQ")
+) -> Array:
+    """Columns of each element, (K, P, N); thrust [N] and torque [N m] are those of all blades."""
     points = np.empty((len(np.atleast_1d(rpm)), K.N_POINT))
     points[:, K.P_OMEGA], points[:, K.P_V], points[:, K.P_RHO] = np.multiply(rpm, _RAD_PER_RPM), V, rho
     points[:, K.P_MU], points[:, K.P_SOUND] = air.mu, air.a_sound
@@ -157,7 +192,7 @@ def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air:
     radial = np.empty((points.shape[0], prep.st.shape[0], K.N_RADIAL))
     entry, *constant = prep.kernel
     entry(points, *constant, out, radial)
-    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in ("dT", "dQ")])
+    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in names])
     if np.any(out[:, K.O_STATUS] != K.OK) or not np.all(np.isfinite(loads)):
         s = solver.solve(prep, np.asarray(rpm), np.asarray(V), air)
         where = f"{np.ravel(rpm)[0]:g} rev/min, {np.ravel(V)[0]:g} m/s"
