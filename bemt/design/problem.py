@@ -1,0 +1,355 @@
+"""The blade as an optimisation: power and constraints of control values, with gradients, all from the real solver.
+
+    minimise   sum_k w_k P_k                            mean power over the points
+    subject to T_k >= T_k required                      also at points of weight 0
+               cl <= (1 - margin) cl_max(r/R, Re)       every element, every point
+               stress <= strength / safety              every other element, every point
+               chord >= what chord and thickness ask    every element, hub and tip
+               chord <= 0.3 R and 0.9 of the gap between blades
+
+The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
+angles (:func:`bemt.bem.gradient.element_tangents`); the control points follow by the chain rule. Over rotors as built,
+power, thrust and margins are means of the rotors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import InputError
+from bemt.bem.gradient import element_tangents, elements
+from bemt.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WHIRL
+from bemt.bem.packing import blend_weights
+from bemt.design import materials
+from bemt.design.requirement import WIDEST, Requirement
+from bemt.design.shape import CONTROLS, Shape
+from bemt.effects import Effect
+from bemt.sections.polars import DEFAULT_RE, first_stall
+
+if TYPE_CHECKING:
+    from bemt.bem.duct import DuctFlow
+    from bemt.bem.model import Model
+    from bemt.sections.polars import Polar
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("dT", "dQ", "cl", "W", "w", "v_t")
+_STEP_RPM = 1e-6
+_TIGHT = 2e-3
+"""Distance from a limit, as a share of it, below which it counts as reached."""
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """What a blade does at the points: rotors as built averaged.
+
+    Attributes
+    ----------
+    rpm, thrust_N, power_W : (P,) float
+        Speed [rev/min], thrust with duct, shaft power.
+    cl, limit, load, stress_Pa : (P, N) float
+        Lift coefficient and its limit [1], thrust per radius of all blades [N/m], stress [Pa].
+    objective : float
+        Mean power over the scale of the problem.
+    margins : (M,) float
+        Constraints, good at 0 or above.
+    gradient, jacobian : (V,), (M, V) float, empty unless asked for
+        Their derivatives by the variables.
+    """
+
+    rpm: Array
+    thrust_N: Array
+    power_W: Array
+    cl: Array
+    limit: Array
+    load: Array
+    stress_Pa: Array
+    objective: float
+    margins: Array
+    gradient: Array
+    jacobian: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A requirement, a model with its sections and duct, and blades around a start.
+
+    ``variants`` are the effects of the rotors that count alike: one rotor as drawn, or several as built. Variables are
+    the control values of `Shape`, then the logarithm of the free speeds over ``rpm0``.
+    """
+
+    need: Requirement
+    model: Model
+    shape: Shape
+    rpm0: Array
+    variants: Sequence[Sequence[Effect]]
+    scale_W: float
+    _last: dict[bool, tuple[bytes, Values]] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def free(self) -> NDArray[np.intp]:
+        """Points whose speed is found."""
+        return np.array([i for i, p in enumerate(self.need.points) if p.rpm is None], dtype=np.intp)
+
+    @cached_property
+    def size(self) -> int:
+        """Number of variables."""
+        return 2 * CONTROLS + self.free.size
+
+    @cached_property
+    def weights(self) -> Array:
+        """Shares of the time, (P,)."""
+        w = np.array([p.weight for p in self.need.points])
+        return np.asarray(w / w.sum())
+
+    @cached_property
+    def asked(self) -> Array:
+        """Thrusts, (P,) [N]."""
+        return np.array([p.thrust_N for p in self.need.points])
+
+    @cached_property
+    def flow(self) -> DuctFlow | None:
+        """Numbers of the duct, with what effects make of them."""
+        return self.model.prepared(self.variants[0]).duct
+
+    @cached_property
+    def blend(self) -> Array:
+        """Weights of the section tables at the elements."""
+        return blend_weights(self.shape.r / self.shape.R, np.array([x for x, _ in self.model.polars]))
+
+    @cached_property
+    def stall(self) -> tuple[Array, Array]:
+        """Largest lift coefficients of the elements' sections, (N, Nr), at logarithms of Reynolds numbers, (Nr,)."""
+        tops = [highest_lift(polar) for _, polar in self.model.polars]
+        ln_Re = np.log(DEFAULT_RE)  # even
+        return self.blend @ np.array([np.interp(ln_Re, *top) for top in tops]), ln_Re
+
+    @cached_property
+    def strength(self) -> materials.SectionStrength:
+        """Shape numbers of the elements' sections."""
+        anchors = list(self.model.rotor.blade.anchors)
+        x = np.array([a[0] for a in anchors])
+        return materials.strength(anchors, blend_weights(self.shape.r / self.shape.R, x))
+
+    @cached_property
+    def chord_range(self) -> tuple[Array, Array]:
+        """Least and largest ln(chord / R) at hub, elements and tip, (N + 2,)."""
+        limits, s = self.need.limits, self.shape
+        r = np.r_[s.Rhub, s.r, s.R]
+        anchors = self.model.rotor.blade.anchors
+        thickness = np.interp(r / s.R, [a[0] for a in anchors], [a[1].thickness for a in anchors])
+        least = np.maximum(limits.min_chord_m, limits.min_thickness_m / thickness) / s.R
+        most = np.minimum(WIDEST if not self.model.ducted else 1.0, 0.9 * 2.0 * np.pi * r / s.R / self.need.blades)
+        return np.log(least), np.log(np.maximum(most, least))
+
+    def speeds(self, x: Array) -> Array:
+        """Speeds of the points, (P,) [rev/min]."""
+        rpm = self.rpm0.copy()
+        rpm[self.free] *= np.exp(x[2 * CONTROLS : 2 * CONTROLS + self.free.size])
+        return rpm
+
+    def bounds(self) -> list[tuple[float, float]]:
+        """Of the variables: chords, angles half a turn of `TURN`, speeds up to the tip Mach number."""
+        low, high = self.chord_range
+        chord = [(float(low.min()), float(high.max()))] * CONTROLS
+        fast = [(math.log(0.1), math.log(max(self.need.slow / self.rpm0[i], 0.11))) for i in self.free]
+        return [*chord, *[(-4.0, 4.0)] * CONTROLS, *fast]
+
+    def values(self, x: Array, derivatives: bool = False) -> Values | None:
+        """What control values give; None where the solver does not converge."""
+        key = x.tobytes()
+        for deep in (True, derivatives):
+            if deep in self._last and self._last[deep][0] == key:
+                return self._last[deep][1]
+        try:
+            found = self._values(np.asarray(x, dtype=float), derivatives)
+        except (InputError, ValueError, FloatingPointError):
+            return None
+        self._last[derivatives] = key, found
+        return found
+
+    def _values(self, x: Array, derivatives: bool) -> Values:
+        s, P = self.shape.stations(x), len(self.need.points)
+        rpm = self.speeds(x)
+        V = np.array([p.airspeed_m_s for p in self.need.points])
+        near = [rpm[self.free] * (1.0 + sign * _STEP_RPM) for sign in (1.0, -1.0)] if derivatives else []
+        every, along = np.concatenate([rpm, *near]), np.concatenate([V, *[V[self.free]] * len(near)])
+        parts = [self._solved(effects, every, along, s, derivatives) for effects in self.variants]
+        e, by_c, by_b = (np.mean([part[i] for part in parts], axis=0) for i in range(3))
+        omega = every * (math.pi / 30.0)
+        # means of the rotors, in a duct the total of the mean sums
+        T, dT_c, dT_b = self._thrust(e, by_c, by_b, along, derivatives)
+        Q = e[1].sum(axis=1)
+        power = omega * Q
+        cl, W = e[2], e[3]
+        limit, d_limit = self._limit(W, s.chord)
+        stress = [self._stress(i, omega[i], s, e, by_c if derivatives else None, by_b) for i in range(P)]
+        allowed = self.need.limits.material.strength_MPa * 1e6 / self.need.limits.safety
+        low, high = self.chord_range
+        spline = self.shape.basis @ x[:CONTROLS]
+        margins = np.concatenate([
+            T[:P] / self.asked - 1.0, (limit[:P] - cl[:P]).ravel(),
+            *(1.0 - one.value[::2] / allowed for one in stress), spline - low, high - spline,
+        ])  # fmt: skip
+        objective = float(self.weights @ power[:P] / self.scale_W)
+        stresses = np.array([one.value for one in stress])
+        rest = rpm, T[:P], power[:P], cl[:P], limit[:P], e[0, :P] / s.dr, stresses, objective, margins
+        if not derivatives:
+            return Values(*rest, np.empty(0), np.empty((0, 0)))
+
+        def chain(c: Array, b: Array) -> Array:
+            return self.shape.pull_back(c, b, s.chord)
+
+        diagonal = np.eye(s.r.size)
+        d_Re_c = (W + s.chord * by_c[3]) / (W * s.chord)  # of ln Re
+        d_Re_b = by_b[3] / W
+        rows = [chain(dT_c[:P], dT_b[:P]) / self.asked[:, None]]
+        rows += [
+            chain(diagonal * (d_limit[k] * d_Re_c[k] - by_c[2, k])[:, None],
+                  diagonal * (d_limit[k] * d_Re_b[k] - by_b[2, k])[:, None])
+            for k in range(P)
+        ]  # fmt: skip
+        rows += [-chain(one.by_chord[::2], one.by_beta[::2]) / allowed for one in stress]
+        none = np.zeros_like(self.shape.basis)
+        rows += [np.c_[self.shape.basis, none], np.c_[-self.shape.basis, none]]
+        power_rows = omega[:P, None] * chain(by_c[1, :P], by_b[1, :P])
+        jacobian = np.zeros((margins.size, self.size))
+        jacobian[:, : 2 * CONTROLS] = np.concatenate(rows)
+        gradient = np.zeros(self.size)
+        gradient[: 2 * CONTROLS] = self.weights @ power_rows / self.scale_W
+        N, F = s.r.size, self.free.size
+        for j, k in enumerate(self.free):
+            up, down, v = P + j, P + F + j, 2 * CONTROLS + j
+            wide = 2.0 * _STEP_RPM  # of the logarithm
+
+            def slope(a: Array, up: int = up, down: int = down, wide: float = wide) -> Any:
+                return (a[up] - a[down]) / wide
+
+            gradient[v] = self.weights[k] * slope(power) / self.scale_W
+            jacobian[k, v] = slope(T) / self.asked[k]
+            jacobian[P + k * N : P + (k + 1) * N, v] = slope(limit) - slope(cl)
+            ends = [self._stress(i, omega[i], s, e, None, None).value[::2] for i in (up, down)]
+            first = P + P * N + k * ends[0].size
+            jacobian[first : first + ends[0].size, v] = -(ends[0] - ends[1]) / wide / allowed
+        return Values(*rest, gradient, jacobian)
+
+    def _solved(
+        self, effects: Sequence[Effect], rpm: Array, V: Array, s: Any, derivatives: bool
+    ) -> tuple[Array, Array, Array]:
+        args = self.model, effects, rpm, V, self.need.air, s, COLUMNS
+        if derivatives:
+            return element_tangents(*args)
+        found = elements(*args)
+        return found, np.zeros(1), np.zeros(1)
+
+    def _thrust(self, e: Array, by_c: Array, by_b: Array, V: Array, derivatives: bool) -> tuple[Array, Array, Array]:
+        """Thrust at points, (P,), and its derivatives by the elements' chords and angles, (P, N)."""
+        if self.flow is None:
+            return e[0].sum(axis=1), by_c[0] if derivatives else by_c, by_b[0] if derivatives else by_b
+        sums = self._sums(e, V)
+        T = self._total(sums.sum(axis=2), V)
+        if not derivatives:
+            return T, by_c, by_b
+        # the total by each sum, each sum by each element
+        size = np.abs(sums.sum(axis=2)).max(axis=1) + 1e-12
+        step = 1e-6
+        out = []
+        for tangent in (by_c, by_b):
+            # the sums are smooth functions of w and v_t of the element alone
+            h = step / (np.abs(tangent[4]).max() + np.abs(tangent[5]).max() + 1e-12)
+            moved = [self._sums(e + sign * h * tangent, V) for sign in (1.0, -1.0)]
+            out.append((moved[0] - moved[1]) / (2.0 * h))
+        by = np.empty((len(size), T.size))
+        for i, wide in enumerate(step * size):
+            one = np.zeros((len(size), 1))
+            one[i] = wide
+            total = sums.sum(axis=2)
+            by[i] = (self._total(total + one, V) - self._total(total - one, V)) / (2.0 * wide)
+        return T, *(np.einsum("ip,ipn->pn", by, d) for d in out)
+
+    def _sums(self, e: Array, V: Array) -> Array:
+        """What each element adds to the duct's sums, (5, P, N): mass, jet, stator, spin, whirl; as the kernel does."""
+        flow, s, rho = self.flow, self.shape, float(self.need.air.rho)
+        assert flow is not None
+        wake = 1.0 / (flow.wake_ratio * flow.contraction)
+        stream = flow.capture / flow.contraction - 1.0
+        area = 2.0 * math.pi * s.r * s.dr
+        w, v_t = e[4], e[5]
+        mass = rho * np.abs(w) * area
+        jet = mass * (wake * w - stream * V[:, None])
+        stator = flow.stator * 2.0 * rho * np.maximum(v_t, 0.0) ** 2 * area
+        return np.stack([mass, jet, stator, 4.0 * v_t**2 * s.dr / s.r, 4.0 * mass * v_t**2])
+
+    def _total(self, sums: Array, V: Array) -> Array:
+        """Thrust of rotor, stator and duct from the sums, (5, P). [N]"""
+        assert self.flow is not None
+        out = np.zeros((V.size, N_OUT))
+        out[:, [O_MASS, O_JET, O_STATOR, O_SPIN, O_WHIRL]] = sums.T
+        return np.asarray(self.flow.total(np.full(V.size, float(self.need.air.rho)), V, out)[0])
+
+    def _limit(self, W: Array, chord: Array) -> tuple[Array, Array]:
+        """Limit of the lift coefficient, (P, N), and its slope with ln Re."""
+        top, ln_Re = self.stall
+        at = np.log(np.maximum(float(self.need.air.rho) * np.abs(W) * chord / float(self.need.air.mu), 1.0))
+        place = np.clip((at - ln_Re[0]) / (ln_Re[1] - ln_Re[0]), 0.0, ln_Re.size - 1.000001)
+        i = place.astype(np.intp)
+        n = np.arange(chord.size)[None, :]
+        rise = top[n, i + 1] - top[n, i]
+        keep = 1.0 - self.need.limits.stall_margin
+        inside = (at > ln_Re[0]) & (at < ln_Re[-1])
+        return keep * (top[n, i] + (place - i) * rise), np.where(inside, keep * rise / (ln_Re[1] - ln_Re[0]), 0.0)
+
+    def _stress(
+        self, k: int, omega: float, s: Any, e: Array, by_c: Array | None, by_b: Array | None
+    ) -> materials.Stress:
+        tangents = (None, None) if by_c is None or by_b is None else (by_c[:2, k], by_b[:2, k])
+        return materials.stress(self.strength, self.need.limits.material.density, self.need.blades, omega, s.r, s.dr,
+                                s.chord, s.beta, e[:2, k], *tangents)  # fmt: skip
+
+    def active(self, v: Values) -> list[str]:
+        """Limits that are reached, in words, the thrust's left out."""
+        P, N = len(self.need.points), self.shape.r.size
+        x = self.shape.r / self.shape.R
+        words = []
+        for k in range(P):
+            gap = (v.limit[k] - v.cl[k]) / np.abs(v.limit[k])
+            if gap.min() < _TIGHT:
+                at = np.flatnonzero(gap < _TIGHT)
+                words.append(f"lift coefficient at r/R {_span(x[at])}{self._of(k)}")
+            used = v.stress_Pa[k, ::2] * self.need.limits.safety / (self.need.limits.material.strength_MPa * 1e6)
+            if used.max() > 1.0 - _TIGHT:
+                words.append(f"stress at r/R {_span(x[::2][used > 1.0 - _TIGHT])}{self._of(k)}")
+        ends = np.r_[self.shape.Rhub / self.shape.R, x, 1.0]
+        low, high = v.margins[P + P * N + P * v.stress_Pa[0, ::2].size :].reshape(2, -1)
+        why = "thickness" if self.need.limits.min_thickness_m > 0.0 else "chord"
+        for gap, name in ((low, f"least {why}"), (high, "largest chord")):
+            if gap.min() < _TIGHT:
+                words.append(f"{name} at r/R {_span(ends[gap < _TIGHT])}")
+        words += [f"tip Mach{self._of(int(k))}" for k in self.free if v.rpm[k] > self.need.slow * (1.0 - _TIGHT)]
+        return words
+
+    def _of(self, k: int) -> str:
+        return "" if len(self.need.points) == 1 else f" (point {k + 1})"
+
+
+def _span(x: Array) -> str:
+    return f"{x[0]:.2f}" if x.size == 1 else f"{x[0]:.2f} to {x[-1]:.2f}"
+
+
+def highest_lift(polar: Polar) -> tuple[Array, Array]:
+    """Logarithms of Reynolds numbers and the lift coefficient at which the section stalls there."""
+    some = np.flatnonzero((polar.alpha >= 0.0) & (polar.alpha <= math.radians(30.0)))
+    cl = polar.cl[some, :, 0]
+    top = np.take_along_axis(cl, first_stall(cl)[None, :], axis=0)[0]
+    if top.size == 1:
+        return np.log(np.array([1e3, 1e7])), np.repeat(top, 2)
+    return np.log(polar.Re), top
+
+
