@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.design.minimum_loss import MinimumLoss, minimum_loss
-from bemt.design.problem import Problem, Values, highest_lift
+from bemt.design.problem import Problem, Values, lift_limit
 from bemt.design.requirement import Requirement
 from bemt.design.shape import CONTROLS, Shape
 from bemt.effects import Effect
@@ -30,6 +30,7 @@ ENOUGH = 1e-3
 _TOLERANCE = 1e-6
 _STEPS = 60
 _ROOM = 1.1  # Thrust over the required one at which the search for more of it ends
+_BOX, _SMALLEST_BOX, _CORNERS, _PENALTY, _NEARLY = 0.4, 1e-3, 40, 10.0, 1e-4  # Of the search for the most thrust
 _USUAL_TIP = 0.35  # Mach number of a first guess where the speed is free
 
 
@@ -65,8 +66,7 @@ def section_at_best(model: Model, need: Requirement, r_over_R: float = 0.7) -> C
     polar = min(model.polars, key=lambda p: abs(p[0] - r_over_R))[1]
     some = np.flatnonzero((polar.alpha >= math.radians(-4.0)) & (polar.alpha <= math.radians(16.0)))
     cl, cd = polar.cl[some, :, 0], polar.cd[some, :, 0]
-    keep = 1.0 - need.limits.stall_margin
-    top = keep * highest_lift(polar)[1][: cl.shape[1]]
+    top = lift_limit(polar, need.limits.stall_margin)[3][: cl.shape[1]]
     best = np.argmax(np.where((cl > 0.1) & (cl <= top[None, :]), cl / cd, -1.0), axis=0)
     n = np.arange(cl.shape[1])
     table = cl[best, n], polar.alpha[some][best], cd[best, n] / cl[best, n]
@@ -156,96 +156,94 @@ def optimise(problem: Problem, x0: Array, progress: Progress | None = None, step
     before = problem.values(start)
     if before is None:
         raise InputError(Fault("", "--thrust", "no blade to start from converges", "a point that the solver converges at"))
-    best, n, done = _least_power(problem, start, progress, steps)
-    after = problem.values(best)
-    if after is None or after.margins.min() < -ENOUGH:
-        reached, x, more = _most_thrust(problem, start, progress, steps)
+    inside, n = start, 0
+    if before.margins.min() < 0.0:
+        reached, inside, n = most_thrust(problem, x0, progress)
         if reached < 1.0 - ENOUGH:
-            raise InputError(_unreachable(problem, x, reached))
-        best, n, done = _least_power(problem, x, progress, steps)
-        n, after = n + more, problem.values(best)
-        if after is None or after.margins.min() < -ENOUGH:
-            best, after, done = x, problem.values(x), False
+            raise InputError(_unreachable(problem, inside, reached))
+    best, more, done = _least_power(problem, inside, progress, steps)
+    after = problem.values(best)
+    if after is None or after.margins.min() < -ENOUGH:  # what was found before is within the limits
+        best, after, done = inside, problem.values(inside), False
     assert after is not None
-    return Found(problem, start, best, before, after, n, done)
+    return Found(problem, start, best, before, after, n + more, done)
+
+
+def most_thrust(problem: Problem, x0: Array, progress: Progress | None = None) -> tuple[float, Array, int]:
+    """Largest share of all thrusts that can be had at once within the limits (up to `_ROOM`), its variables, and steps.
+
+    Linear programs in a box around the last blade, with one slack for all limits (Fletcher and Sainz de la Maza 1989,
+    Mathematical Programming 43): the most thrust stands in a corner of the limits.
+    """
+    from scipy.optimize import linprog
+
+    P = len(problem.need.points)
+    low, high = np.array(problem.bounds()).T
+    x, box, n = np.clip(x0, low, high), _BOX, 0
+    v = problem.values(x, derivatives=True)
+    if v is None:
+        return 0.0, x0, 0
+    c = np.r_[np.zeros(x.size), -1.0, _PENALTY]
+    while n < _CORNERS and box > _SMALLEST_BOX:
+        if _share(v) >= 1.0 and v.margins[P:].min() >= -_NEARLY:
+            break
+        # ratio + d(ratio) dx >= t;  margin + d(margin) dx >= -slack
+        ratio = v.thrust_N / problem.asked
+        A = np.block([[-v.jacobian[:P], np.ones((P, 1)), np.zeros((P, 1))],
+                      [-v.jacobian[P:], np.zeros((v.margins.size - P, 1)), -np.ones((v.margins.size - P, 1))]])
+        sides = np.c_[np.maximum(low - x, -box), np.minimum(high - x, box)]
+        got = linprog(c, A, np.r_[ratio, v.margins[P:]], bounds=[*sides, (-9.0, _ROOM), (0.0, None)], method="highs")
+        n += 1
+        if progress is not None:
+            progress(n, "limits")
+        new = None if got.status != 0 else problem.values(x + got.x[: x.size], derivatives=True)
+        if new is not None and _merit(new, P) < _merit(v, P) - 1e-6:
+            x, v, box = x + got.x[: x.size], new, min(1.5 * box, _BOX)
+        else:
+            box *= 0.35
+    within = float(np.maximum(-v.margins[P:], 0.0).max(initial=0.0))
+    return (_share(v) if within <= ENOUGH else min(_share(v), 0.0)), x, n
+
+
+def _share(v: Values) -> float:
+    """Least thrust over the required one."""
+    return float(v.margins[: v.thrust_N.size].min()) + 1.0
+
+
+def _merit(v: Values, P: int) -> float:
+    """What the linear programs lessen: thrust that is missing, and the worst limit."""
+    return -min(_share(v), _ROOM) + _PENALTY * max(0.0, -float(v.margins[P:].min()))
 
 
 def _least_power(problem: Problem, x0: Array, progress: Progress | None, steps: int) -> tuple[Array, int, bool]:
-    search = _Search(problem, progress, "least power")
-    return search.run(x0, search.power, problem.bounds(), steps)
+    """Run SLSQP (Kraft 1988, DFVLR-FB 88-28): variables at the end, steps, and whether it converged."""
+    from scipy.optimize import minimize
 
+    last, n = [problem.values(x0, derivatives=True)], 0
 
-def _most_thrust(problem: Problem, x0: Array, progress: Progress | None, steps: int) -> tuple[float, Array, int]:
-    """Largest share of all thrusts that can be had at once (up to `_ROOM`), its variables, and steps."""
-    search = _Search(problem, progress, "most thrust", shared=True)
-    v = problem.values(x0)
-    share = 0.0 if v is None else float((v.thrust_N / problem.asked).min())
-    bounds = [*problem.bounds(), (-2.0, _ROOM)]
-    x, n, _ = search.run(np.r_[x0, min(share, _ROOM)], search.share, bounds, steps)
-    v = problem.values(x[:-1])
-    ratio = -1.0 if v is None else float((v.thrust_N / problem.asked).min())
-    return ratio, x[:-1], n
+    def values(x: Array) -> Values:
+        found = problem.values(x, derivatives=True)
+        last[0] = found or last[0]
+        assert last[0] is not None
+        return last[0]
 
+    def power(x: Array) -> tuple[float, Array]:
+        v = values(x)
+        lost = problem.values(x, derivatives=True) is None
+        return (1e3, np.zeros(x.size)) if lost else (v.objective, v.gradient)
 
-class _Search:
-    """One run of SLSQP (Kraft 1988, DFVLR-FB 88-28) with what it has seen last."""
+    def count(x: Array) -> None:
+        nonlocal n
+        n += 1
+        if progress is not None:
+            progress(n, "least power")
 
-    def __init__(self, problem: Problem, progress: Progress | None, what: str, shared: bool = False) -> None:
-        self.problem, self.progress, self.what, self.shared = problem, progress, what, shared
-        self.steps = 0
-        self.last: Values | None = None
-
-    def run(self, x0: Array, objective: Any, bounds: Any, steps: int) -> tuple[Array, int, bool]:
-        """Variables at the end, steps, and whether it converged."""
-        from scipy.optimize import minimize
-
-        low, high = np.array(bounds).T
-        found = minimize(
-            objective, np.clip(x0, low, high), jac=True, method="SLSQP", bounds=bounds, callback=self._count,
-            constraints=[{"type": "ineq", "fun": self.margins, "jac": self.slopes}],
-            options={"maxiter": steps, "ftol": _TOLERANCE},
-        )  # fmt: skip
-        return np.asarray(found.x), self.steps, bool(found.success)
-
-    def _count(self, x: Array) -> None:
-        self.steps += 1
-        if self.progress is not None:
-            self.progress(self.steps, self.what)
-
-    def _values(self, x: Array) -> Values | None:
-        v = self.problem.values(x[: self.problem.size], derivatives=True)
-        self.last = v or self.last
-        return v
-
-    def power(self, x: Array) -> tuple[float, Array]:
-        """Mean power; a wall where the solver does not converge."""
-        v = self._values(x)
-        return (1e3, np.zeros(x.size)) if v is None else (v.objective, v.gradient)
-
-    def share(self, x: Array) -> tuple[float, Array]:
-        """Share of the thrusts, negative, with a little of the power: the same blade from every start."""
-        one = np.zeros(x.size)
-        one[-1] = -1.0
-        return -float(x[-1]), one
-
-    def margins(self, x: Array) -> Array:
-        """Constraints."""
-        v = self._values(x) or self.last
-        assert v is not None
-        m = v.margins.copy()
-        if self.shared:
-            m[: len(self.problem.need.points)] += 1.0 - x[-1]
-        return m
-
-    def slopes(self, x: Array) -> Array:
-        """Derivatives of the constraints."""
-        v = self._values(x) or self.last
-        assert v is not None
-        if not self.shared:
-            return v.jacobian
-        extra = np.zeros((v.margins.size, 1))
-        extra[: len(self.problem.need.points)] = -1.0
-        return np.c_[v.jacobian, extra]
+    found = minimize(
+        power, x0, jac=True, method="SLSQP", bounds=problem.bounds(), callback=count,
+        constraints=[{"type": "ineq", "fun": lambda x: values(x).margins, "jac": lambda x: values(x).jacobian}],
+        options={"maxiter": steps, "ftol": _TOLERANCE},
+    )  # fmt: skip
+    return np.asarray(found.x), n, bool(found.success)
 
 
 def _unreachable(problem: Problem, x: Array, share: float) -> list[Fault]:

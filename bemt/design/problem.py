@@ -2,12 +2,14 @@
 
     minimise   sum_k w_k P_k                            mean power over the points
     subject to T_k >= T_k required                      also at points of weight 0
-               cl <= (1 - margin) cl_max(r/R, Re)       every element, every point
+               alpha <= that of (1 - margin) cl_max     every element, every point of weight
                stress <= strength / safety              every other element, every point
                chord >= what chord and thickness ask    every element, hub and tip
                chord <= 0.3 R and 0.9 of the gap between blades
 
-The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
+The angle of attack is limited, not the lift coefficient, since a stalled section has a lift that any limit allows. The
+limit is that of the section's own table at the element's Reynolds number, less by Prandtl and Glauert's factor at its Mach
+number. The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
 angles (:func:`bemt.bem.gradient.element_tangents`); the control points follow by the chain rule. Over rotors as built,
 power, thrust and margins are means of the rotors.
 """
@@ -40,8 +42,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COLUMNS = ("dT", "dQ", "cl", "W", "w", "v_t")
+COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
+_ALPHA, _W, _AXIAL, _SWIRL, _CL = range(2, 7)
 _STEP_RPM = 1e-6
+_STEEP = 5.0  # Lift coefficient over angle: of the size of the other constraints [1/rad]
+_MACH = 0.9  # Beyond, Prandtl and Glauert's factor is held
 _TIGHT = 2e-3
 """Distance from a limit, as a share of it, below which it counts as reached."""
 
@@ -110,6 +115,11 @@ class Problem:
         return np.asarray(w / w.sum())
 
     @cached_property
+    def flown(self) -> NDArray[np.intp]:
+        """Points of weight, which keep the stall margin."""
+        return np.flatnonzero(self.weights > 0.0)
+
+    @cached_property
     def asked(self) -> Array:
         """Thrusts, (P,) [N]."""
         return np.array([p.thrust_N for p in self.need.points])
@@ -126,10 +136,14 @@ class Problem:
 
     @cached_property
     def stall(self) -> tuple[Array, Array]:
-        """Largest lift coefficients of the elements' sections, (N, Nr), at logarithms of Reynolds numbers, (Nr,)."""
-        tops = [highest_lift(polar) for _, polar in self.model.polars]
+        """Limits of the elements' sections, (3, N, Nr): zero-lift angle, largest angle less that [rad], lift there.
+
+        And the logarithms of Reynolds numbers, (Nr,).
+        """
         ln_Re = np.log(DEFAULT_RE)  # even
-        return self.blend @ np.array([np.interp(ln_Re, *top) for top in tops]), ln_Re
+        tops = [lift_limit(polar, self.need.limits.stall_margin) for _, polar in self.model.polars]
+        tables = np.array([[np.interp(ln_Re, top[0], row) for row in top[1:]] for top in tops])
+        return np.einsum("ns,skr->knr", self.blend, tables), ln_Re
 
     @cached_property
     def strength(self) -> materials.SectionStrength:
@@ -188,19 +202,19 @@ class Problem:
         T, dT_c, dT_b = self._thrust(e, by_c, by_b, along, derivatives)
         Q = e[1].sum(axis=1)
         power = omega * Q
-        cl, W = e[2], e[3]
-        limit, d_limit = self._limit(W, s.chord)
+        alpha, W = e[_ALPHA], e[_W]
+        limit, by_Re, by_W, lift = self._limit(W, s.chord)
         stress = [self._stress(i, omega[i], s, e, by_c if derivatives else None, by_b) for i in range(P)]
         allowed = self.need.limits.material.strength_MPa * 1e6 / self.need.limits.safety
         low, high = self.chord_range
         spline = self.shape.basis @ x[:CONTROLS]
         margins = np.concatenate([
-            T[:P] / self.asked - 1.0, (limit[:P] - cl[:P]).ravel(),
-            *(1.0 - one.value[::2] / allowed for one in stress), spline - low, high - spline,
+            T[:P] / self.asked - 1.0, _STEEP * (limit - alpha)[self.flown].ravel(),
+            *(np.log(allowed / one.value[::2]) for one in stress), spline - low, high - spline,
         ])  # fmt: skip
         objective = float(self.weights @ power[:P] / self.scale_W)
         stresses = np.array([one.value for one in stress])
-        rest = rpm, T[:P], power[:P], cl[:P], limit[:P], e[0, :P] / s.dr, stresses, objective, margins
+        rest = rpm, T[:P], power[:P], e[_CL, :P], lift[:P], e[0, :P] / s.dr, stresses, objective, margins
         if not derivatives:
             return Values(*rest, np.empty(0), np.empty((0, 0)))
 
@@ -208,15 +222,14 @@ class Problem:
             return self.shape.pull_back(c, b, s.chord)
 
         diagonal = np.eye(s.r.size)
-        d_Re_c = (W + s.chord * by_c[3]) / (W * s.chord)  # of ln Re
-        d_Re_b = by_b[3] / W
+        limit_c = by_Re * (1.0 / s.chord + by_c[_W] / W) + by_W * by_c[_W]
+        limit_b = by_Re * by_b[_W] / W + by_W * by_b[_W]
         rows = [chain(dT_c[:P], dT_b[:P]) / self.asked[:, None]]
         rows += [
-            chain(diagonal * (d_limit[k] * d_Re_c[k] - by_c[2, k])[:, None],
-                  diagonal * (d_limit[k] * d_Re_b[k] - by_b[2, k])[:, None])
-            for k in range(P)
+            _STEEP * chain(diagonal * (limit_c - by_c[_ALPHA])[k][:, None], diagonal * (limit_b - by_b[_ALPHA])[k][:, None])
+            for k in self.flown
         ]  # fmt: skip
-        rows += [-chain(one.by_chord[::2], one.by_beta[::2]) / allowed for one in stress]
+        rows += [-chain(one.by_chord[::2], one.by_beta[::2]) / one.value[::2, None] for one in stress]
         none = np.zeros_like(self.shape.basis)
         rows += [np.c_[self.shape.basis, none], np.c_[-self.shape.basis, none]]
         power_rows = omega[:P, None] * chain(by_c[1, :P], by_b[1, :P])
@@ -234,10 +247,12 @@ class Problem:
 
             gradient[v] = self.weights[k] * slope(power) / self.scale_W
             jacobian[k, v] = slope(T) / self.asked[k]
-            jacobian[P + k * N : P + (k + 1) * N, v] = slope(limit) - slope(cl)
+            if k in self.flown:
+                place = P + N * int(np.searchsorted(self.flown, k))
+                jacobian[place : place + N, v] = _STEEP * (slope(limit) - slope(alpha))
             ends = [self._stress(i, omega[i], s, e, None, None).value[::2] for i in (up, down)]
-            first = P + P * N + k * ends[0].size
-            jacobian[first : first + ends[0].size, v] = -(ends[0] - ends[1]) / wide / allowed
+            first = P + self.flown.size * N + k * ends[0].size
+            jacobian[first : first + ends[0].size, v] = -np.log(ends[0] / ends[1]) / wide
         return Values(*rest, gradient, jacobian)
 
     def _solved(
@@ -263,7 +278,7 @@ class Problem:
         out = []
         for tangent in (by_c, by_b):
             # the sums are smooth functions of w and v_t of the element alone
-            h = step / (np.abs(tangent[4]).max() + np.abs(tangent[5]).max() + 1e-12)
+            h = step / (np.abs(tangent[_AXIAL]).max() + np.abs(tangent[_SWIRL]).max() + 1e-12)
             moved = [self._sums(e + sign * h * tangent, V) for sign in (1.0, -1.0)]
             out.append((moved[0] - moved[1]) / (2.0 * h))
         by = np.empty((len(size), T.size))
@@ -281,7 +296,7 @@ class Problem:
         wake = 1.0 / (flow.wake_ratio * flow.contraction)
         stream = flow.capture / flow.contraction - 1.0
         area = 2.0 * math.pi * s.r * s.dr
-        w, v_t = e[4], e[5]
+        w, v_t = e[_AXIAL], e[_SWIRL]
         mass = rho * np.abs(w) * area
         jet = mass * (wake * w - stream * V[:, None])
         stator = flow.stator * 2.0 * rho * np.maximum(v_t, 0.0) ** 2 * area
@@ -294,17 +309,20 @@ class Problem:
         out[:, [O_MASS, O_JET, O_STATOR, O_SPIN, O_WHIRL]] = sums.T
         return np.asarray(self.flow.total(np.full(V.size, float(self.need.air.rho)), V, out)[0])
 
-    def _limit(self, W: Array, chord: Array) -> tuple[Array, Array]:
-        """Limit of the lift coefficient, (P, N), and its slope with ln Re."""
-        top, ln_Re = self.stall
-        at = np.log(np.maximum(float(self.need.air.rho) * np.abs(W) * chord / float(self.need.air.mu), 1.0))
-        place = np.clip((at - ln_Re[0]) / (ln_Re[1] - ln_Re[0]), 0.0, ln_Re.size - 1.000001)
-        i = place.astype(np.intp)
-        n = np.arange(chord.size)[None, :]
-        rise = top[n, i + 1] - top[n, i]
-        keep = 1.0 - self.need.limits.stall_margin
-        inside = (at > ln_Re[0]) & (at < ln_Re[-1])
-        return keep * (top[n, i] + (place - i) * rise), np.where(inside, keep * rise / (ln_Re[1] - ln_Re[0]), 0.0)
+    def _limit(self, W: Array, chord: Array) -> tuple[Array, Array, Array, Array]:
+        """Largest angle of attack, (P, N) [rad], its slopes with ln Re and with W, and the lift coefficient there."""
+        tables, ln_Re = self.stall
+        air, step = self.need.air, ln_Re[1] - ln_Re[0]
+        at = np.log(np.maximum(float(air.rho) * np.abs(W) * chord / float(air.mu), 1.0))
+        place = np.clip((at - ln_Re[0]) / step, 0.0, ln_Re.size - 1.000001)
+        i, n = place.astype(np.intp), np.arange(chord.size)[None, :]
+        low, high = tables[:, n, i], tables[:, n, i + 1]
+        zero, wide, lift = low + (place - i) * (high - low)
+        d_zero, d_wide, _ = np.where((at > ln_Re[0]) & (at < ln_Re[-1]), (high - low) / step, 0.0)
+        mach = np.minimum(np.abs(W) / float(air.a_sound), _MACH)
+        factor = np.sqrt(1.0 - mach**2)
+        by_W = np.where(mach < _MACH, -wide * mach / (factor * float(air.a_sound)), 0.0)
+        return zero + factor * wide, d_zero + factor * d_wide, by_W, lift
 
     def _stress(
         self, k: int, omega: float, s: Any, e: Array, by_c: Array | None, by_b: Array | None
@@ -319,15 +337,15 @@ class Problem:
         x = self.shape.r / self.shape.R
         words = []
         for k in range(P):
-            gap = (v.limit[k] - v.cl[k]) / np.abs(v.limit[k])
+            at = P + N * int(np.searchsorted(self.flown, k))
+            gap = v.margins[at : at + N] if k in self.flown else np.ones(N)
             if gap.min() < _TIGHT:
-                at = np.flatnonzero(gap < _TIGHT)
-                words.append(f"lift coefficient at r/R {_span(x[at])}{self._of(k)}")
+                words.append(f"stall margin at r/R {_span(x[gap < _TIGHT])}{self._of(k)}")
             used = v.stress_Pa[k, ::2] * self.need.limits.safety / (self.need.limits.material.strength_MPa * 1e6)
             if used.max() > 1.0 - _TIGHT:
                 words.append(f"stress at r/R {_span(x[::2][used > 1.0 - _TIGHT])}{self._of(k)}")
         ends = np.r_[self.shape.Rhub / self.shape.R, x, 1.0]
-        low, high = v.margins[P + P * N + P * v.stress_Pa[0, ::2].size :].reshape(2, -1)
+        low, high = v.margins[P + self.flown.size * N + P * v.stress_Pa[0, ::2].size :].reshape(2, -1)
         why = "thickness" if self.need.limits.min_thickness_m > 0.0 else "chord"
         for gap, name in ((low, f"least {why}"), (high, "largest chord")):
             if gap.min() < _TIGHT:
@@ -343,13 +361,23 @@ def _span(x: Array) -> str:
     return f"{x[0]:.2f}" if x.size == 1 else f"{x[0]:.2f} to {x[-1]:.2f}"
 
 
-def highest_lift(polar: Polar) -> tuple[Array, Array]:
-    """Logarithms of Reynolds numbers and the lift coefficient at which the section stalls there."""
-    some = np.flatnonzero((polar.alpha >= 0.0) & (polar.alpha <= math.radians(30.0)))
-    cl = polar.cl[some, :, 0]
-    top = np.take_along_axis(cl, first_stall(cl)[None, :], axis=0)[0]
-    if top.size == 1:
-        return np.log(np.array([1e3, 1e7])), np.repeat(top, 2)
-    return np.log(polar.Re), top
+def lift_limit(polar: Polar, margin: float) -> tuple[Array, Array, Array, Array]:
+    """Over Reynolds number: its logarithm, zero-lift angle, angle from there to the limit [rad], lift coefficient there.
 
-
+    The limit is where the lift first reaches (1 - margin) of what the section has before it stalls.
+    """
+    some = np.flatnonzero((polar.alpha >= math.radians(-12.0)) & (polar.alpha <= math.radians(30.0)))
+    alpha = polar.alpha[some]
+    rows = []
+    for cl in polar.cl[some, :, 0].T:
+        start = int(np.flatnonzero(cl <= 0.0)[-1]) if (cl <= 0.0).any() else 0
+        part, angle = cl[start:], alpha[start:]
+        end = int(first_stall(part))
+        rising = np.maximum.accumulate(part[: end + 1])
+        top = (1.0 - margin) * float(rising[-1])
+        zero, at = np.interp([0.0, top], rising, angle[: end + 1])
+        rows.append((zero, at - zero, top))
+    zero, wide, top = (np.array(v) for v in zip(*rows, strict=True))
+    if polar.Re.size == 1:
+        return np.log(np.array([1e3, 1e7])), *(np.repeat(v, 2) for v in (zero, wide, top))
+    return np.log(polar.Re), zero, wide, top
