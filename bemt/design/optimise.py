@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.design.minimum_loss import MinimumLoss, minimum_loss
-from bemt.design.problem import Problem, Values, lift_limit
+from bemt.design.problem import Problem, Values, top_lift
 from bemt.design.requirement import Requirement
 from bemt.design.shape import CONTROLS, Shape
 from bemt.effects import Effect
@@ -66,7 +66,7 @@ def section_at_best(model: Model, need: Requirement, r_over_R: float = 0.7) -> C
     polar = min(model.polars, key=lambda p: abs(p[0] - r_over_R))[1]
     some = np.flatnonzero((polar.alpha >= math.radians(-4.0)) & (polar.alpha <= math.radians(16.0)))
     cl, cd = polar.cl[some, :, 0], polar.cd[some, :, 0]
-    top = lift_limit(polar, need.limits.stall_margin)[3][: cl.shape[1]]
+    top = (1.0 - need.limits.stall_margin) * top_lift(polar)[1]
     best = np.argmax(np.where((cl > 0.1) & (cl <= top[None, :]), cl / cd, -1.0), axis=0)
     n = np.arange(cl.shape[1])
     table = cl[best, n], polar.alpha[some][best], cd[best, n] / cl[best, n]

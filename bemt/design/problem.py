@@ -5,12 +5,13 @@
                alpha <= that of (1 - margin) cl_max     every element, every point of weight
                stress <= strength / safety              every other element, every point
                chord >= what chord and thickness ask    every element, hub and tip
-               chord <= 0.3 R and 0.9 of the gap between blades
+               chord <= 0.3 R and 0.9 of the gap between blades (in a duct R and twice the gap)
 
-The angle of attack is limited, not the lift coefficient, since a stalled section has a lift that any limit allows. The
-limit is that of the section's own table at the element's Reynolds number, less by Prandtl and Glauert's factor at its Mach
-number. The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
-angles (:func:`bemt.bem.gradient.element_tangents`); the control points follow by the chain rule. Over rotors as built,
+The angle of attack is limited, not the lift coefficient, since a stalled section has a lift that any limit allows: up to
+where the table with which the solver works (rotation, neighbouring blades) first has the lift that is left of the
+isolated section's largest, at the element's Reynolds number, less by Prandtl and Glauert's factor at its Mach number.
+The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
+angles (:mod:`bemt.bem.gradient`); the control points follow by the chain rule. Over rotors as built,
 power, thrust and margins are means of the rotors.
 """
 
@@ -26,27 +27,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
-from bemt.bem.gradient import element_tangents, elements
+from bemt.bem import gradient as around
 from bemt.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WHIRL
 from bemt.bem.packing import blend_weights
 from bemt.design import materials
 from bemt.design.requirement import WIDEST, Requirement
 from bemt.design.shape import CONTROLS, Shape
 from bemt.effects import Effect
-from bemt.sections.polars import DEFAULT_RE, first_stall
+from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
 
 if TYPE_CHECKING:
     from bemt.bem.duct import DuctFlow
     from bemt.bem.model import Model
+    from bemt.bem.solver import Prepared
     from bemt.sections.polars import Polar
+    from geometry.blade import Stations
 
 Array = NDArray[np.float64]
 
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
-_ALPHA, _W, _AXIAL, _SWIRL, _CL = range(2, 7)
+_ALPHA, _W, _AXIAL, _SWIRL, _CL, _ROOM, _LIFT = range(2, 9)  # the last two are added here
 _STEP_RPM = 1e-6
 _STEEP = 5.0  # Lift coefficient over angle: of the size of the other constraints [1/rad]
+_ANGLES = np.flatnonzero((ALPHA_GRID >= math.radians(-20.0)) & (ALPHA_GRID <= math.radians(35.0)))
 _MACH = 0.9  # Beyond, Prandtl and Glauert's factor is held
+GAPS, FAN_GAPS = 0.9, 2.0
+"""Largest chord over the distance between blades, in the open and in a duct [1]."""
 _TIGHT = 2e-3
 """Distance from a limit, as a share of it, below which it counts as reached."""
 
@@ -135,15 +141,11 @@ class Problem:
         return blend_weights(self.shape.r / self.shape.R, np.array([x for x, _ in self.model.polars]))
 
     @cached_property
-    def stall(self) -> tuple[Array, Array]:
-        """Limits of the elements' sections, (3, N, Nr): zero-lift angle, largest angle less that [rad], lift there.
-
-        And the logarithms of Reynolds numbers, (Nr,).
-        """
-        ln_Re = np.log(DEFAULT_RE)  # even
-        tops = [lift_limit(polar, self.need.limits.stall_margin) for _, polar in self.model.polars]
-        tables = np.array([[np.interp(ln_Re, top[0], row) for row in top[1:]] for top in tops])
-        return np.einsum("ns,skr->knr", self.blend, tables), ln_Re
+    def top(self) -> Array:
+        """Lift coefficients that the elements' sections may have, (N, Nr), at the shared Reynolds numbers."""
+        tops = [top_lift(polar) for _, polar in self.model.polars]
+        table = np.array([np.interp(np.log(DEFAULT_RE), np.log(Re), cl) for Re, cl in tops])
+        return np.asarray((1.0 - self.need.limits.stall_margin) * (self.blend @ table))
 
     @cached_property
     def strength(self) -> materials.SectionStrength:
@@ -160,7 +162,8 @@ class Problem:
         anchors = self.model.rotor.blade.anchors
         thickness = np.interp(r / s.R, [a[0] for a in anchors], [a[1].thickness for a in anchors])
         least = np.maximum(limits.min_chord_m, limits.min_thickness_m / thickness) / s.R
-        most = np.minimum(WIDEST if not self.model.ducted else 1.0, 0.9 * 2.0 * np.pi * r / s.R / self.need.blades)
+        wide, gaps = (1.0, FAN_GAPS) if self.model.ducted else (WIDEST, GAPS)
+        most = np.minimum(wide, gaps * 2.0 * np.pi * r / s.R / self.need.blades)
         return np.log(least), np.log(np.maximum(most, least))
 
     def speeds(self, x: Array) -> Array:
@@ -202,19 +205,17 @@ class Problem:
         T, dT_c, dT_b = self._thrust(e, by_c, by_b, along, derivatives)
         Q = e[1].sum(axis=1)
         power = omega * Q
-        alpha, W = e[_ALPHA], e[_W]
-        limit, by_Re, by_W, lift = self._limit(W, s.chord)
         stress = [self._stress(i, omega[i], s, e, by_c if derivatives else None, by_b) for i in range(P)]
         allowed = self.need.limits.material.strength_MPa * 1e6 / self.need.limits.safety
         low, high = self.chord_range
         spline = self.shape.basis @ x[:CONTROLS]
         margins = np.concatenate([
-            T[:P] / self.asked - 1.0, _STEEP * (limit - alpha)[self.flown].ravel(),
+            T[:P] / self.asked - 1.0, _STEEP * e[_ROOM, self.flown].ravel(),
             *(np.log(allowed / one.value[::2]) for one in stress), spline - low, high - spline,
         ])  # fmt: skip
         objective = float(self.weights @ power[:P] / self.scale_W)
         stresses = np.array([one.value for one in stress])
-        rest = rpm, T[:P], power[:P], e[_CL, :P], lift[:P], e[0, :P] / s.dr, stresses, objective, margins
+        rest = rpm, T[:P], power[:P], e[_CL, :P], e[_LIFT, :P], e[0, :P] / s.dr, stresses, objective, margins
         if not derivatives:
             return Values(*rest, np.empty(0), np.empty((0, 0)))
 
@@ -222,11 +223,9 @@ class Problem:
             return self.shape.pull_back(c, b, s.chord)
 
         diagonal = np.eye(s.r.size)
-        limit_c = by_Re * (1.0 / s.chord + by_c[_W] / W) + by_W * by_c[_W]
-        limit_b = by_Re * by_b[_W] / W + by_W * by_b[_W]
         rows = [chain(dT_c[:P], dT_b[:P]) / self.asked[:, None]]
         rows += [
-            _STEEP * chain(diagonal * (limit_c - by_c[_ALPHA])[k][:, None], diagonal * (limit_b - by_b[_ALPHA])[k][:, None])
+            _STEEP * chain(diagonal * by_c[_ROOM, k][:, None], diagonal * by_b[_ROOM, k][:, None])
             for k in self.flown
         ]  # fmt: skip
         rows += [-chain(one.by_chord[::2], one.by_beta[::2]) / one.value[::2, None] for one in stress]
@@ -249,20 +248,40 @@ class Problem:
             jacobian[k, v] = slope(T) / self.asked[k]
             if k in self.flown:
                 place = P + N * int(np.searchsorted(self.flown, k))
-                jacobian[place : place + N, v] = _STEEP * (slope(limit) - slope(alpha))
+                jacobian[place : place + N, v] = _STEEP * slope(e[_ROOM])
             ends = [self._stress(i, omega[i], s, e, None, None).value[::2] for i in (up, down)]
             first = P + self.flown.size * N + k * ends[0].size
             jacobian[first : first + ends[0].size, v] = -np.log(ends[0] / ends[1]) / wide
         return Values(*rest, gradient, jacobian)
 
     def _solved(
-        self, effects: Sequence[Effect], rpm: Array, V: Array, s: Any, derivatives: bool
+        self, effects: Sequence[Effect], rpm: Array, V: Array, s: Stations, derivatives: bool
     ) -> tuple[Array, Array, Array]:
-        args = self.model, effects, rpm, V, self.need.air, s, COLUMNS
-        if derivatives:
-            return element_tangents(*args)
-        found = elements(*args)
-        return found, np.zeros(1), np.zeros(1)
+        """Columns of the elements with room to the largest angle and the lift there, and their own derivatives."""
+        if not derivatives:
+            return self._columns(around.only(self.model, effects, s), rpm, V), np.zeros(1), np.zeros(1)
+        rotors = around.moved(self.model, effects, s)
+        base, *slopes = self._columns(rotors.base, rpm, V), *(
+            (self._columns(high, rpm, V) - self._columns(low, rpm, V)) / width
+            for low, high, width in (rotors.chord, rotors.beta)
+        )  # fmt: skip
+        return base, slopes[0], slopes[1]
+
+    def _columns(self, prep: Prepared, rpm: Array, V: Array) -> Array:
+        air = self.need.air
+        e = around.elements(prep, rpm, V, air.rho, air, COLUMNS)
+        W = np.abs(e[_W])
+        ln_Re0, per_step, last = prep.grid[7], prep.grid[8], prep.axes[1] - 1
+        at = np.log(np.maximum(float(air.rho) * W * prep.stations.chord / float(air.mu), 1.0))
+        place = np.clip((at - ln_Re0) * per_step, 0.0, max(last - 1e-6, 0.0))
+        i, n = place.astype(np.intp), np.arange(W.shape[1])[None, :]
+        nodes = np.clip(np.rint((ln_Re0 - LOG_RE0) / DLOG_RE).astype(int) + np.arange(last + 1), 0, DEFAULT_RE.size - 1)
+        top = self.top[:, nodes]
+        zero, most = (_angle_of(_lift_at_rest(prep), top * share) for share in (0.0, 1.0))
+        j = np.minimum(i + 1, last)
+        low, wide, lift = (t[n, i] + (place - i) * (t[n, j] - t[n, i]) for t in (zero, most - zero, top))
+        factor = np.sqrt(1.0 - np.minimum(W / float(air.a_sound), _MACH) ** 2)
+        return np.concatenate([e, [low + factor * wide - e[_ALPHA], lift]])
 
     def _thrust(self, e: Array, by_c: Array, by_b: Array, V: Array, derivatives: bool) -> tuple[Array, Array, Array]:
         """Thrust at points, (P,), and its derivatives by the elements' chords and angles, (P, N)."""
@@ -309,23 +328,8 @@ class Problem:
         out[:, [O_MASS, O_JET, O_STATOR, O_SPIN, O_WHIRL]] = sums.T
         return np.asarray(self.flow.total(np.full(V.size, float(self.need.air.rho)), V, out)[0])
 
-    def _limit(self, W: Array, chord: Array) -> tuple[Array, Array, Array, Array]:
-        """Largest angle of attack, (P, N) [rad], its slopes with ln Re and with W, and the lift coefficient there."""
-        tables, ln_Re = self.stall
-        air, step = self.need.air, ln_Re[1] - ln_Re[0]
-        at = np.log(np.maximum(float(air.rho) * np.abs(W) * chord / float(air.mu), 1.0))
-        place = np.clip((at - ln_Re[0]) / step, 0.0, ln_Re.size - 1.000001)
-        i, n = place.astype(np.intp), np.arange(chord.size)[None, :]
-        low, high = tables[:, n, i], tables[:, n, i + 1]
-        zero, wide, lift = low + (place - i) * (high - low)
-        d_zero, d_wide, _ = np.where((at > ln_Re[0]) & (at < ln_Re[-1]), (high - low) / step, 0.0)
-        mach = np.minimum(np.abs(W) / float(air.a_sound), _MACH)
-        factor = np.sqrt(1.0 - mach**2)
-        by_W = np.where(mach < _MACH, -wide * mach / (factor * float(air.a_sound)), 0.0)
-        return zero + factor * wide, d_zero + factor * d_wide, by_W, lift
-
     def _stress(
-        self, k: int, omega: float, s: Any, e: Array, by_c: Array | None, by_b: Array | None
+        self, k: int, omega: float, s: Stations, e: Array, by_c: Array | None, by_b: Array | None
     ) -> materials.Stress:
         tangents = (None, None) if by_c is None or by_b is None else (by_c[:2, k], by_b[:2, k])
         return materials.stress(self.strength, self.need.limits.material.density, self.need.blades, omega, s.r, s.dr,
@@ -361,23 +365,26 @@ def _span(x: Array) -> str:
     return f"{x[0]:.2f}" if x.size == 1 else f"{x[0]:.2f} to {x[-1]:.2f}"
 
 
-def lift_limit(polar: Polar, margin: float) -> tuple[Array, Array, Array, Array]:
-    """Over Reynolds number: its logarithm, zero-lift angle, angle from there to the limit [rad], lift coefficient there.
+def top_lift(polar: Polar) -> tuple[Array, Array]:
+    """Reynolds numbers, and the lift coefficient at which the section stalls there."""
+    some = np.flatnonzero((polar.alpha >= 0.0) & (polar.alpha <= math.radians(30.0)))
+    cl = polar.cl[some, :, 0]
+    return np.asarray(polar.Re), np.take_along_axis(cl, first_stall(cl)[None, :], axis=0)[0]
 
-    The limit is where the lift first reaches (1 - margin) of what the section has before it stalls.
-    """
-    some = np.flatnonzero((polar.alpha >= math.radians(-12.0)) & (polar.alpha <= math.radians(30.0)))
-    alpha = polar.alpha[some]
-    rows = []
-    for cl in polar.cl[some, :, 0].T:
-        start = int(np.flatnonzero(cl <= 0.0)[-1]) if (cl <= 0.0).any() else 0
-        part, angle = cl[start:], alpha[start:]
-        end = int(first_stall(part))
-        rising = np.maximum.accumulate(part[: end + 1])
-        top = (1.0 - margin) * float(rising[-1])
-        zero, at = np.interp([0.0, top], rising, angle[: end + 1])
-        rows.append((zero, at - zero, top))
-    zero, wide, top = (np.array(v) for v in zip(*rows, strict=True))
-    if polar.Re.size == 1:
-        return np.log(np.array([1e3, 1e7])), *(np.repeat(v, 2) for v in (zero, wide, top))
-    return np.log(polar.Re), zero, wide, top
+
+def _lift_at_rest(prep: Prepared) -> Array:
+    """Lift coefficients of the stations' tables without compressibility, (N, Nr, angles), at the angles of `_ANGLES`."""
+    n_r = prep.axes[1]
+    rows = prep.tab[:, :n_r] if prep.layout == "factored" else prep.tab.reshape(prep.tab.shape[0], *prep.axes, -1, 2)[:, 0]
+    return np.asarray(rows[:, :, _ANGLES, 0])
+
+
+def _angle_of(cl: Array, wanted: Array) -> Array:
+    """Angle at which the lift first reaches a value, (N, Nr) [rad]; that of the most lift where it never does."""
+    alpha = ALPHA_GRID[_ANGLES]
+    reached = cl >= wanted[..., None]
+    i = np.where(reached.any(axis=-1), reached.argmax(axis=-1), cl.argmax(axis=-1))
+    k = np.maximum(i - 1, 0)
+    low, high = (np.take_along_axis(cl, m[..., None], axis=-1)[..., 0] for m in (k, i))
+    part = np.clip((wanted - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    return np.asarray(alpha[k] + part * (alpha[i] - alpha[k]))
