@@ -74,6 +74,8 @@ class Design:
         Blade of minimum induced loss; None in a duct, whose own blade is the start.
     label : Label or None
         Best propeller on sale; None if none meets the points.
+    label_breaks : tuple of str
+        Limits that it does not keep.
     disk_W, betz_W : float
         Mean power of the ideal disk and of the best blade without drag (NaN in a duct) [W].
     bands, label_bands : tuple of Band
@@ -87,6 +89,7 @@ class Design:
     files: dict[str, bytes]
     start: MinimumLoss | None
     label: Label | None
+    label_breaks: tuple[str, ...]
     disk_W: float
     betz_W: float
     bands: tuple[Band, ...]
@@ -178,8 +181,21 @@ def design_blade(
     with new_folder.temporary(files) as case:
         bands = _bands(case, need, found.after.rpm)
     label_bands = () if label is None else _bands(label.case, need, label.rpm)
-    return Design(need, found, files, start, label, *_ideal(need, model, found), bands, label_bands, over,
+    breaks = () if label is None else _breaks(label, need)
+    return Design(need, found, files, start, label, breaks, *_ideal(need, model, found), bands, label_bands, over,
                   duct is not None)  # fmt: skip
+
+
+def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
+    """Limits that a propeller on sale does not keep, in words without places."""
+    model = prepare_case(label.case)
+    points = tuple(replace(p, rpm=float(n)) for p, n in zip(need.points, label.rpm, strict=True))
+    rotor = model.rotor
+    asked = replace(need, points=points, R=rotor.R, Rhub=rotor.Rhub, blades=rotor.B)
+    problem, x = search.problem_of(model, asked, rotor.blade)
+    v = problem.values(x)
+    words = () if v is None else problem.broken(v)
+    return tuple(dict.fromkeys(word.partition(" at r/R")[0] for word in words if not word.startswith(("least", "largest"))))
 
 
 def _over_rotors(found: search.Found, variants: Sequence[Any]) -> OverRotors:
@@ -345,7 +361,8 @@ def case_files(base: Case, found: search.Found, points: Sequence[Point]) -> dict
     ]
     if base.ducted:
         kept = tuple(f"{key}." for key in KEYS_KEPT)
-        document["assumptions"] = [dict(a) for a in written.get("assumptions", ()) if a["key"].startswith(kept)]
+        document["assumptions"] = [dict(a) for a in written.get("assumptions", ()) if a["key"].startswith(kept)
+                                   and a["key"] != "rotor.blades"]  # fmt: skip
     files = {"case.toml": tomlkit.dumps(document).encode(),
              "stations.csv": ("r_over_R,chord_over_R,beta_deg\n" + "\n".join(rows) + "\n").encode()}  # fmt: skip
     return files | new_folder.companions(base)

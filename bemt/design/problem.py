@@ -18,7 +18,7 @@ power, thrust and margins are means of the rotors.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -337,32 +337,37 @@ class Problem:
 
     def active(self, v: Values) -> list[str]:
         """Limits that are reached, in words, the thrust's left out."""
-        P, N = len(self.need.points), self.shape.r.size
+        return self._words(v, lambda margin: margin < _TIGHT)
+
+    def broken(self, v: Values) -> list[str]:
+        """Limits that are not kept, in words."""
+        return self._words(v, lambda margin: margin < -_TIGHT)
+
+    def _words(self, v: Values, chosen: Callable[[Array], NDArray[np.bool_]]) -> list[str]:
+        P, N, S = len(self.need.points), self.shape.r.size, v.stress_Pa[0, ::2].size
         x = self.shape.r / self.shape.R
         words = []
+        for i, k in enumerate(self.flown):
+            hit = chosen(v.margins[P + i * N : P + (i + 1) * N])
+            words += [f"stall margin at r/R {_span(x[hit])}{self._of(int(k))}"] if hit.any() else []
+        rest = v.margins[P + self.flown.size * N :]
         for k in range(P):
-            at = P + N * int(np.searchsorted(self.flown, k))
-            gap = v.margins[at : at + N] if k in self.flown else np.ones(N)
-            if gap.min() < _TIGHT:
-                words.append(f"stall margin at r/R {_span(x[gap < _TIGHT])}{self._of(k)}")
-            used = v.stress_Pa[k, ::2] * self.need.limits.safety / (self.need.limits.material.strength_MPa * 1e6)
-            if used.max() > 1.0 - _TIGHT:
-                words.append(f"stress at r/R {_span(x[::2][used > 1.0 - _TIGHT])}{self._of(k)}")
+            hit = chosen(rest[k * S : (k + 1) * S])
+            words += [f"stress at r/R {_span(x[::2][hit])}{self._of(k)}"] if hit.any() else []
         ends = np.r_[self.shape.Rhub / self.shape.R, x, 1.0]
-        low, high = v.margins[P + self.flown.size * N + P * v.stress_Pa[0, ::2].size :].reshape(2, -1)
         why = "thickness" if self.need.limits.min_thickness_m > 0.0 else "chord"
-        for gap, name in ((low, f"least {why}"), (high, "largest chord")):
-            if gap.min() < _TIGHT:
-                words.append(f"{name} at r/R {_span(ends[gap < _TIGHT])}")
-        words += [f"tip Mach{self._of(int(k))}" for k in self.free if v.rpm[k] > self.need.slow * (1.0 - _TIGHT)]
-        return words
+        for margin, name in zip(rest[P * S :].reshape(2, -1), (f"least {why}", "largest chord"), strict=True):
+            hit = chosen(margin)
+            words += [f"{name} at r/R {_span(ends[hit])}"] if hit.any() else []
+        fast = chosen(1.0 - v.rpm[self.free] / self.need.slow)
+        return words + [f"tip Mach{self._of(int(k))}" for k in self.free[fast]]
 
     def _of(self, k: int) -> str:
         return "" if len(self.need.points) == 1 else f" (point {k + 1})"
 
 
 def _span(x: Array) -> str:
-    return f"{x[0]:.2f}" if x.size == 1 else f"{x[0]:.2f} to {x[-1]:.2f}"
+    return f"{x[0]:.2f}" if x[-1] - x[0] < 0.01 else f"{x[0]:.2f} to {x[-1]:.2f}"
 
 
 def top_lift(polar: Polar) -> tuple[Array, Array]:

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 STALL_MARGIN = 0.15
 """Share of the section's largest lift coefficient that is kept in hand: declared [1]."""
 MIN_CHORD_MM = 5.0
-"""Least chord: a printed tip narrower than this has no section left [mm]."""
+"""Least chord: a printed tip narrower than this has no section left; of small rotors `MIN_CHORD` [mm]."""
+MIN_CHORD = 0.04
+"""Least chord of small rotors over their diameter [1]."""
 FAST = 150.0  # No airspeed of a propeller of section theory [m/s]
 WIDEST = 0.3
 """Largest chord over the tip radius; that of slow flyers is 0.28 [1]."""
@@ -130,13 +132,15 @@ def point_of(text: str) -> Point:
 
 def required(
     points: Sequence[Point], diameter_m: float, hub_ratio: float, blades: int, air: Air, *,
-    static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float = MIN_CHORD_MM,
+    static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float | None = None,
     min_thickness_mm: float = 0.0, max_tip_mach: float = 0.8, stall_margin: float = STALL_MARGIN,
     material: str = "pla", safety: float = SAFETY,
 ) -> Requirement:  # fmt: skip
     """Check a request; all faults at once."""
     D = 1e3 * diameter_m
     faults: list[Fault] = []
+    if min_chord_mm is None:
+        min_chord_mm = min(MIN_CHORD_MM, MIN_CHORD * D)
 
     def check(name: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
         if not low <= value <= high:  # not a number fails too
