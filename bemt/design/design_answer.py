@@ -89,10 +89,10 @@ def _bought(d: Design) -> list[str]:
     kind = "blade of constant pitch in this duct" if d.ducted else f"standard label up to {2.0 * d.need.R / INCH:.4g} in"
     lines = []
     if d.label is None:
-        lines.append(f"no {kind} meets this at any speed within the tip Mach number")
+        lines.append(f"no {kind} does this at any speed within the tip Mach number")
     else:
         gain = d.mean_W / d.label.mean_W - 1.0
-        breaks = f"; it does not keep the {' and the '.join(d.label_breaks)}" if d.label_breaks else ""
+        breaks = f"; it would break these limits: {', '.join(d.label_breaks)}" if d.label_breaks else ""
         lines.append(f"{abs(gain):.1%} {'less' if gain <= 0.0 else 'more'} power than {d.label.name}, the best {kind}, "
                      f"at the speed that suits it{breaks}")  # fmt: skip
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):

@@ -47,7 +47,7 @@ def picture(d: Design) -> bytes:
     axes["blade"].set(xlabel="radius [mm]", ylabel="[mm]", aspect="equal")
     axes["blade"].set_title(d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10)
     for key, y in (("chord", "chord [mm]"), ("twist", "blade angle [deg]"), ("lift", "lift coefficient"),
-                   ("load", "thrust per radius, all blades [N/m]")):  # fmt: skip
+                   ("load", "thrust per radius [N/m]")):  # fmt: skip
         axes[key].set(xlabel="r/R", ylabel=y, xlim=(0.0, 1.0))
         axes[key].set_ylim(bottom=min(0.0, axes[key].get_ylim()[0]))
     axes["chord"].legend(frameon=False, fontsize=8)

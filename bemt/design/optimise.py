@@ -91,7 +91,9 @@ def start_blade(model: Model, need: Requirement) -> tuple[Blade, MinimumLoss]:
                              float(air.mu))  # fmt: skip
         target *= 0.7
     keep = np.r_[0, 1:199:6, 199]
-    r, chord, beta = found.r[keep], found.chord[keep], found.beta[keep]
+    # one angle of attack for the whole blade: that of the best lift-to-drag ratio jumps where the tip's Re falls
+    alpha = float(np.interp(0.7 * need.R, found.r, found.beta - found.phi))
+    r, chord, beta = found.r[keep], found.chord[keep], found.phi[keep] + alpha
     chord = np.clip(chord, 0.01 * need.R, 0.4 * need.R)
     return from_stations(r, chord, np.minimum(beta, 1.4), need.R, need.Rhub, list(model.rotor.blade.anchors)), found
 

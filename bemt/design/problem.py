@@ -208,7 +208,7 @@ class Problem:
         stress = [self._stress(i, omega[i], s, e, by_c if derivatives else None, by_b) for i in range(P)]
         allowed = self.need.limits.material.strength_MPa * 1e6 / self.need.limits.safety
         low, high = self.chord_range
-        spline = self.shape.basis @ x[:CONTROLS]
+        spline = self.shape.ln_chord(x)
         margins = np.concatenate([
             T[:P] / self.asked - 1.0, _STEEP * e[_ROOM, self.flown].ravel(),
             *(np.log(allowed / one.value[::2]) for one in stress), spline - low, high - spline,

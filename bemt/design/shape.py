@@ -64,16 +64,20 @@ class Shape:
         """Splines at the elements, (N, K)."""
         return self.basis[1:-1]
 
+    def ln_chord(self, x: Array) -> Array:
+        """Logarithm of chord over R at hub, elements and tip, (N + 2,)."""
+        return np.asarray(self.basis @ x[:CONTROLS])
+
     def stations(self, x: Array) -> Stations:
         """Blade elements of control values."""
-        chord = self.R * np.exp(self.inner @ x[:CONTROLS])
+        chord = self.R * np.exp(self.ln_chord(x)[1:-1])
         return Stations(self.r, self.dr, chord, self.beta0[1:-1] + TURN * (self.inner @ x[CONTROLS : 2 * CONTROLS]))
 
     def table(self, x: Array) -> tuple[Array, Array, Array]:
         """Columns r/R, chord/R and blade angle [rad] from hub to tip: the blade that the elements are cut from."""
         r = np.r_[self.Rhub, self.r, self.R] / self.R
         beta = self.beta0 + TURN * (self.basis @ x[CONTROLS : 2 * CONTROLS])
-        return r, np.exp(self.basis @ x[:CONTROLS]), beta
+        return r, np.exp(self.ln_chord(x)), beta
 
     def pull_back(self, by_chord: Array, by_beta: Array, chord: Array) -> Array:
         """Derivatives by control values, (..., 2 K), of those by chords and angles of the elements, (..., N)."""
