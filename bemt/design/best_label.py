@@ -14,6 +14,7 @@ from bemt.case import Case
 from bemt.case.load import with_changes
 from bemt.design import rotor_loads
 from bemt.design.requirement import Requirement
+from bemt.design.rotor_loads import RotorLoads
 from bemt.design.search import DIAMETERS, RATIOS
 
 Array = NDArray[np.float64]
@@ -28,11 +29,12 @@ FAN_CHORDS = (0.3, 0.45)
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A propeller at the points of a requirement: speeds [rev/min] and powers [W], (P,), and their mean [W]."""
+    """A propeller at the points of a requirement: speeds [rev/min], thrusts [N] and powers [W], (P,), mean power [W]."""
 
     name: str
     case: Case
     rpm: Array
+    thrust_N: Array
     power_W: Array
     mean_W: float
 
@@ -60,29 +62,44 @@ def rivals(need: Requirement, ducted: Case | None) -> Iterator[tuple[str, Case]]
             yield name, with_changes(ducted, {"blade": blade, "assumptions": [], "polars": []})
 
 
-def best_label(need: Requirement, ducted: Case | None = None) -> Label | None:
-    """The one with the least mean power that meets every point; None if none does."""
-    found = [one for name, case in rivals(need, ducted) if (one := _at_points(name, case, need)) is not None]
-    return min(found, key=lambda one: one.mean_W, default=None)
+def best_labels(need: Requirement, ducted: Case | None = None) -> tuple[Label | None, Label | None]:
+    """Those with the least mean power that meet every point: at the speed that suits each, and at the speeds asked for.
+
+    The second has at least the thrust at those speeds; None if no speed is asked for, or none has the thrust.
+    """
+    own, same = [], []
+    for name, case in rivals(need, ducted):
+        loads = _loads(name, case, need)
+        own += [one for one in (_at_points(name, case, need, loads, fixed=False),) if one is not None]
+        if all(p.rpm is not None for p in need.points if p.weight > 0.0):
+            same += [one for one in (_at_points(name, case, need, loads, fixed=True),) if one is not None]
+    return min(own, key=lambda one: one.mean_W, default=None), min(same, key=lambda one: one.mean_W, default=None)
 
 
-def _at_points(name: str, case: Case, need: Requirement) -> Label | None:
+def _loads(name: str, case: Case, need: Requirement) -> dict[float, RotorLoads | None]:
+    """Thrust and torque over speed, up to the tip Mach number, by airspeed."""
     fast = {p.airspeed_m_s: 60.0 * tip / (math.pi * case.diameter_m) for p in need.points
             if (tip := _tip_speed(need, p.airspeed_m_s)) > 0.0}  # fmt: skip
-    loads = {V: rotor_loads.loads_of_case(name, case, rpm, V, need.air) for V, rpm in fast.items()}
-    rpm, power = [], []
+    return {V: rotor_loads.loads_of_case(name, case, rpm, V, need.air) for V, rpm in fast.items()}
+
+
+def _at_points(
+    name: str, case: Case, need: Requirement, loads: dict[float, RotorLoads | None], fixed: bool
+) -> Label | None:
+    rows = []
     for p in need.points:
         one = loads.get(p.airspeed_m_s)
-        n = math.nan if one is None else float(one.speed_for(np.array([p.thrust_N]))[0])
-        if one is None or not math.isfinite(n):
+        if one is None:
             return None
-        rpm.append(n)
-        power.append(float(one.torque_at(np.array([n]))[0]) * n * math.pi / 30.0)
+        n = p.rpm if fixed and p.rpm is not None else float(one.speed_for(np.array([p.thrust_N]))[0])
+        T = float(np.interp(n, one.rpm, one.thrust_N, right=math.nan))
+        P = float(one.torque_at(np.array([n]))[0]) * n * math.pi / 30.0
+        if not (math.isfinite(n + P) and T >= (1.0 - 1e-3) * p.thrust_N and P > 0.0):
+            return None
+        rows.append((n, T, P))
+    rpm, thrust, power = np.array(rows).T
     weight = np.array([p.weight for p in need.points])
-    P = np.array(power)
-    if not np.all(np.isfinite(P)) or P.min() <= 0.0:
-        return None
-    return Label(name, case, np.array(rpm), P, float(weight @ P / weight.sum()))
+    return Label(name, case, rpm, thrust, power, float(weight @ power / weight.sum()))
 
 
 def _tip_speed(need: Requirement, airspeed_m_s: float) -> float:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case import Case, case_of, new_folder
@@ -19,7 +20,7 @@ from bemt.case.prepare import prepare_case
 from bemt.case.propagate import propagate
 from bemt.case.unknowns import AIR, SECTION, SURFACE
 from bemt.design import optimise as search
-from bemt.design.best_label import Label, best_label
+from bemt.design.best_label import Label, best_labels
 from bemt.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
 from bemt.design.problem import Values
 from bemt.design.requirement import Point, Requirement, required
@@ -73,7 +74,9 @@ class Design:
     start : MinimumLoss or None
         Blade of minimum induced loss; None in a duct, whose own blade is the start.
     label : Label or None
-        Best propeller on sale; None if none meets the points.
+        Best propeller on sale at the speed that suits it; None if none meets the points.
+    same_speed : Label or None
+        Best one at the speeds asked for, with at least the thrust.
     label_breaks : tuple of str
         Limits that it does not keep.
     disk_W, betz_W : float
@@ -89,6 +92,7 @@ class Design:
     files: dict[str, bytes]
     start: MinimumLoss | None
     label: Label | None
+    same_speed: Label | None
     label_breaks: tuple[str, ...]
     disk_W: float
     betz_W: float
@@ -138,8 +142,19 @@ def design_blade(
     duct: Case | None = None, robust: bool = False, progress: Progress | None = None, **limits: Any,
 ) -> Design:  # fmt: skip
     """Design a blade; parameters as `bemt.library.design`."""
-    base = _open_case(diameter_m, blades, section, hub_ratio, density_kg_m3) if duct is None else _in_duct(
-        duct, diameter_m, blades, section, hub_ratio, density_kg_m3)  # fmt: skip
+    faults: list[Fault] = []
+    base: Case | None = None
+    try:
+        base = _open_case(diameter_m, blades, section, hub_ratio, density_kg_m3) if duct is None else _in_duct(
+            duct, diameter_m, blades, section, hub_ratio, density_kg_m3)  # fmt: skip
+    except InputError as error:
+        faults += error.faults
+    if base is None:  # the rest of the request is judged on a size that can be
+        try:
+            required(points, 10.0 * INCH, HUB_RATIO, 2, Air.from_density(), **limits)
+        except InputError as error:
+            faults += [f for f in error.faults if "tip Mach" not in f.got]
+        raise InputError(faults)
     need = required(points, base.diameter_m, base.hub_diameter_m / base.diameter_m, int(base.file.rotor.blades),
                     base.air(), **limits)  # fmt: skip
     say = progress or (lambda line: None)
@@ -150,7 +165,7 @@ def design_blade(
     else:
         blade, start = model.rotor.blade, None
     say("propellers on sale")
-    label = best_label(need, duct)
+    label, same = best_labels(need, duct)
     free = next((i for i, p in enumerate(need.points) if p.rpm is None), None)
     rpm0 = None if label is None or free is None else float(label.rpm[free])
     if rpm0 is not None and duct is None:
@@ -182,7 +197,7 @@ def design_blade(
         bands = _bands(case, need, found.after.rpm)
     label_bands = () if label is None else _bands(label.case, need, label.rpm)
     breaks = () if label is None else _breaks(label, need)
-    return Design(need, found, files, start, label, breaks, *_ideal(need, model, found), bands, label_bands, over,
+    return Design(need, found, files, start, label, same, breaks, *_ideal(need, model, found), bands, label_bands, over,
                   duct is not None)  # fmt: skip
 
 

@@ -34,6 +34,10 @@ def _banded(value: float, u: float) -> str:
     return f"{number_text(value, digits)} ± {number_text(u, 2)}" if math.isfinite(u) else number_text(value, digits)
 
 
+def _loads(b: Band) -> tuple[str, str]:
+    return _banded(b.thrust_N, b.u_thrust_N), _banded(b.power_W, b.u_power_W)
+
+
 def _mach(d: Design, rpm: float, V: float, R: float) -> float:
     return math.hypot(rpm * math.pi / 30.0 * R, V) / float(d.need.air.a_sound)
 
@@ -50,13 +54,18 @@ def text(d: Design) -> str:
     rows = []
     for k, p in enumerate(need.points):
         point = f"{k + 1}: " if several else ""
-        shown: list[tuple[str, Any, Any, tuple[Band, ...], float]] = [("design", v.rpm, v.power_W, d.bands, need.R)]
-        if d.label is not None:
-            shown.append((d.label.name, d.label.rpm, d.label.power_W, d.label_bands, 0.5 * d.label.case.diameter_m))
-        for name, rpm, power, bands, R in shown:
-            b, T = bands[k], p.thrust_N if name != "design" else float(v.thrust_N[k])
-            rows.append(_row(point + name, float(rpm[k]), _banded(b.thrust_N, b.u_thrust_N), _banded(b.power_W, b.u_power_W),
-                             T, p.airspeed_m_s, float(power[k]), _mach(d, float(rpm[k]), p.airspeed_m_s, R), d))  # fmt: skip
+        V = p.airspeed_m_s
+        mach = _mach(d, float(v.rpm[k]), V, need.R)
+        rows.append(_row(point + "design", float(v.rpm[k]), *_loads(d.bands[k]), float(v.thrust_N[k]), V,
+                         float(v.power_W[k]), mach, d))  # fmt: skip
+        others = [(d.label, "its best speed", d.label_bands), (d.same_speed, "same speed", ())]
+        for label, what, bands in others:
+            if label is None or (what == "same speed" and p.rpm is None):
+                continue
+            T, P, rpm = (float(a[k]) for a in (label.thrust_N, label.power_W, label.rpm))
+            shown = _loads(bands[k]) if bands else (number_text(T, 3), number_text(P, 3))
+            mach = _mach(d, rpm, V, 0.5 * label.case.diameter_m)
+            rows.append(_row(f"{point}{label.name}, {what}", rpm, *shown, T, V, P, mach, d))
     if not several:
         T, V = first.thrust_N, first.airspeed_m_s
         ideal = [("best without drag (Betz)", d.betz_W), ("ideal disk", d.disk_W)]
@@ -88,6 +97,8 @@ def _bought(d: Design) -> list[str]:
     """What the design buys over the best label, and how far the ideal is."""
     kind = "blade of constant pitch in this duct" if d.ducted else f"standard label up to {2.0 * d.need.R / INCH:.4g} in"
     lines = []
+    if d.same_speed is None and not d.ducted and all(p.rpm is not None for p in d.need.points if p.weight > 0.0):
+        lines.append(f"at the speed asked for, no {kind} reaches the thrust")
     if d.label is None:
         lines.append(f"no {kind} does this at any speed within the tip Mach number")
     else:
@@ -128,6 +139,9 @@ def document(d: Design) -> dict[str, Any]:
             "name": d.label.name, "rpm": d.label.rpm.tolist(), "power_W": d.label.power_W.tolist(),
             "mean_power_W": d.label.mean_W, "breaks": list(d.label_breaks),
             "bands": [vars(b) for b in d.label_bands]},
+        "same_speed": None if d.same_speed is None else {
+            "name": d.same_speed.name, "rpm": d.same_speed.rpm.tolist(), "thrust_N": d.same_speed.thrust_N.tolist(),
+            "power_W": d.same_speed.power_W.tolist()},
         "robust": None if d.robust is None else {"this": vars(d.robust[0]), "drawn": vars(d.robust[1])},
         "stations": {"r_over_R": r.tolist(), "chord_over_R": chord.tolist(), "beta_deg": np.degrees(beta).tolist()},
     }  # fmt: skip

@@ -147,10 +147,6 @@ def required(
             ends = f"a number from {low:g} to {high:g}"
             faults.append(Fault(name, "", f"{value:g}", f"{ends} {unit}".rstrip(), hint))
 
-    check("--diameter-in", diameter_m / INCH, 1.0, 100.0, "in",
-          "In mm? Divide by 25.4" if 100.0 < diameter_m / INCH < 2600.0 else "")  # fmt: skip
-    check("--blades", blades, 1, 16)
-    check("--hub-ratio", hub_ratio, 0.05, 0.6)
     for p in points:
         check("--thrust", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
         check("--airspeed", p.airspeed_m_s, 0.0, FAST, "m/s", "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "")

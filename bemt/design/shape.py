@@ -11,7 +11,7 @@ from geometry.blade import Blade, Stations
 
 Array = NDArray[np.float64]
 
-CONTROLS = 6
+CONTROLS = 5
 """Control points of the chord, and as many of the blade angle."""
 TURN = 0.2
 """Blade angle that counts as much as the whole logarithm of a chord [rad]."""
