@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-tip-mach", type=float, default=0.8, metavar="M", help="tip Mach limit (default 0.8)")
     stall = "share of the section's largest lift that is kept in hand (default 0.15)"
     parser.add_argument("--stall-margin", type=float, default=0.15, metavar="X", help=stall)
-    parser.add_argument("--material", default="pla", metavar="NAME", help="pla, petg, pc, pa12, pla_soft, al6061 (default pla)")
+    parser.add_argument("--material", default="pla", metavar="NAME", help="pla, petg, pc, pa12, pla_soft, pa6_gf, al6061 (default pla)")
     parser.add_argument("--safety", type=float, default=3.0, metavar="X", help="strength over stress (default 3)")
     parser.add_argument("--density", type=float, metavar="RHO", help="air density (default 1.225) [kg/m3]")
     parser.add_argument("--duct", metavar="CASE", help="design the rotor inside the duct of this case, from its blade")

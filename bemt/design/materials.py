@@ -40,6 +40,7 @@ MATERIALS = {
         Material("pa12", 930.0, 43.0, "sintered PA12, 43 MPa (3D Systems, in PMC10406103, table 2); density of EOS "
                                       "PA 2200 (not checked)"),
         Material("pla_soft", 1310.0, 12.2, "printed matt PLA, 12.2 MPa upright, 23.2 flat (PolyTerra PLA data sheet V5.3)"),
+        Material("pa6_gf", 1270.0, 140.0, "glass-fibre nylon as moulded, 140 MPa at yield (CR-3D data sheet PA 6 G4)"),
         Material("al6061", 2700.0, 276.0, "aluminium 6061-T6, yield (ASM handbook value, not checked)"),
     )
 }  # fmt: skip
