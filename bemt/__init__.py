@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset", "choose": "bemt.design"}
 _ROOMS = ("compare", "design", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
 _NAMES = (
-    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "design", "diagnose",
-    "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
+    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "design",
+    "diagnose", "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
 )  # fmt: skip
 __all__ = ["__version__", *_NAMES]
 

@@ -1,4 +1,4 @@
-"""Ten targets designed and compared with the best label: ``python docs/design_targets.py`` fills the table of design.md.
+"""Ten targets designed, next to the best label: ``python docs/design_targets.py`` fills the table of design.md.
 
 A row is a request; what it gives is printed in the page and checked by tests/test_design_targets.py.
 """
@@ -64,14 +64,19 @@ def row(target: Target, d: Design, strict: Design) -> str:
     """Line of the table: within the limits of the label, and within the usual ones."""
     assert d.label is not None
     ideal = d.disk_W if d.ducted else d.betz_W
-    cells = (target.words, f"{d.mean_W:.4g}", d.label.name, f"{d.label.mean_W:.4g}", f"{saved(d):.1%}", f"{ideal:.4g}",
-             f"{saved(strict):.1%}", "; ".join(strict.active) or "none", ", ".join(strict.label_breaks) or "none")  # fmt: skip
+    first = (target.words, f"{d.mean_W:.4g}", d.label.name, f"{d.label.mean_W:.4g}", f"{saved(d):.1%}", f"{ideal:.4g}")
+    cells = (
+        *first,
+        f"{saved(strict):.1%}",
+        "; ".join(strict.active) or "none",
+        ", ".join(strict.label_breaks) or "none",
+    )
     return f"| {' | '.join(cells)} |"
 
 
 HEAD = (
-    "| target | design W | best label | its W | saved | ideal W | saved within the usual limits | limits reached then | "
-    "limits that the label breaks |\n|---|---|---|---|---|---|---|---|---|\n"
+    "| target | design W | best label | its W | saved | ideal W | saved within the usual limits | limits reached then "
+    "| limits that the label breaks |\n|---|---|---|---|---|---|---|---|---|\n"
 )
 
 

@@ -1,4 +1,4 @@
-"""The promise of docs/design.md: ten targets, none with more power than the best label, and the table is that of today."""
+"""The promise of docs/design.md: ten targets, none with more power than the best label, and the table is current."""
 
 from __future__ import annotations
 

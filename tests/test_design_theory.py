@@ -26,10 +26,10 @@ from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
 FT, LBF, HP = 0.3048, 4.4482216, 745.69987
-# Light aeroplane propeller of Adkins and Liebeck: 70 hp, 110 mph, 2400 rev/min, 5.75 ft, two blades, NACA 4415 at cl 0.7.
+# Light aeroplane propeller of Adkins and Liebeck: 70 hp, 110 mph, 2400 rev/min, 5.75 ft, two blades, NACA 4415, cl 0.7.
 # The table is the one handed out in a course of R. Liebeck, as github.com/pepe-roni/aerodynamicsCFD has it in
-# 195/propellerGeometry.csv (8e99f4f) with thrust in 195/propellerAnalysis.m (c48546c) and cd in 195/performanceDrag.csv;
-# the paper itself was not read. Stations are 20 even steps from 0.5 to 2.875 ft, in the table with two decimals.
+# 195/propellerGeometry.csv (8e99f4f), thrust in 195/propellerAnalysis.m (c48546c), cd in 195/performanceDrag.csv; the
+# paper itself was not read. Stations are 20 even steps from 0.5 to 2.875 ft, in the table with two decimals.
 CHORD_FT = np.array([0.3353, 0.3966, 0.4325, 0.4484, 0.4501, 0.4423, 0.4285, 0.411, 0.3913, 0.3704, 0.3487, 0.3265,
                      0.304, 0.281, 0.2572, 0.2324, 0.2059, 0.1768, 0.1433, 0.1006])  # fmt: skip
 BETA_DEG = np.array([56.42, 50.5, 45.48, 41.24, 37.64, 34.57, 31.94, 29.66, 27.68, 25.95, 24.42, 23.06, 21.85, 20.77,
@@ -71,7 +71,7 @@ def _helices(B: int, lam: float, rv: np.ndarray, rc: np.ndarray) -> tuple[np.nda
 
 
 def _least_loss(B: int, lam: float, hub: float = 0.02, n: int = 40) -> tuple[np.ndarray, np.ndarray]:
-    """Radii, and circulation over (displacement speed R) of sheets that move back as if rigid (Betz; Goldstein 1929)."""
+    """Radii, and circulation over (displacement speed R) of sheets that move back as if rigid (Betz, Goldstein)."""
     t = np.linspace(0.0, np.pi, n + 1)
     edge, r = (hub + (1.0 - hub) * 0.5 * (1.0 - np.cos(v)) for v in (t, 0.5 * (t[1:] + t[:-1])))
     ua, ut = _helices(B, lam, edge[None, :], r[:, None])
@@ -82,7 +82,7 @@ def _least_loss(B: int, lam: float, hub: float = 0.02, n: int = 40) -> tuple[np.
 
 @pytest.mark.parametrize(("B", "lam", "within"), [(3, 0.1, 0.02), (4, 0.1, 0.02), (6, 0.1, 0.01), (2, 0.16, 0.06)])
 def test_the_circulation_is_that_of_rigid_helical_sheets(B: int, lam: float, within: float) -> None:
-    """Independent of blade elements; with two blades in fast flight Prandtl's factor is known to be some percent off."""
+    """Independent of blade elements; for two blades in fast flight Prandtl's factor is some percent off."""
     r, gamma = _least_loss(B, lam)
     Omega = 1000.0
     found = minimum_loss(1e-4, lam * Omega, Omega * 30.0 / math.pi, B, 1.0, 0.02, without_drag, n=400)
@@ -106,8 +106,12 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     """From a blade of constant chord and pitch, with the solver's gradient: circulation within 2 %, power 0.05 %."""
     monkeypatch.setattr(search, "_TOLERANCE", 1e-11)
     R, T, V, rpm = 0.127, 1.0, 12.0, 7000.0
-    blade = from_laws(2 * R, "constant", hub=0.1, chord={"max_chord": 0.16}, pitch={"pitch": 0.16}, anchors=naca("4412"))
-    model = Model(Rotor(blade, B), [(0.75, linear_polar(cd=1e-6))], effects=(from_text("swirl"), TipLoss(sheets="disk")))
+    blade = from_laws(
+        2 * R, "constant", hub=0.1, chord={"max_chord": 0.16}, pitch={"pitch": 0.16}, anchors=naca("4412")
+    )
+    model = Model(
+        Rotor(blade, B), [(0.75, linear_polar(cd=1e-6))], effects=(from_text("swirl"), TipLoss(sheets="disk"))
+    )
     need = required([Point(T, V, rpm)], 2 * R, 0.1, B, Air.from_density(), material="al6061", stall_margin=0.0)
     problem, x = search.problem_of(model, need, blade)
     found = search.optimise(problem, x)
@@ -163,7 +167,9 @@ def test_stress_of_a_spinning_bar_and_of_a_cantilever() -> None:
     ones = np.ones(n)
     bar = SectionStrength(0.1 * ones, 1e-4 * ones, 1e-2 * ones, 0.05 * ones, 0.5 * ones)
     spun = stress(bar, 2700.0, 2, 500.0, r, dr, chord, 0 * ones, np.zeros((2, n)))
-    assert spun.value == pytest.approx(0.5 * 2700.0 * 500.0**2 * (R**2 - r**2), rel=5e-3, abs=1e3)  # rho W^2 (R^2 - r^2)/2
+    assert spun.value == pytest.approx(
+        0.5 * 2700.0 * 500.0**2 * (R**2 - r**2), rel=5e-3, abs=1e3
+    )  # rho W^2 (R^2 - r^2)/2
     load = np.stack([2 * 30.0 * dr, 0 * dr])  # 30 N/m on each of two blades, across the chord
     bent = stress(bar, 0.0, 2, 0.0, r, dr, chord, 0 * ones, load)
     moment = 0.5 * 30.0 * (R - r) ** 2

@@ -16,7 +16,9 @@ EXAMPLE = "design --thrust 6 --airspeed 15 --rpm 7000 --diameter-in 10"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("--thrust", type=float, metavar="N", help="thrust to reach [N]")
-    parser.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="flight speed [m/s] (default 0: static)")
+    parser.add_argument(
+        "--airspeed", type=float, default=0.0, metavar="V", help="flight speed [m/s] (default 0: static)"
+    )
     rpm = "speed of rotation (default: the one of least power) [rev/min]"
     parser.add_argument("--rpm", type=float, metavar="N", help=rpm)
     point = "a point as thrust=6,airspeed=15,rpm=7000,weight=1, weight being its share of the time; may be repeated"
@@ -35,7 +37,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-tip-mach", type=float, default=0.8, metavar="M", help="tip Mach limit (default 0.8)")
     stall = "share of the section's largest lift that is kept in hand (default 0.15)"
     parser.add_argument("--stall-margin", type=float, default=0.15, metavar="X", help=stall)
-    parser.add_argument("--material", default="pla", metavar="NAME", help="pla, petg, pc, pa12, pla_soft, pa6_gf, al6061 (default pla)")
+    parser.add_argument(
+        "--material", default="pla", metavar="NAME", help="pla, petg, pc, pa12, pla_soft, pa6_gf, al6061 (default pla)"
+    )
     parser.add_argument("--safety", type=float, default=3.0, metavar="X", help="strength over stress (default 3)")
     parser.add_argument("--density", type=float, metavar="RHO", help="air density (default 1.225) [kg/m3]")
     parser.add_argument("--duct", metavar="CASE", help="design the rotor inside the duct of this case, from its blade")

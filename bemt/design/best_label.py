@@ -29,7 +29,7 @@ FAN_CHORDS = (0.3, 0.45)
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A propeller at the points of a requirement: speeds [rev/min], thrusts [N] and powers [W], (P,), mean power [W]."""
+    """A propeller at points: speeds [rev/min], thrusts [N] and powers [W], (P,) each, and mean power [W]."""
 
     name: str
     case: Case

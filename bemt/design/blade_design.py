@@ -210,7 +210,9 @@ def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
     problem, x = search.problem_of(model, asked, rotor.blade)
     v = problem.values(x)
     words = () if v is None else problem.broken(v)
-    return tuple(dict.fromkeys(word.partition(" at r/R")[0] for word in words if not word.startswith(("least", "largest"))))
+    return tuple(
+        dict.fromkeys(word.partition(" at r/R")[0] for word in words if not word.startswith(("least", "largest")))
+    )
 
 
 def _over_rotors(found: search.Found, variants: Sequence[Any]) -> OverRotors:
@@ -240,7 +242,9 @@ def _ideal(need: Requirement, model: Model, found: search.Found) -> tuple[float,
             betz.append(math.nan)
             continue
         disk.append(actuator_disk(p.thrust_N, p.airspeed_m_s, need.R, need.Rhub, rho))
-        best = minimum_loss(p.thrust_N, p.airspeed_m_s, float(rpm), need.blades, need.R, need.Rhub, without_drag, rho, mu)
+        best = minimum_loss(
+            p.thrust_N, p.airspeed_m_s, float(rpm), need.blades, need.R, need.Rhub, without_drag, rho, mu
+        )
         betz.append(math.nan if best is None else best.power_W)
     w = found.problem.weights
     some = w > 0.0
@@ -255,7 +259,9 @@ def _section(text: str | None, hub_ratio: float) -> tuple[dict[str, Any], Path]:
         return {"camber": camber, "thickness": [max(ROOT, thickness), thickness], "r_over_R": radii}, Path(".")
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
-        raise InputError(Fault("--section", "", repr(text), "NACA digits or coordinate files", "As in 4412, or 4415,4409"))
+        raise InputError(
+            Fault("--section", "", repr(text), "NACA digits or coordinate files", "As in 4412, or 4415,4409")
+        )
     files = [Path(word) for word in words if word.lower().endswith(".dat")]
     if files and (len(files) < len(words) or len({f.parent for f in files}) > 1):
         raise InputError(Fault("--section", "", text, "NACA digits, or coordinate files (.dat) of one folder"))
@@ -285,7 +291,9 @@ def _open_case(
     if not 0.05 <= hub <= 0.6:
         faults.append(Fault("--hub-ratio", "", f"{hub:g}", "a number from 0.05 to 0.6"))
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
-        faults.append(Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10)))
+        faults.append(
+            Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10))
+        )
     if faults or diameter_m is None:
         raise InputError(faults)
     table, folder = _section(section, hub)

@@ -21,7 +21,9 @@ def _at(V: float) -> str:
     return "static" if V == 0.0 else f"at {V:g} m/s"
 
 
-def _row(name: str, rpm: float, thrust: str, power: str, T: float, V: float, P: float, mach: float, d: Design) -> list[str]:
+def _row(
+    name: str, rpm: float, thrust: str, power: str, T: float, V: float, P: float, mach: float, d: Design
+) -> list[str]:
     """Thrust and power at a point, with the efficiency in flight or the figure of merit at rest."""
     need = d.need
     ideal = T * V if V else actuator_disk(T, 0.0, need.R, need.Rhub, float(need.air.rho)) if not d.ducted else math.nan
@@ -74,7 +76,8 @@ def text(d: Design) -> str:
     quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"
     lines.append(text_table(["", "rpm", "thrust N", "power W", quality, "g/W", "tip Mach"], rows))
     if several:
-        lines.append(f"mean power: design {d.mean_W:.4g} W" + (f", {d.label.name} {d.label.mean_W:.4g} W" if d.label else "")
+        label = "" if d.label is None else f", {d.label.name} {d.label.mean_W:.4g} W"
+        lines.append(f"mean power: design {d.mean_W:.4g} W{label}"
                      + (f", best without drag {d.betz_W:.4g} W" if math.isfinite(d.betz_W) else "")
                      + f", ideal disk {d.disk_W:.4g} W")  # fmt: skip
     lines += ["± one standard uncertainty: " + ("the label's unknown shape is most of its band" if not d.ducted else
@@ -95,7 +98,9 @@ def text(d: Design) -> str:
 
 def _bought(d: Design) -> list[str]:
     """What the design buys over the best label, and how far the ideal is."""
-    kind = "blade of constant pitch in this duct" if d.ducted else f"standard label up to {2.0 * d.need.R / INCH:.4g} in"
+    kind = (
+        "blade of constant pitch in this duct" if d.ducted else f"standard label up to {2.0 * d.need.R / INCH:.4g} in"
+    )
     lines = []
     if d.same_speed is None and not d.ducted and all(p.rpm is not None for p in d.need.points if p.weight > 0.0):
         lines.append(f"at the speed asked for, no {kind} reaches the thrust")
@@ -103,15 +108,14 @@ def _bought(d: Design) -> list[str]:
         lines.append(f"no {kind} does this at any speed within the tip Mach number")
     else:
         gain = d.mean_W / d.label.mean_W - 1.0
-        breaks = f"; it would break these limits: {', '.join(d.label_breaks)}" if d.label_breaks else ""
+        words = [f"stress (in {d.need.limits.material.name})" if w == "stress" else w for w in d.label_breaks]
+        breaks = f"; it does not keep: {', '.join(words)}" if words else ""
         lines.append(f"{abs(gain):.1%} {'less' if gain <= 0.0 else 'more'} power than {d.label.name}, the best {kind}, "
                      f"at the speed that suits it{breaks}")  # fmt: skip
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
             lines.append("leave the rpm out, and the speed is found too")
     ideal, name = (d.disk_W, "ideal disk") if math.isnan(d.betz_W) else (d.betz_W, "best blade without drag")
-    lines.append(f"{d.mean_W / ideal - 1.0:.1%} more than the {name}; the start, of minimum induced loss, is "
-                 "shown as 'before'" if d.start is not None else
-                 f"{d.mean_W / ideal - 1.0:.1%} more than the {name}; the start is the blade of the case")  # fmt: skip
+    lines.append(f"{d.mean_W / ideal - 1.0:.1%} more power than the {name}")
     return lines
 
 

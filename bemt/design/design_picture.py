@@ -13,9 +13,9 @@ from bemt.design.blade_design import Design
 Array = NDArray[np.float64]
 
 # Okabe and Ito (2008): told apart by colour-blind readers; line styles differ too.
-BEFORE = {"color": "#E69F00", "ls": "--", "lw": 1.4}
-AFTER = {"color": "#0072B2", "ls": "-", "lw": 1.8}
-LIMIT = {"color": "#7F7F7F", "ls": ":", "lw": 1.3}
+BEFORE: dict[str, Any] = {"color": "#E69F00", "ls": "--", "lw": 1.4}
+AFTER: dict[str, Any] = {"color": "#0072B2", "ls": "-", "lw": 1.8}
+LIMIT: dict[str, Any] = {"color": "#7F7F7F", "ls": ":", "lw": 1.3}
 
 
 def picture(d: Design) -> bytes:
@@ -31,7 +31,10 @@ def picture(d: Design) -> bytes:
     x = shape.r / R
     tables = [shape.table(d.found.start), shape.table(d.found.best)]
     start = "before: minimum induced loss" if d.start is not None else "before: blade of the case"
-    looks = ((tables[0], d.found.before, {**BEFORE, "label": start}), (tables[1], d.values, {**AFTER, "label": "after"}))
+    looks: tuple[Any, ...] = (
+        (tables[0], d.found.before, {**BEFORE, "label": start}),
+        (tables[1], d.values, {**AFTER, "label": "after"}),
+    )
     for (r, chord, beta), v, look in looks:
         _outline(axes["blade"], 1e3 * R * r, 1e3 * R * chord, look)
         axes["chord"].plot(r, 1e3 * R * chord, **look)
@@ -43,9 +46,13 @@ def picture(d: Design) -> bytes:
     low, _ = d.found.problem.chord_range
     axes["chord"].plot(tables[1][0], 1e3 * R * np.exp(low), **LIMIT, label="least")
     for k in d.found.problem.flown:
-        axes["lift"].plot(x, d.values.limit[k], **LIMIT, label="largest allowed" if k == d.found.problem.flown[0] else None)
+        axes["lift"].plot(
+            x, d.values.limit[k], **LIMIT, label="largest allowed" if k == d.found.problem.flown[0] else None
+        )
     axes["blade"].set(xlabel="radius [mm]", ylabel="[mm]", aspect="equal")
-    axes["blade"].set_title(d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10)
+    axes["blade"].set_title(
+        d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10
+    )
     for key, y in (("chord", "chord [mm]"), ("twist", "blade angle [deg]"), ("lift", "lift coefficient"),
                    ("load", "thrust per radius [N/m]")):  # fmt: skip
         axes[key].set(xlabel="r/R", ylabel=y, xlim=(0.0, 1.0))

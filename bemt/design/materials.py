@@ -33,27 +33,26 @@ class Material:
 MATERIALS = {
     m.name: m
     for m in (
-        Material("pla", 1240.0, 35.0, "printed PLA, 35 to 45 MPa upright, 50 to 65 flat (additive.tools, materials/pla)"),
-        Material("petg", 1270.0, 25.0, "printed PETG, 25 to 38 MPa upright, 44 to 56 flat (additive.tools, materials/petg)"),
-        Material("pc", 1200.0, 35.0, "printed polycarbonate, 35 to 52 MPa upright, 58 to 75 flat (additive.tools, "
-                                     "materials/pc)"),
+        Material("pla", 1240.0, 35.0, "printed PLA, 35 to 45 MPa upright, 50 to 65 flat (additive.tools)"),
+        Material("petg", 1270.0, 25.0, "printed PETG, 25 to 38 MPa upright, 44 to 56 flat (additive.tools)"),
+        Material("pc", 1200.0, 35.0, "printed polycarbonate, 35 to 52 MPa upright, 58 to 75 flat (additive.tools)"),
         Material("pa12", 930.0, 43.0, "sintered PA12, 43 MPa (3D Systems, in PMC10406103, table 2); density of EOS "
                                       "PA 2200 (not checked)"),
-        Material("pla_soft", 1310.0, 12.2, "printed matt PLA, 12.2 MPa upright, 23.2 flat (PolyTerra PLA data sheet V5.3)"),
+        Material("pla_soft", 1310.0, 12.2, "printed matt PLA, 12.2 MPa upright, 23.2 flat (PolyTerra PLA sheet V5.3)"),
         Material("pa6_gf", 1270.0, 140.0, "glass-fibre nylon as moulded, 140 MPa at yield (CR-3D data sheet PA 6 G4)"),
         Material("al6061", 2700.0, 276.0, "aluminium 6061-T6, yield (ASM handbook value, not checked)"),
     )
 }  # fmt: skip
 """Materials by name. Printed plastics count with the lower end across the layers."""
 SAFETY = 3.0
-"""Strength over stress that is asked for: declared, for fatigue, notches, creep and prints worse than the test bar [1]."""
+"""Strength over stress that is asked for: declared, for fatigue, notches, creep and prints worse than test bars [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class SectionStrength:
     """Shape numbers of sections along a blade, (N,): of unit chord, about the centroid, along and across the chord.
 
-    ``area`` over c^2, ``flap`` and ``edge`` second moments over c^4, ``y`` and ``x`` the outermost distances over c [1].
+    ``area`` over c^2, ``flap`` and ``edge`` second moments over c^4, ``y`` and ``x`` outermost distances over c [1].
     """
 
     area: Array

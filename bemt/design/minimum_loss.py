@@ -1,9 +1,9 @@
 """Blades of minimum induced loss, and the ideal limits next to which a design stands.
 
 A blade loses least when the sheets that it sheds move back as if they were rigid (Betz 1919), with one displacement
-speed v'. The design follows Larrabee (1979, SAE 790585) in the form of Adkins and Liebeck (1994, J. Propulsion and Power
-10(5), 676-682), here A&L, with zeta = v'/V. Their equations are written with v' instead of zeta, so that nothing is
-divided by the airspeed and hover needs no theory of its own::
+speed v'. The design follows Larrabee (1979, SAE 790585) in the form of Adkins and Liebeck (1994, J. Propulsion and
+Power 10(5), 676-682), here A&L, with zeta = v'/V. Their equations are written with v' instead of zeta, so that nothing
+is divided by the airspeed and hover needs no theory of its own::
 
     tan(phi) = (V + v'/2) / (Omega r)                                       A&L 20, 21
     F = (2/pi) acos(exp(-(B/2) (1 - r/R) / sin(phi_tip)))                   A&L 18, 19
@@ -13,7 +13,7 @@ divided by the airspeed and hover needs no theory of its own::
     dT = B rho W Gamma cos(phi) (1 - eps tan(phi)) dr
     dQ = B rho W Gamma sin(phi) (1 + eps / tan(phi)) r dr                   A&L 1
 
-with eps = cd/cl. A&L integrate these in powers of zeta (11 to 15); here v' is found by bisection, which is the same root.
+with eps = cd/cl. A&L integrate these in powers of zeta (11 to 15); here v' is bracketed: the same root.
 The numbers of the equations are those that open codes of the method quote; the paper itself was not read.
 """
 
@@ -153,5 +153,5 @@ def ducted_disk(thrust_N: float, airspeed_m_s: float, flow: DuctFlow, rho: float
 
 def sheet_speed(circulation: ArrayLike, r: ArrayLike, blades: int, phi: ArrayLike, F: ArrayLike) -> Array:
     """Displacement speed that a circulation means at each radius; one value along a blade of least loss. [m/s]"""
-    s, c = np.sin(phi), np.cos(phi)
-    return np.asarray(np.asarray(circulation) * blades / (2.0 * np.pi * np.asarray(r) * F * s * c))
+    gamma, radius, angle, loss = (np.asarray(v, dtype=float) for v in (circulation, r, phi, F))
+    return np.asarray(gamma * blades / (2.0 * np.pi * radius * loss * np.sin(angle) * np.cos(angle)))

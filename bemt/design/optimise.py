@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,9 @@ class Found:
     converged: bool
 
 
-def section_at_best(model: Model, need: Requirement, r_over_R: float = 0.7) -> Callable[[Array], tuple[Array, Array, Array]]:
+def section_at_best(
+    model: Model, need: Requirement, r_over_R: float = 0.7
+) -> Callable[[Array], tuple[Array, Array, Array]]:
     """Lift coefficient, angle and drag over lift of the best lift-to-drag ratio within the stall margin, over Re."""
     polar = min(model.polars, key=lambda p: abs(p[0] - r_over_R))[1]
     some = np.flatnonzero((polar.alpha >= math.radians(-4.0)) & (polar.alpha <= math.radians(16.0)))
@@ -157,7 +159,9 @@ def optimise(problem: Problem, x0: Array, progress: Progress | None = None, step
     start = turned(problem, x0)
     before = problem.values(start)
     if before is None:
-        raise InputError(Fault("", "--thrust", "no blade to start from converges", "a point that the solver converges at"))
+        raise InputError(
+            Fault("", "--thrust", "no blade to start from converges", "a point that the solver converges at")
+        )
     inside, n = start, 0
     if before.margins.min() < 0.0:
         reached, inside, n = most_thrust(problem, x0, progress)
@@ -191,8 +195,12 @@ def most_thrust(problem: Problem, x0: Array, progress: Progress | None = None) -
             break
         # ratio + d(ratio) dx >= t;  margin + d(margin) dx >= -slack
         ratio = v.thrust_N / problem.asked
-        A = np.block([[-v.jacobian[:P], np.ones((P, 1)), np.zeros((P, 1))],
-                      [-v.jacobian[P:], np.zeros((v.margins.size - P, 1)), -np.ones((v.margins.size - P, 1))]])
+        A = np.block(
+            [
+                [-v.jacobian[:P], np.ones((P, 1)), np.zeros((P, 1))],
+                [-v.jacobian[P:], np.zeros((v.margins.size - P, 1)), -np.ones((v.margins.size - P, 1))],
+            ]
+        )
         sides = np.c_[np.maximum(low - x, -box), np.minimum(high - x, box)]
         got = linprog(c, A, np.r_[ratio, v.margins[P:]], bounds=[*sides, (-9.0, _ROOM), (0.0, None)], method="highs")
         n += 1

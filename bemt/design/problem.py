@@ -7,8 +7,8 @@
                chord >= what chord and thickness ask    every element, hub and tip
                chord <= 0.3 R and 0.9 of the gap between blades (in a duct R and twice the gap)
 
-The angle of attack is limited, not the lift coefficient, since a stalled section has a lift that any limit allows: up to
-where the table with which the solver works (rotation, neighbouring blades) first has the lift that is left of the
+The angle of attack is limited, not the lift coefficient, since a stalled section has a lift that any limit allows: up
+to where the table with which the solver works (rotation, neighbouring blades) first has the lift that is left of the
 isolated section's largest, at the element's Reynolds number, less by Prandtl and Glauert's factor at its Mach number.
 The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
 angles (:mod:`bemt.bem.gradient`); the control points follow by the chain rule. Over rotors as built,
@@ -378,9 +378,11 @@ def top_lift(polar: Polar) -> tuple[Array, Array]:
 
 
 def _lift_at_rest(prep: Prepared) -> Array:
-    """Lift coefficients of the stations' tables without compressibility, (N, Nr, angles), at the angles of `_ANGLES`."""
+    """Lift coefficients of the stations' tables without compressibility, (N, Nr, angles), at `_ANGLES`."""
     n_r = prep.axes[1]
-    rows = prep.tab[:, :n_r] if prep.layout == "factored" else prep.tab.reshape(prep.tab.shape[0], *prep.axes, -1, 2)[:, 0]
+    rows = (
+        prep.tab[:, :n_r] if prep.layout == "factored" else prep.tab.reshape(prep.tab.shape[0], *prep.axes, -1, 2)[:, 0]
+    )
     return np.asarray(rows[:, :, _ANGLES, 0])
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import INCH
 from bemt.design.materials import MATERIALS, SAFETY, Material
 
 if TYPE_CHECKING:
@@ -122,7 +121,9 @@ def point_of(text: str) -> Point:
                 raise ValueError
             found[names[key]] = float(value)
         except ValueError:
-            faults.append(Fault("--point", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once"))
+            faults.append(
+                Fault("--point", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
+            )
     if "thrust_N" not in found and not faults:
         faults.append(Fault("--point", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
     if faults:
@@ -174,7 +175,9 @@ def required(
         for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
             mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
             if mach > max_tip_mach:
-                top = 60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
+                top = (
+                    60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
+                )
                 faults.append(Fault("--rpm", "", f"{rpm or 0.0:g} rev/min, tip Mach {mach:.2f}",
                                     f"a tip Mach up to {max_tip_mach:g}",
                                     f"That is {top:.0f} rev/min at {V:g} m/s"))  # fmt: skip
@@ -183,7 +186,7 @@ def required(
     every = tuple(points)
     if static_thrust_N is not None:
         every = (*every, Point(static_thrust_N, 0.0, static_rpm, 0.0))
-    limits = Limits(min_chord_mm * 1e-3, min_thickness_mm * 1e-3, max_tip_mach, stall_margin, MATERIALS[material], safety)
+    limits = Limits(
+        min_chord_mm * 1e-3, min_thickness_mm * 1e-3, max_tip_mach, stall_margin, MATERIALS[material], safety
+    )
     return Requirement(every, 0.5 * diameter_m, 0.5 * hub_ratio * diameter_m, blades, limits, air)
-
-

@@ -12,6 +12,6 @@ from bemt.library.blades import design
 from bemt.library.rotors import Propeller, load, propeller
 
 __all__ = [
-    "Answer", "Propeller", "calibrate_rotor", "cite", "compare", "design", "diagnose", "drive", "estimate", "export", "load",
-    "plan", "propeller", "read", "report", "validate",
+    "Answer", "Propeller", "calibrate_rotor", "cite", "compare", "design", "diagnose", "drive", "estimate", "export",
+    "load", "plan", "propeller", "read", "report", "validate",
 ]  # fmt: skip

@@ -84,12 +84,14 @@ def design(
         asked = [] if thrust_N is None else [Point(thrust_N, airspeed_m_s, rpm)]
         for i, point in enumerate(points):
             if len(point) != 4:
-                raise InputError(Fault("", f"points[{i}]", repr(point), "(thrust_N, airspeed_m_s, rpm or None, weight)"))
+                raise InputError(
+                    Fault("", f"points[{i}]", repr(point), "(thrust_N, airspeed_m_s, rpm or None, weight)")
+                )
             asked.append(Point(*point))
         return design_blade(
             asked, None if diameter_in is None else diameter_in * INCH, blades, section=section, hub_ratio=hub_ratio,
-            density_kg_m3=density_kg_m3, duct=None if duct is None else load_case(path_text("duct", duct)), robust=robust,
-            static_thrust_N=static_thrust_N, static_rpm=static_rpm, min_chord_mm=min_chord_mm,
+            density_kg_m3=density_kg_m3, duct=None if duct is None else load_case(path_text("duct", duct)),
+            robust=robust, static_thrust_N=static_thrust_N, static_rpm=static_rpm, min_chord_mm=min_chord_mm,
             min_thickness_mm=min_thickness_mm, max_tip_mach=max_tip_mach, stall_margin=stall_margin, material=material,
             safety=safety,
         )  # fmt: skip
