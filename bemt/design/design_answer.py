@@ -76,8 +76,8 @@ def text(d: Design) -> str:
     quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"
     lines.append(text_table(["", "rpm", "thrust N", "power W", quality, "g/W", "tip Mach"], rows))
     if several:
-        label = "" if d.label is None else f", {d.label.name} {d.label.mean_W:.4g} W"
-        lines.append(f"mean power: design {d.mean_W:.4g} W{label}"
+        other = "" if d.label is None else f", {d.label.name} {d.label.mean_W:.4g} W"
+        lines.append(f"mean power: design {d.mean_W:.4g} W{other}"
                      + (f", best without drag {d.betz_W:.4g} W" if math.isfinite(d.betz_W) else "")
                      + f", ideal disk {d.disk_W:.4g} W")  # fmt: skip
     lines += ["± one standard uncertainty: " + ("the label's unknown shape is most of its band" if not d.ducted else

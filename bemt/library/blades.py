@@ -29,10 +29,12 @@ def design(
 
     Parameters
     ----------
-    thrust_N, airspeed_m_s, rpm : float
-        Thrust at least [N], flight speed [m/s] and speed of rotation [rev/min]; without rpm, that of the least power.
+    thrust_N : float
+        Thrust at least. [N]
     diameter_in : float
         Diameter; not with `duct`. [in]
+    airspeed_m_s, rpm : float
+        Flight speed [m/s] and speed of rotation [rev/min]; without rpm, that of the least power.
     points : sequence of (thrust_N, airspeed_m_s, rpm or None, weight)
         More points; weights are shares of the time, and that of the first is 1.
     blades : int, optional
