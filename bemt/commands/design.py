@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from bemt.base.units import INCH
     from bemt.case import load_case, new_folder
     from bemt.design import design_answer
-    from bemt.design.blade_design import design_blade
+    from bemt.design.blade_design import design_blade, name_of
     from bemt.design.requirement import Point, point_of
 
     points = [point_of(text) for text in args.point]
@@ -68,12 +68,14 @@ def run(args: argparse.Namespace) -> int:
         points.insert(0, Point(args.thrust, args.airspeed, args.rpm))
     elif args.rpm is not None or args.airspeed:
         raise InputError(Fault("--thrust", "", "nothing", "a thrust [N] with --airspeed and --rpm"))
-    if args.out:
-        new_folder.free_folder(Path(args.out))
+    duct = load_case(args.duct) if args.duct else None
+    inch = duct.diameter_m / INCH if duct is not None else args.diameter_in
+    if args.out or (points and inch):
+        new_folder.free_folder(Path(args.out or name_of(points[0], inch * INCH)))
     with _terminal.progress(args.quiet or args.json) as say:
         found = design_blade(
             points, None if args.diameter_in is None else args.diameter_in * INCH, args.blades, section=args.section,
-            hub_ratio=args.hub_ratio, density_kg_m3=args.density, duct=load_case(args.duct) if args.duct else None,
+            hub_ratio=args.hub_ratio, density_kg_m3=args.density, duct=duct,
             robust=args.robust, progress=say, static_thrust_N=args.static_thrust, static_rpm=args.static_rpm,
             min_chord_mm=args.min_chord_mm, min_thickness_mm=args.min_thickness_mm, max_tip_mach=args.max_tip_mach,
             stall_margin=args.stall_margin, material=args.material, safety=args.safety,

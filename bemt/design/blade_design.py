@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -104,7 +103,7 @@ class Design:
     @property
     def name(self) -> str:
         """Name of the case."""
-        return str(re.search(rb'^name = "(.+)"$', self.files["case.toml"], re.M)[1].decode())  # type: ignore[index]
+        return name_of(self.need.points[0], 2.0 * self.need.R)
 
     @property
     def values(self) -> Values:
@@ -134,6 +133,15 @@ class Design:
         from bemt.design.design_answer import text
 
         return text(self)
+
+
+def name_of(point: Point, diameter_m: float) -> str:
+    """Name of the case of a blade.
+
+    >>> name_of(Point(6.5, 15.0), 0.254)
+    'design_10in_6p5N'
+    """
+    return f"design_{diameter_m / INCH:.3g}in_{point.thrust_N:.3g}N".replace(".", "p")
 
 
 def design_blade(
@@ -364,14 +372,13 @@ def case_files(base: Case, found: search.Found, points: Sequence[Point]) -> dict
     x, chord, beta = found.problem.shape.table(found.best)
     rows = [f"{a:.7f},{c:.7f},{math.degrees(b):.6f}" for a, c, b in zip(x, chord, beta, strict=True)]
     kind = "fan" if base.ducted else "propeller"
-    name = f"design_{inch:.3g}in_{p.thrust_N:.3g}N".replace(".", "p")
     at = "static" if p.airspeed_m_s == 0.0 else f"at {p.airspeed_m_s:g} m/s"
     written = base.written
     blade: dict[str, Any] = {"stations": "stations.csv", "known_from": "cad"}
     if written["blade"].get("section") is not None:
         blade["section"] = written["blade"]["section"]
     document: dict[str, Any] = {
-        "schema": "bemt.case/1", "name": name,
+        "schema": "bemt.case/1", "name": name_of(p, 2.0 * need.R),
         "title": f"{kind} designed for {p.thrust_N:g} N {at}, {rpm:.0f} rev/min, {inch:.4g} in, {need.blades} blades",
         "origin": "bemt design", **{key: written[key] for key in KEYS_KEPT if written.get(key)},
         "blade": blade, "operating": {"rpm": round(rpm, 1), "airspeed_m_s": float(p.airspeed_m_s)},

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.canvas import BLUE, GREY, ORANGE
 from bemt.design.blade_design import Design
 
 Array = NDArray[np.float64]
 
-# Okabe and Ito (2008): told apart by colour-blind readers; line styles differ too.
-BEFORE: dict[str, Any] = {"color": "#E69F00", "ls": "--", "lw": 1.4}
-AFTER: dict[str, Any] = {"color": "#0072B2", "ls": "-", "lw": 1.8}
-LIMIT: dict[str, Any] = {"color": "#7F7F7F", "ls": ":", "lw": 1.3}
+BEFORE: dict[str, Any] = {"color": ORANGE, "ls": "--", "lw": 1.4}
+AFTER: dict[str, Any] = {"color": BLUE, "ls": "-", "lw": 1.8}
+LIMIT: dict[str, Any] = {"color": GREY, "ls": ":", "lw": 1.3}
 
 
 def picture(d: Design) -> bytes:
@@ -49,11 +49,12 @@ def picture(d: Design) -> bytes:
         axes["lift"].plot(
             x, d.values.limit[k], **LIMIT, label="largest allowed" if k == d.found.problem.flown[0] else None
         )
+    later = "" if len(d.found.problem.flown) == 1 else " (later points lighter)"
     axes["blade"].set(xlabel="radius [mm]", ylabel="[mm]", aspect="equal")
     axes["blade"].set_title(
         d.name + f": {d.need.blades} blades, outline along the quarter chord, unrolled", fontsize=10
     )
-    for key, y in (("chord", "chord [mm]"), ("twist", "blade angle [deg]"), ("lift", "lift coefficient"),
+    for key, y in (("chord", "chord [mm]"), ("twist", "blade angle [deg]"), ("lift", "lift coefficient" + later),
                    ("load", "thrust per radius [N/m]")):  # fmt: skip
         axes[key].set(xlabel="r/R", ylabel=y, xlim=(0.0, 1.0))
         axes[key].set_ylim(bottom=min(0.0, axes[key].get_ylim()[0]))

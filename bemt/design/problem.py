@@ -48,6 +48,7 @@ Array = NDArray[np.float64]
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
 _ALPHA, _W, _AXIAL, _SWIRL, _CL, _ROOM, _LIFT = range(2, 9)  # the last two are added here
 _STEP_RPM = 1e-6
+_FLOOR = 1e-3
 _STEEP = 5.0  # Lift coefficient over angle: of the size of the other constraints [1/rad]
 _ANGLES = np.flatnonzero((ALPHA_GRID >= math.radians(-20.0)) & (ALPHA_GRID <= math.radians(35.0)))
 _MACH = 0.9  # Beyond, Prandtl and Glauert's factor is held
@@ -119,6 +120,11 @@ class Problem:
         """Shares of the time, (P,)."""
         w = np.array([p.weight for p in self.need.points])
         return np.asarray(w / w.sum())
+
+    @cached_property
+    def price(self) -> Array:
+        """What the objective counts of each power, (P,): a floor a little, lest its speed is higher than needed."""
+        return np.where(self.weights > 0.0, self.weights, _FLOOR)
 
     @cached_property
     def flown(self) -> NDArray[np.intp]:
@@ -213,7 +219,7 @@ class Problem:
             T[:P] / self.asked - 1.0, _STEEP * e[_ROOM, self.flown].ravel(),
             *(np.log(allowed / one.value[::2]) for one in stress), spline - low, high - spline,
         ])  # fmt: skip
-        objective = float(self.weights @ power[:P] / self.scale_W)
+        objective = float(self.price @ power[:P] / self.scale_W)
         stresses = np.array([one.value for one in stress])
         rest = rpm, T[:P], power[:P], e[_CL, :P], e[_LIFT, :P], e[0, :P] / s.dr, stresses, objective, margins
         if not derivatives:
@@ -235,7 +241,7 @@ class Problem:
         jacobian = np.zeros((margins.size, self.size))
         jacobian[:, : 2 * CONTROLS] = np.concatenate(rows)
         gradient = np.zeros(self.size)
-        gradient[: 2 * CONTROLS] = self.weights @ power_rows / self.scale_W
+        gradient[: 2 * CONTROLS] = self.price @ power_rows / self.scale_W
         N, F = s.r.size, self.free.size
         for j, k in enumerate(self.free):
             up, down, v = P + j, P + F + j, 2 * CONTROLS + j
@@ -244,7 +250,7 @@ class Problem:
             def slope(a: Array, up: int = up, down: int = down, wide: float = wide) -> Any:
                 return (a[up] - a[down]) / wide
 
-            gradient[v] = self.weights[k] * slope(power) / self.scale_W
+            gradient[v] = self.price[k] * slope(power) / self.scale_W
             jacobian[k, v] = slope(T) / self.asked[k]
             if k in self.flown:
                 place = P + N * int(np.searchsorted(self.flown, k))
