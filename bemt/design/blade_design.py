@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case import Case, case_of, new_folder
+from bemt.case.load import with_changes
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import propagate
 from bemt.case.unknowns import AIR, SECTION, SURFACE
@@ -312,25 +314,20 @@ def _open_case(
         "blade": {"chord_law": "constant", "pitch_ratio": 0.6, "known_from": "cad", "section": table},
         "operating": {"rpm": 1000.0}, "air": {"density_kg_m3": density or AIR.value},
     }  # fmt: skip
-    with _named({"case.toml": "", "blade.section.naca": "--section", "blade.section.dat": "--section"}):
+    with _in_words_of_the_request():
         return case_of(tomlkit.dumps(document), folder)
 
 
-class _named:
-    """Faults of a made case in the words of the request."""
-
-    def __init__(self, words: dict[str, str]) -> None:
-        self.words = words
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
-        if isinstance(error, InputError):
-            file = "" if any(f.file.endswith("case.toml") for f in error.faults) else None
-            faults = [replace(f, file=f.file if file is None else "", where=self.words.get(f.where, f.where))
-                      for f in error.faults]  # fmt: skip
-            raise InputError(faults) from None
+@contextmanager
+def _in_words_of_the_request() -> Iterator[None]:
+    """Faults of a case that was made here name the option."""
+    try:
+        yield
+    except InputError as error:
+        made = [f for f in error.faults if f.file.endswith("case.toml")]
+        section = [replace(f, file="", where="--section") for f in made if f.where.startswith("blade.section")]
+        rest = [replace(f, file="") for f in made if not f.where.startswith("blade.section")]
+        raise InputError([*section, *rest, *(f for f in error.faults if f not in made)]) from None
 
 
 def _in_duct(
@@ -356,9 +353,15 @@ def _in_duct(
         if "dat" in table and folder.resolve() != case.folder.resolve():
             raise InputError(Fault("--section", "", section, "coordinate files in the folder of the case"))
         changes["blade.section"] = table
-    from bemt.case.load import with_changes
+    if not changes:
+        return case
+    changes["assumptions"] = [a for a in case.written.get("assumptions", ()) if not _settled(a["key"], changes)]
+    return with_changes(case, changes)
 
-    return with_changes(case, changes) if changes else case
+
+def _settled(key: str, changes: Mapping[str, Any]) -> bool:
+    """Whether an unknown is one no more."""
+    return any(key == done or key.startswith(f"{done}.") for done in changes)
 
 
 def case_files(base: Case, found: search.Found, points: Sequence[Point]) -> dict[str, bytes]:
