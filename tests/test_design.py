@@ -68,12 +68,14 @@ def test_the_answer_is_one_screen_with_document_and_picture(plain, tmp_path) -> 
     assert (out / "design.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_a_free_speed_needs_no_more_power(plain) -> None:
     free = bemt.design(T, D_IN, airspeed_m_s=V)
     assert free.mean_W < plain.mean_W * (1.0 + 2e-4) and free.values.thrust_N[0] == pytest.approx(T, rel=1e-3)
     assert free.same_speed is None
 
 
+@pytest.mark.slow
 def test_points_and_a_static_floor_are_met_together() -> None:
     found = bemt.design(T, 11, airspeed_m_s=V, points=[(8.0, 5.0, None, 0.5)], static_thrust_N=9.0)
     assert (found.values.thrust_N >= np.array([T, 8.0, 9.0]) * (1.0 - 1e-3)).all()

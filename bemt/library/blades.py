@@ -74,9 +74,12 @@ def design(
     Examples
     --------
     >>> import bemt
-    >>> found = bemt.design(6.0, 10, airspeed_m_s=15.0, rpm=7000)
-    >>> found.values.thrust_N.round(2), bool(found.disk_W < found.betz_W < found.mean_W)
-    (array([6.]), True)
+    >>> bemt.design(6.0, 254, airspeed_m_s=15.0, rpm=7000)
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: diameter_in: got 254; expected a number from 1 to 100 in. In mm? Divide by 25.4.
+
+    The page on design (docs/design.md) has one that is designed.
     """
     from bemt.case import load_case
     from bemt.design.blade_design import design_blade
