@@ -41,7 +41,7 @@ def design(
         Number of blades, 2 by default, in a duct that of the case.
     section : str, optional
         NACA digits or coordinate files (.dat) from hub to tip, as ``"4412"`` or ``"4415,4409"``; by default that of
-        the section rule (3.5 % camber, 9 % thickness), 15 % thick at the hub.
+        the section rule (3.5 % camber, 9 % thickness), 12 % thick at the hub.
     hub_ratio : float, optional
         Hub over tip radius [1]; 0.15 by default.
     static_thrust_N, static_rpm : float, optional
