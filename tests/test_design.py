@@ -15,7 +15,9 @@ from bemt.case.prepare import prepare_case
 from bemt.commands.cli import main
 from bemt.design import design_answer
 from bemt.design.best_label import standard
+from bemt.design.optimise import optimise
 from bemt.design.requirement import Point, point_of
+from bemt.design.shape import CONTROLS
 
 T, V, RPM, D_IN = 6.0, 15.0, 7000.0, 10.0
 
@@ -82,6 +84,14 @@ def test_points_and_a_static_floor_are_met_together() -> None:
     w = np.array([1.0, 0.5, 0.0])
     assert found.mean_W == pytest.approx(float(w @ found.values.power_W / w.sum()))
     assert len(found.bands) == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_optimum_does_not_depend_on_the_start(plain, seed: int) -> None:
+    problem, random = plain.found.problem, np.random.default_rng(seed)
+    far = plain.found.start + np.r_[0.3 * random.normal(size=CONTROLS), 0.1 * random.normal(size=CONTROLS)]
+    assert optimise(problem, far).after.power_W[0] == pytest.approx(plain.mean_W, rel=1e-4)
 
 
 @pytest.mark.slow

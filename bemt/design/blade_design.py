@@ -34,7 +34,7 @@ Progress = Callable[[str], None]
 
 HUB_RATIO = 0.15
 ROOT, THIN_FROM = 0.12, 0.5
-"""Thickness at the hub, the thickest that is tabulated without NeuralFoil, and r/R from which on it is the rule's [1]."""
+"""Thickness at the hub, the thickest that is tabulated without NeuralFoil, and r/R from which it is the rule's [1]."""
 DENSITY = (0.01, 10.0)  # of the air [kg/m3]
 KEYS_KEPT = ("rotor", "duct", "air", "model", "polars")
 """Tables of a case with a duct that the new blade keeps."""
