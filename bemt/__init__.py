@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bemt.library import calibrate_rotor as calibrate_rotor
     from bemt.library import cite as cite
     from bemt.library import compare as compare
+    from bemt.library import design as design
     from bemt.library import diagnose as diagnose
     from bemt.library import drive as drive
     from bemt.library import estimate as estimate
@@ -34,10 +35,10 @@ if TYPE_CHECKING:
     from bemt.library import validate as validate
 
 _HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset", "choose": "bemt.design"}
-_ROOMS = ("compare", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
+_ROOMS = ("compare", "design", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
 _NAMES = (
-    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "diagnose",
-    "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
+    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "design",
+    "diagnose", "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
 )  # fmt: skip
 __all__ = ["__version__", *_NAMES]
 

@@ -27,6 +27,7 @@ API = {  # page: title, introduction, names
         *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
         *(f"bemt.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor", "CalibratedRotor",
                                                 "export", "ExportedCase", "report", "cite")),
+        "bemt.library.blades.design", "bemt.design.blade_design.Design",
         "bemt.case.sources.Source",
         "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.Band")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
@@ -37,7 +38,16 @@ API = {  # page: title, introduction, names
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
-    "How to": ("choose.md", "notebooks/*", "flight_logs.md", "exports.md", "adding.md", "scaling.md", "trust.md"),
+    "How to": (
+        "choose.md",
+        "design.md",
+        "notebooks/*",
+        "flight_logs.md",
+        "exports.md",
+        "adding.md",
+        "scaling.md",
+        "trust.md",
+    ),
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("believe.md", "theory.md", "oblique.md", "duct.md", "effects.md", "diagnosis.md"),

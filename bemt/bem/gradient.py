@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "gradient", "loads"]
+__all__ = ["Gradient", "Moved", "elements", "gradient", "loads", "moved", "only"]
 
 Array = NDArray[np.float64]
 
@@ -93,31 +93,31 @@ def gradient(
     >>> g.chord.shape, bool(g.pitch[0] > 0), bool(g.airspeed[0] < 0)
     ((2, 40), True, True)
     """
-    moved = _moved(model, effects, stations, step)
+    rotors = moved(model, effects, stations, step)
     tip = rpm * _RAD_PER_RPM * model.rotor.R
     dn, dV, drho = step * rpm, step * tip, step * air.rho
     rates, speeds, densities = (np.array([[0, 1, -1, 0, 0, 0, 0], [0, 0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 0, 1, -1]])
                                 * [[dn], [dV], [drho]] + [[rpm], [airspeed_m_s], [air.rho]])  # fmt: skip
-    around_point = _elements(moved.base, rates, speeds, densities, air)
+    around_point = elements(rotors.base, rates, speeds, densities, air)
     sums = around_point.sum(axis=2)
     here = ([rpm], [airspeed_m_s], [air.rho], air)
     chord, beta = (
-        (_elements(high, *here)[:, 0] - _elements(low, *here)[:, 0]) / width
-        for low, high, width in (moved.chord, moved.beta)
+        (elements(high, *here)[:, 0] - elements(low, *here)[:, 0]) / width
+        for low, high, width in (rotors.chord, rotors.beta)
     )
     by = [(sums[:, 2 * k + 1] - sums[:, 2 * k + 2]) / (2.0 * d) for k, d in enumerate((dn, dV, drho))]
-    return Gradient(moved.base.stations, float(sums[0, 0]), float(sums[1, 0]), chord, beta, *by)
+    return Gradient(rotors.base.stations, float(sums[0, 0]), float(sums[1, 0]), chord, beta, *by)
 
 
 def loads(
     model: Model, effects: Sequence[Effect], rpm: float, airspeed_m_s: float, air: Air, stations: Stations
 ) -> tuple[float, float]:
     """Thrust [N] and torque [N m] of the rotor with these stations."""
-    both = _elements(model.prepared(_inside(effects), stations=stations), [rpm], [airspeed_m_s], [air.rho], air)
+    both = elements(only(model, effects, stations), [rpm], [airspeed_m_s], [air.rho], air)
     return float(both[0].sum()), float(both[1].sum())
 
 
-class _Moved(NamedTuple):
+class Moved(NamedTuple):
     """The rotor, and rotors whose chords (angles) are all a little smaller and larger, with the distance between."""
 
     base: Prepared
@@ -125,8 +125,8 @@ class _Moved(NamedTuple):
     beta: tuple[Prepared, Prepared, Array]
 
 
-def _moved(model: Model, effects: Sequence[Effect], stations: Stations | None, step: float) -> _Moved:
-    """Rotors around the one to be differentiated."""
+def moved(model: Model, effects: Sequence[Effect], stations: Stations | None = None, step: float = STEP) -> Moved:
+    """Rotors around the one to be differentiated: what differs between them is the derivative, element by element."""
     chosen = _inside(effects)
     s = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
 
@@ -137,7 +137,12 @@ def _moved(model: Model, effects: Sequence[Effect], stations: Stations | None, s
         low, high = (made(s._replace(**{key: getattr(s, key) + sign * width})) for sign in (-1.0, 1.0))
         return low, high, 2.0 * width
 
-    return _Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
+    return Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
+
+
+def only(model: Model, effects: Sequence[Effect], stations: Stations) -> Prepared:
+    """Rotor with these stations."""
+    return model.prepared(_inside(effects), stations=stations)
 
 
 def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -148,8 +153,13 @@ def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(sorted((e for e in effects if acts_on_rotor(e)), key=lambda e: (e.order, e.id)))
 
 
-def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air) -> Array:
-    """Thrust [N] and torque [N m] of each element, all blades, (2, P, N)."""
+def elements(
+    prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air, names: Sequence[str] = ("dT", "dQ")
+) -> Array:
+    """Columns of :data:`bemt.bem.solver.RADIAL` at points, (K, P, N); thrust and torque are those of all blades.
+
+    rpm [rev/min], V [m/s], rho [kg/m3]. InputError where a point does not converge.
+    """
     points = np.empty((len(np.atleast_1d(rpm)), K.N_POINT))
     points[:, K.P_OMEGA], points[:, K.P_V], points[:, K.P_RHO] = np.multiply(rpm, _RAD_PER_RPM), V, rho
     points[:, K.P_MU], points[:, K.P_SOUND] = air.mu, air.a_sound
@@ -157,7 +167,7 @@ def _elements(prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air:
     radial = np.empty((points.shape[0], prep.st.shape[0], K.N_RADIAL))
     entry, *constant = prep.kernel
     entry(points, *constant, out, radial)
-    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in ("dT", "dQ")])
+    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in names])
     if np.any(out[:, K.O_STATUS] != K.OK) or not np.all(np.isfinite(loads)):
         s = solver.solve(prep, np.asarray(rpm), np.asarray(V), air)
         where = f"{np.ravel(rpm)[0]:g} rev/min, {np.ravel(V)[0]:g} m/s"

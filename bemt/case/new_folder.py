@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
-from bemt.case import fresh, from_solid, load_case
+from bemt.case import Case, fresh, from_solid, load_case
 from bemt.readers._uiuc_names import find_family
 
 
@@ -64,24 +66,54 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
     faults = _faults(wanted)
     if faults:
         raise InputError(faults)
-    with tempfile.TemporaryDirectory() as made:  # a case is checked with the files that it names
-        files = _files(wanted)
+    files = _files(wanted)
+    case = checked(files)
+    if wanted.campaign:
+        files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
+    folder = Path(out) if out else Path(case.name)
+    write_files(files, folder)
+    return folder, sorted(files)
+
+
+@contextmanager
+def temporary(files: Mapping[str, bytes]) -> Iterator[Case]:
+    """Case of the files of a folder, as long as the folder is needed; faults name the files alone."""
+    with tempfile.TemporaryDirectory() as made:
         for name, content in files.items():
             (Path(made) / name).write_bytes(content)
         try:
-            case = load_case(made)
+            yield load_case(made)
         except InputError as error:
             place = Path(made).as_posix() + "/"
             raise InputError([replace(f, file=f.file.removeprefix(place)) for f in error.faults]) from None
-        folder = Path(out) if out else Path(case.name)
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
-            raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
-        if wanted.campaign:
-            files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
-    for name in sorted(files, key=lambda name: name == "case.toml"):  # last: what it names is there
+
+
+def checked(files: Mapping[str, bytes]) -> Case:
+    """Check the files of a case together; the case of them, whose files are not there."""
+    with temporary(files) as case:
+        return case
+
+
+def companions(case: Case) -> dict[str, bytes]:
+    """Section files of a case, by name: coordinates and polars that another blade with its sections needs."""
+    section = case.file.blade.section
+    dat = () if section is None or section.dat is None else section.dat
+    names = [*((dat,) if isinstance(dat, str) else dat), *(polar.file for polar in case.file.polars)]
+    return {name: (case.folder / name).read_bytes() for name in names}
+
+
+def free_folder(folder: Path) -> None:
+    """Refuse a folder that holds something."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        got = f"a {'folder' if folder.is_dir() else 'file'} that already exists"
+        raise InputError(Fault(folder.as_posix(), "", got, "a new folder", "Choose --out DIR"))
+
+
+def write_files(files: Mapping[str, bytes], folder: Path) -> None:
+    """Write the files of a case into a new folder; case.toml last, so that what it names is there."""
+    free_folder(folder)
+    for name in sorted(files, key=lambda name: name == "case.toml"):
         write_atomic(folder / name, files[name])
-    return folder, sorted(files)
 
 
 def _faults(w: Wanted) -> list[Fault]:

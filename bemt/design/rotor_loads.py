@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.air import Air
 from bemt.base.units import INCH
 from bemt.case import Case, case_of, fresh
 from bemt.case.prepare import prepare_case
@@ -66,12 +67,19 @@ def case_of_label(label: str) -> Case:
     return case_of(fresh.label_text(label))
 
 
-def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float) -> RotorLoads | None:
+def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None) -> RotorLoads | None:
     """Solve a label over speed; None where too few speeds converge."""
+    return loads_of_case(label, case_of_label(label), rpm_max, airspeed_m_s, air)
+
+
+def loads_of_case(
+    label: str, case: Case, rpm_max: float, airspeed_m_s: float, air: Air | None = None
+) -> RotorLoads | None:
+    """Solve a case over speed, in its own air unless told; None where too few speeds converge."""
     from scipy.interpolate import PchipInterpolator
 
-    case = case_of_label(label)
-    points = prepare_case(case).solve(SPEEDS * rpm_max, airspeed_m_s, case.air())
+    air = case.air() if air is None else air
+    points = prepare_case(case).solve(SPEEDS * rpm_max, airspeed_m_s, air)
     T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
     good = np.isfinite(T) & np.isfinite(Q)
     if np.count_nonzero(good) < 4:
@@ -81,7 +89,7 @@ def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float) -> RotorLoads |
     thrust, torque = (np.asarray(PchipInterpolator(n, v[good] / n**2)(fine)) * fine**2 for v in (T, Q))
     pitch = case.stated_pitch_m
     return RotorLoads(label, case.diameter_m, pitch, int(case.file.rotor.blades), fine, thrust, torque,
-                      float(case.air().a_sound))  # fmt: skip
+                      float(air.a_sound))  # fmt: skip
 
 
 def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:

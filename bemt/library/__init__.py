@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from bemt.library.actions import calibrate_rotor, cite, estimate, export, plan, report
 from bemt.library.answers import Answer, compare, diagnose, drive, read, validate
+from bemt.library.blades import design
 from bemt.library.rotors import Propeller, load, propeller
 
 __all__ = [
-    "Answer", "Propeller", "calibrate_rotor", "cite", "compare", "diagnose", "drive", "estimate", "export", "load",
-    "plan", "propeller", "read", "report", "validate",
+    "Answer", "Propeller", "calibrate_rotor", "cite", "compare", "design", "diagnose", "drive", "estimate", "export",
+    "load", "plan", "propeller", "read", "report", "validate",
 ]  # fmt: skip

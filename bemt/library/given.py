@@ -17,7 +17,7 @@ __all__ = ["in_words_of_the_library", "numbers", "path_text"]
 
 ARGUMENTS = {
     "--airspeed": "airspeed_m_s", "--density": "density_kg_m3", "--format": "formats", "--out": "folder",
-    "--case": "propeller", "--plan": "points",
+    "--case": "propeller", "--plan": "points", "--thrust": "thrust_N", "--static-thrust": "static_thrust_N",
 }  # fmt: skip
 """Arguments whose name is not the option's."""
 

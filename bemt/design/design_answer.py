@@ -1,0 +1,162 @@
+"""A design as text, document and files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.base.tables import json_text, number_text, text_table, write_atomic
+from bemt.base.units import G0, INCH
+from bemt.design.blade_design import Band, Design
+from bemt.design.minimum_loss import actuator_disk
+
+SCHEMA = "bemt.design/1"
+RESULTS = ("design.json", "design.png")
+
+
+def _at(V: float) -> str:
+    return "static" if V == 0.0 else f"at {V:g} m/s"
+
+
+def _row(
+    name: str, rpm: float, thrust: str, power: str, T: float, V: float, P: float, mach: float, d: Design
+) -> list[str]:
+    """Thrust and power at a point, with the efficiency in flight or the figure of merit at rest."""
+    need = d.need
+    ideal = T * V if V else actuator_disk(T, 0.0, need.R, need.Rhub, float(need.air.rho)) if not d.ducted else math.nan
+    return [name, "-" if math.isnan(rpm) else f"{rpm:.0f}", thrust, power, number_text(ideal / P, 3),
+            number_text(1e3 * T / G0 / P, 3), number_text(mach, 2)]  # fmt: skip
+
+
+def _banded(value: float, u: float) -> str:
+    digits = 3 if value < 1000.0 else 4
+    return f"{number_text(value, digits)} ± {number_text(u, 2)}" if math.isfinite(u) else number_text(value, digits)
+
+
+def _loads(b: Band) -> tuple[str, str]:
+    return _banded(b.thrust_N, b.u_thrust_N), _banded(b.power_W, b.u_power_W)
+
+
+def _mach(d: Design, rpm: float, V: float, R: float) -> float:
+    return math.hypot(rpm * math.pi / 30.0 * R, V) / float(d.need.air.a_sound)
+
+
+def text(d: Design) -> str:
+    """One screen: the blade next to the best label and the ideal limits, what it buys and what limits it."""
+    need, v, several = d.need, d.values, len(d.need.points) > 1
+    first = need.points[0]
+    lines = [
+        f"{d.name}: {2.0 * need.R / INCH:.4g} in, {need.blades} blades, "
+        + "; ".join(f"{p.thrust_N:g} N {_at(p.airspeed_m_s)}" + ("" if p.weight else " (floor)") for p in need.points),
+        "",
+    ]
+    rows = []
+    for k, p in enumerate(need.points):
+        point = f"{k + 1}: " if several else ""
+        V = p.airspeed_m_s
+        mach = _mach(d, float(v.rpm[k]), V, need.R)
+        rows.append(_row(point + "design", float(v.rpm[k]), *_loads(d.bands[k]), float(v.thrust_N[k]), V,
+                         float(v.power_W[k]), mach, d))  # fmt: skip
+        others = [(d.label, "its best speed", d.label_bands), (d.same_speed, "same speed", ())]
+        for label, what, bands in others:
+            if label is None or (what == "same speed" and p.rpm is None):
+                continue
+            T, P, rpm = (float(a[k]) for a in (label.thrust_N, label.power_W, label.rpm))
+            shown = _loads(bands[k]) if bands else (number_text(T, 3), number_text(P, 3))
+            mach = _mach(d, rpm, V, 0.5 * label.case.diameter_m)
+            rows.append(_row(f"{point}{label.name}, {what}", rpm, *shown, T, V, P, mach, d))
+    if not several:
+        T, V = first.thrust_N, first.airspeed_m_s
+        ideal = [("best without drag (Betz)", d.betz_W), ("ideal disk", d.disk_W)]
+        rows += [_row(name, math.nan, number_text(T, 3), number_text(P, 3), T, V, P, math.nan, d)
+                 for name, P in ideal if math.isfinite(P)]  # fmt: skip
+    quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"
+    lines.append(text_table(["", "rpm", "thrust N", "power W", quality, "g/W", "tip Mach"], rows))
+    if several:
+        other = "" if d.label is None else f", {d.label.name} {d.label.mean_W:.4g} W"
+        lines.append(f"mean power: design {d.mean_W:.4g} W{other}"
+                     + (f", best without drag {d.betz_W:.4g} W" if math.isfinite(d.betz_W) else "")
+                     + f", ideal disk {d.disk_W:.4g} W")  # fmt: skip
+    lines += ["± one standard uncertainty: " + ("the label's unknown shape is most of its band" if not d.ducted else
+                                                "duct and gap are most of it"), "", *_bought(d)]  # fmt: skip
+    limits = need.limits
+    stress, allowed = float(np.nanmax(v.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
+    lines.append(f"limits reached: {'; '.join(d.active) or 'none'}")
+    lines.append(f"largest stress {stress:.3g} MPa; {allowed:.3g} allowed ({limits.material.name}, "
+                 f"{limits.material.strength_MPa:g} MPa over {limits.safety:g})")  # fmt: skip
+    if d.robust is not None:
+        lines.append("over rotors as built, " + "; ".join(
+            f"{name}: {_banded(o.thrust_N, o.sd_thrust_N)} N, {_banded(o.power_W, o.sd_power_W)} W"
+            for name, o in zip(("this blade", "the blade for the drawing alone"), d.robust, strict=True)))  # fmt: skip
+    if not d.found.converged:
+        lines.append("! the search did not converge: the blade keeps its limits, but less power may be possible")
+    return "\n".join(lines) + "\n"
+
+
+def _bought(d: Design) -> list[str]:
+    """What the design buys over the best label, and how far the ideal is."""
+    kind = (
+        "blade of constant pitch in this duct" if d.ducted else f"standard label up to {2.0 * d.need.R / INCH:.4g} in"
+    )
+    lines = []
+    if d.same_speed is None and not d.ducted and all(p.rpm is not None for p in d.need.points if p.weight > 0.0):
+        lines.append(f"at the speed asked for, no {kind} reaches the thrust")
+    if d.label is None:
+        lines.append(f"no {kind} does this at any speed within the tip Mach number")
+    else:
+        gain = d.mean_W / d.label.mean_W - 1.0
+        words = [f"stress (in {d.need.limits.material.name})" if w == "stress" else w for w in d.label_breaks]
+        breaks = f"; it does not keep: {', '.join(words)}" if words else ""
+        lines.append(f"{abs(gain):.1%} {'less' if gain <= 0.0 else 'more'} power than {d.label.name}, the best {kind}, "
+                     f"at the speed that suits it{breaks}")  # fmt: skip
+        if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
+            lines.append("leave the rpm out, and the speed is found too")
+    ideal, name = (d.disk_W, "ideal disk") if math.isnan(d.betz_W) else (d.betz_W, "best blade without drag")
+    lines.append(f"{d.mean_W / ideal - 1.0:.1%} more power than the {name}")
+    return lines
+
+
+def document(d: Design) -> dict[str, Any]:
+    """Plain values, ``bemt.design/1``."""
+    v, need = d.values, d.need
+    r, chord, beta = d.found.problem.shape.table(d.found.best)
+    return {
+        "schema": SCHEMA, "name": d.name, "diameter_in": 2.0 * need.R / INCH, "blades": need.blades,
+        "converged": d.found.converged, "steps": d.found.steps,
+        "limits": {"min_chord_mm": 1e3 * need.limits.min_chord_m, "min_thickness_mm": 1e3 * need.limits.min_thickness_m,
+                   "max_tip_mach": need.limits.max_tip_mach, "stall_margin": need.limits.stall_margin,
+                   "material": need.limits.material.name, "safety": need.limits.safety},
+        "active": d.active,
+        "points": [
+            {"thrust_N": float(v.thrust_N[k]), "asked_N": p.thrust_N, "airspeed_m_s": p.airspeed_m_s,
+             "rpm": float(v.rpm[k]), "weight": p.weight, "power_W": float(v.power_W[k]),
+             "u_thrust_N": d.bands[k].u_thrust_N, "u_power_W": d.bands[k].u_power_W,
+             "tip_mach": _mach(d, float(v.rpm[k]), p.airspeed_m_s, need.R),
+             "stress_MPa": float(np.nanmax(v.stress_Pa[k])) / 1e6}
+            for k, p in enumerate(need.points)
+        ],
+        "mean_power_W": d.mean_W, "disk_W": d.disk_W, "betz_W": None if math.isnan(d.betz_W) else d.betz_W,
+        "label": None if d.label is None else {
+            "name": d.label.name, "rpm": d.label.rpm.tolist(), "power_W": d.label.power_W.tolist(),
+            "mean_power_W": d.label.mean_W, "breaks": list(d.label_breaks),
+            "bands": [vars(b) for b in d.label_bands]},
+        "same_speed": None if d.same_speed is None else {
+            "name": d.same_speed.name, "rpm": d.same_speed.rpm.tolist(), "thrust_N": d.same_speed.thrust_N.tolist(),
+            "power_W": d.same_speed.power_W.tolist()},
+        "robust": None if d.robust is None else {"this": vars(d.robust[0]), "drawn": vars(d.robust[1])},
+        "stations": {"r_over_R": r.tolist(), "chord_over_R": chord.tolist(), "beta_deg": np.degrees(beta).tolist()},
+    }  # fmt: skip
+
+
+def write(d: Design, folder: str | Path) -> Path:
+    """Write case, document and picture into a new folder; the document last."""
+    from bemt.design.design_picture import picture
+
+    drawn = picture(d)
+    out = d.write(folder)
+    write_atomic(out / RESULTS[1], drawn)
+    write_atomic(out / RESULTS[0], json_text(document(d)))
+    return out

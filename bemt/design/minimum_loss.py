@@ -1,0 +1,157 @@
+"""Blades of minimum induced loss, and the ideal limits next to which a design stands.
+
+A blade loses least when the sheets that it sheds move back as if they were rigid (Betz 1919), with one displacement
+speed v'. The design follows Larrabee (1979, SAE 790585) in the form of Adkins and Liebeck (1994, J. Propulsion and
+Power 10(5), 676-682), here A&L, with zeta = v'/V. Their equations are written with v' instead of zeta, so that nothing
+is divided by the airspeed and hover needs no theory of its own::
+
+    tan(phi) = (V + v'/2) / (Omega r)                                       A&L 20, 21
+    F = (2/pi) acos(exp(-(B/2) (1 - r/R) / sin(phi_tip)))                   A&L 18, 19
+    Gamma = 2 pi r v' F sin(phi) cos(phi) / B                               circulation of a blade, A&L 5, 6
+    W c = 2 Gamma / cl                                                      A&L 16
+    W sin(phi) = V + v'/2 cos(phi)^2 (1 - eps tan(phi))                     A&L 17 with 7a
+    dT = B rho W Gamma cos(phi) (1 - eps tan(phi)) dr
+    dQ = B rho W Gamma sin(phi) (1 + eps / tan(phi)) r dr                   A&L 1
+
+with eps = cd/cl. A&L integrate these in powers of zeta (11 to 15); here v' is bracketed: the same root.
+The numbers of the equations are those that open codes of the method quote; the paper itself was not read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt.bem.duct import DuctFlow
+
+Array = NDArray[np.float64]
+Section = Callable[[Array], tuple[Array, Array, Array]]
+"""Reynolds numbers of the elements, (N,), to lift coefficient, angle of attack [rad] and drag over lift there."""
+
+_STEPS = 6  # of the Reynolds number, which depends on W c only
+
+
+@dataclass(frozen=True, eq=False)
+class MinimumLoss:
+    """A blade of minimum induced loss.
+
+    Attributes
+    ----------
+    r, chord, beta, phi : (N,) float
+        Radii and chord [m], blade angle and inflow angle [rad].
+    circulation, W : (N,) float
+        Circulation of a blade [m2/s], speed of the section [m/s].
+    displacement : float
+        Speed v' of the vortex sheets [m/s].
+    thrust_N, power_W : float
+        Of all blades.
+    """
+
+    r: Array
+    chord: Array
+    beta: Array
+    phi: Array
+    circulation: Array
+    W: Array
+    displacement: float
+    thrust_N: float
+    power_W: float
+
+
+def minimum_loss(
+    target: float,
+    airspeed_m_s: float,
+    rpm: float,
+    blades: int,
+    R: float,
+    Rhub: float,
+    section: Section,
+    rho: float = 1.225,
+    mu: float = 1.79e-5,
+    *,
+    power: bool = False,
+    n: int = 200,
+) -> MinimumLoss | None:
+    """Blade of minimum induced loss for a thrust [N] or a power [W]; None if no blade on this disk reaches it.
+
+    Examples
+    --------
+    >>> def ideal(Re):
+    ...     return np.full_like(Re, 0.5), np.radians(np.full_like(Re, 4.0)), np.zeros_like(Re)
+    >>> found = minimum_loss(6.0, 15.0, 7000.0, 2, 0.127, 0.02, ideal)
+    >>> round(found.thrust_N, 6), bool(actuator_disk(6.0, 15.0, 0.127, 0.02) < found.power_W)
+    (6.0, True)
+    """
+    from scipy.optimize import brentq
+
+    edges = Rhub + (R - Rhub) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, n + 1)))
+    r, dr = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    Omega = rpm * math.pi / 30.0
+
+    def blade(v: float) -> MinimumLoss:
+        phi = np.arctan2(airspeed_m_s + 0.5 * v, Omega * r)
+        tip = math.atan2(airspeed_m_s + 0.5 * v, Omega * R)
+        F = 2.0 / math.pi * np.arccos(np.exp(-0.5 * blades * (1.0 - r / R) / math.sin(tip)))
+        s, c = np.sin(phi), np.cos(phi)
+        gamma = 2.0 * math.pi * r * v * F * s * c / blades
+        cl, alpha, eps = section(np.full_like(r, 1e5))
+        for _ in range(_STEPS):
+            cl, alpha, eps = section(np.maximum(rho * 2.0 * gamma / cl / mu, 1.0))
+        W = (airspeed_m_s + 0.5 * v * c**2 * (1.0 - eps * s / c)) / s
+        dT = blades * rho * W * gamma * (c - eps * s) * dr
+        dQ = blades * rho * W * gamma * (s + eps * c) * r * dr
+        T, P = float(dT.sum()), Omega * float(dQ.sum())
+        return MinimumLoss(r, 2.0 * gamma / (cl * W), alpha + phi, phi, gamma, W, v, T, P)
+
+    def reached(v: float) -> float:
+        found = blade(v)
+        return found.power_W if power else found.thrust_N
+
+    low, high = 0.0, 1e-3 * Omega * R
+    while reached(high) < target:
+        if high > 8.0 * Omega * R or (not power and high > Omega * R and reached(high) < reached(low)):
+            return None
+        low, high = high, 1.5 * high
+    return blade(float(brentq(lambda v: reached(v) / target - 1.0, low or 1e-9 * high, high, xtol=1e-12 * high)))
+
+
+def without_drag(Re: Array) -> tuple[Array, Array, Array]:
+    """Section without drag: the Betz optimum, whose power no lift coefficient changes."""
+    return np.full_like(Re, 0.5), np.zeros_like(Re), np.zeros_like(Re)
+
+
+def actuator_disk(thrust_N: float, airspeed_m_s: float, R: float, Rhub: float, rho: float = 1.225) -> float:
+    """Power of the ideal actuator disk on the swept annulus: thrust times the speed through it. [W]
+
+    >>> round(actuator_disk(10.0, 0.0, 0.127, 0.0), 1)
+    89.8
+    """
+    area = math.pi * (R**2 - Rhub**2)
+    return thrust_N * (0.5 * airspeed_m_s + math.sqrt(0.25 * airspeed_m_s**2 + thrust_N / (2.0 * rho * area)))
+
+
+def ducted_disk(thrust_N: float, airspeed_m_s: float, flow: DuctFlow, rho: float = 1.225) -> float:
+    """Power of an ideal disk in a duct of the same exit, without losses and swirl: energy of the jet. [W]
+
+    Continuity and momentum as in :mod:`bemt.bem.duct`.
+    """
+    from scipy.optimize import brentq
+
+    V = airspeed_m_s
+
+    def mass(jet: float) -> float:
+        return rho * flow.area * flow.wake_ratio * (flow.capture * V + flow.contraction * (jet - V))
+
+    fast = V + math.sqrt(thrust_N / (rho * flow.area * flow.wake_ratio * flow.contraction)) + 1e-6
+    jet = float(brentq(lambda v: mass(v) * (v - V) - thrust_N, V, 2.0 * fast))
+    return 0.5 * mass(jet) * (jet**2 - V**2)
+
+
+def sheet_speed(circulation: ArrayLike, r: ArrayLike, blades: int, phi: ArrayLike, F: ArrayLike) -> Array:
+    """Displacement speed that a circulation means at each radius; one value along a blade of least loss. [m/s]"""
+    gamma, radius, angle, loss = (np.asarray(v, dtype=float) for v in (circulation, r, phi, F))
+    return np.asarray(gamma * blades / (2.0 * np.pi * radius * loss * np.sin(angle) * np.cos(angle)))

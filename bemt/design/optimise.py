@@ -1,0 +1,290 @@
+"""From a requirement to a blade: a start of minimum induced loss, then the real solver with its gradient (SLSQP)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.design.minimum_loss import MinimumLoss, minimum_loss
+from bemt.design.problem import Problem, Values, top_lift
+from bemt.design.requirement import Requirement
+from bemt.design.shape import CONTROLS, Shape
+from bemt.effects import Effect
+from bemt.rotors.latents import NAMES, Prior, as_built
+from geometry.blade import Blade, from_stations
+
+if TYPE_CHECKING:
+    from bemt.bem.model import Model
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, str], None]
+
+ENOUGH = 1e-3
+"""Share of a thrust, or of another limit, that may be missing [1]."""
+_TOLERANCE = 1e-6
+_STEPS = 60
+_ROOM = 1.1  # Thrust over the required one at which the search for more of it ends
+_BOX, _SMALLEST_BOX, _CORNERS, _PENALTY, _NEARLY = 0.4, 1e-3, 40, 10.0, 1e-4  # Of the search for the most thrust
+_USUAL_TIP = 0.35  # Mach number of a first guess where the speed is free
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A blade found.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was solved.
+    start, best : (V,) float
+        Variables of start and result.
+    before, after : Values
+        What they give.
+    steps : int
+        Iterations.
+    converged : bool
+        Whether the optimum was reached within the tolerance.
+    """
+
+    problem: Problem
+    start: Array
+    best: Array
+    before: Values
+    after: Values
+    steps: int
+    converged: bool
+
+
+def section_at_best(
+    model: Model, need: Requirement, r_over_R: float = 0.7
+) -> Callable[[Array], tuple[Array, Array, Array]]:
+    """Lift coefficient, angle and drag over lift of the best lift-to-drag ratio within the stall margin, over Re."""
+    polar = min(model.polars, key=lambda p: abs(p[0] - r_over_R))[1]
+    some = np.flatnonzero((polar.alpha >= math.radians(-4.0)) & (polar.alpha <= math.radians(16.0)))
+    cl, cd = polar.cl[some, :, 0], polar.cd[some, :, 0]
+    top = (1.0 - need.limits.stall_margin) * top_lift(polar)[1]
+    best = np.argmax(np.where((cl > 0.1) & (cl <= top[None, :]), cl / cd, -1.0), axis=0)
+    n = np.arange(cl.shape[1])
+    table = cl[best, n], polar.alpha[some][best], cd[best, n] / cl[best, n]
+
+    def at(Re: Array) -> tuple[Array, Array, Array]:
+        ln = np.log(Re)
+        one, two, three = (np.interp(ln, np.log(polar.Re), v) if n.size > 1 else np.full_like(ln, v[0]) for v in table)
+        return one, two, three
+
+    return at
+
+
+def start_blade(model: Model, need: Requirement) -> tuple[Blade, MinimumLoss]:
+    """Blade of minimum induced loss for the heaviest point; for less thrust where that cannot be reached."""
+    point = max(need.points, key=lambda p: (p.weight > 0.0, p.thrust_N))
+    rpm = point.rpm or first_speed(need)
+    section, target = section_at_best(model, need), point.thrust_N
+    air = need.air
+    found = None
+    while found is None:
+        found = minimum_loss(target, point.airspeed_m_s, rpm, need.blades, need.R, need.Rhub, section, float(air.rho),
+                             float(air.mu))  # fmt: skip
+        target *= 0.7
+    keep = np.r_[0, 1:199:6, 199]
+    # one angle of attack for the whole blade: that of the best lift-to-drag ratio jumps where the tip's Re falls
+    alpha = float(np.interp(0.7 * need.R, found.r, found.beta - found.phi))
+    r, chord, beta = found.r[keep], found.chord[keep], found.phi[keep] + alpha
+    chord = np.clip(chord, 0.01 * need.R, 0.4 * need.R)
+    return from_stations(r, chord, np.minimum(beta, 1.4), need.R, need.Rhub, list(model.rotor.blade.anchors)), found
+
+
+def first_speed(need: Requirement) -> float:
+    """First guess of a free speed [rev/min]."""
+    tip = min(_USUAL_TIP, 0.9 * need.limits.max_tip_mach) * float(need.air.a_sound)
+    return min(60.0 * tip / (2.0 * math.pi * need.R), 0.95 * need.slow)
+
+
+def problem_of(
+    model: Model, need: Requirement, blade: Blade, rpm0: float | None = None, variants: Sequence[Sequence[Effect]] = ()
+) -> tuple[Problem, Array]:
+    """Problem around a blade, and the variables of that blade."""
+    shape, x = Shape.around(blade, model.n_stations)
+    guess = rpm0 or first_speed(need)
+    rpm = np.array([float(p.rpm or guess) for p in need.points])
+    fast = np.hypot(rpm.max() * math.pi / 30.0 * need.R, max(p.airspeed_m_s for p in need.points))
+    free = any(p.rpm is None for p in need.points)
+    mach = need.limits.max_tip_mach if free else float(fast / need.air.a_sound)
+    limited = replace(model, mach_max=min(1.2 * mach, model.mach_max))
+    problem = Problem(need, limited, shape, rpm, tuple(variants) or (model.effects,), 1.0)
+    low, high = problem.chord_range
+    nodes = [int(np.argmin(np.abs(np.r_[shape.Rhub, shape.r, shape.R] / shape.R - n))) for n in shape.nodes]
+    x[:CONTROLS] = np.clip(x[:CONTROLS], low[nodes] + 1e-3, high[nodes])
+    scale = sum(
+        w * p.thrust_N * (p.airspeed_m_s + math.sqrt(p.thrust_N / (2.0 * float(need.air.rho) * math.pi * need.R**2)))
+        for w, p in zip(problem.weights, need.points, strict=True)
+    )
+    return replace(problem, scale_W=scale), np.r_[x, np.zeros(problem.size - 2 * CONTROLS)]
+
+
+def turned(problem: Problem, x: Array) -> Array:
+    """Turn the whole blade until the hardest point has its thrust, as far as that helps."""
+
+    def lacking(angle: float) -> float:
+        moved = x.copy()
+        moved[CONTROLS : 2 * CONTROLS] += angle
+        v = problem.values(moved)
+        return -math.inf if v is None else float((v.thrust_N / problem.asked).min()) - 1.0
+
+    angles = np.linspace(-0.8, 0.8, 17)
+    gains = np.array([lacking(a) for a in angles])
+    if not np.isfinite(gains).any():
+        return x
+    enough = np.flatnonzero(gains >= 0.0)
+    out = x.copy()
+    angle = float(angles[int(np.nanargmax(gains))])
+    if enough.size and enough[0] > 0:
+        low, high = angles[enough[0] - 1], angles[enough[0]]
+        for _ in range(12):
+            mid = 0.5 * (low + high)
+            low, high = (low, mid) if lacking(mid) >= 0.0 else (mid, high)
+        angle = high
+    out[CONTROLS : 2 * CONTROLS] += angle
+    return out
+
+
+def optimise(problem: Problem, x0: Array, progress: Progress | None = None, steps: int = _STEPS) -> Found:
+    """Least mean power within the limits; InputError with the nearest thrust that can be reached, if it cannot."""
+    start = turned(problem, x0)
+    before = problem.values(start)
+    if before is None:
+        raise InputError(
+            Fault("", "--thrust", "no blade to start from converges", "a point that the solver converges at")
+        )
+    inside, n = start, 0
+    if before.margins.min() < 0.0:
+        reached, inside, n = most_thrust(problem, x0, progress)
+        if reached < 1.0 - ENOUGH:
+            raise InputError(_unreachable(problem, inside, reached))
+    best, more, done = _least_power(problem, inside, progress, steps)
+    after = problem.values(best)
+    if after is None or after.margins.min() < -ENOUGH:  # what was found before is within the limits
+        best, after, done = inside, problem.values(inside), False
+    assert after is not None
+    return Found(problem, start, best, before, after, n + more, done)
+
+
+def most_thrust(problem: Problem, x0: Array, progress: Progress | None = None) -> tuple[float, Array, int]:
+    """Largest share of all thrusts that can be had at once within the limits (up to `_ROOM`), its variables, and steps.
+
+    Linear programs in a box around the last blade, with one slack for all limits (Fletcher and Sainz de la Maza 1989,
+    Mathematical Programming 43): the most thrust stands in a corner of the limits.
+    """
+    from scipy.optimize import linprog
+
+    P = len(problem.need.points)
+    low, high = np.array(problem.bounds()).T
+    x, box, n = np.clip(x0, low, high), _BOX, 0
+    v = problem.values(x, derivatives=True)
+    if v is None:
+        return 0.0, x0, 0
+    c = np.r_[np.zeros(x.size), -1.0, _PENALTY]
+    while n < _CORNERS and box > _SMALLEST_BOX:
+        if _share(v) >= 1.0 and v.margins[P:].min() >= -_NEARLY:
+            break
+        # ratio + d(ratio) dx >= t;  margin + d(margin) dx >= -slack
+        ratio = v.thrust_N / problem.asked
+        A = np.block(
+            [
+                [-v.jacobian[:P], np.ones((P, 1)), np.zeros((P, 1))],
+                [-v.jacobian[P:], np.zeros((v.margins.size - P, 1)), -np.ones((v.margins.size - P, 1))],
+            ]
+        )
+        sides = np.c_[np.maximum(low - x, -box), np.minimum(high - x, box)]
+        got = linprog(c, A, np.r_[ratio, v.margins[P:]], bounds=[*sides, (-9.0, _ROOM), (0.0, None)], method="highs")
+        n += 1
+        if progress is not None:
+            progress(n, "limits")
+        new = None if got.status != 0 else problem.values(x + got.x[: x.size], derivatives=True)
+        if new is not None and _merit(new, P) < _merit(v, P) - 1e-6:
+            x, v, box = x + got.x[: x.size], new, min(1.5 * box, _BOX)
+        else:
+            box *= 0.35
+    within = float(np.maximum(-v.margins[P:], 0.0).max(initial=0.0))
+    return (_share(v) if within <= ENOUGH else min(_share(v), 0.0)), x, n
+
+
+def _share(v: Values) -> float:
+    """Least thrust over the required one."""
+    return float(v.margins[: v.thrust_N.size].min()) + 1.0
+
+
+def _merit(v: Values, P: int) -> float:
+    """What the linear programs lessen: thrust that is missing, and the worst limit."""
+    return -min(_share(v), _ROOM) + _PENALTY * max(0.0, -float(v.margins[P:].min()))
+
+
+def _least_power(problem: Problem, x0: Array, progress: Progress | None, steps: int) -> tuple[Array, int, bool]:
+    """Run SLSQP (Kraft 1988, DFVLR-FB 88-28): variables at the end, steps, and whether it converged."""
+    from scipy.optimize import minimize
+
+    last, n = [problem.values(x0, derivatives=True)], 0
+
+    def values(x: Array) -> Values:
+        found = problem.values(x, derivatives=True)
+        last[0] = found or last[0]
+        assert last[0] is not None
+        return last[0]
+
+    def power(x: Array) -> tuple[float, Array]:
+        v = values(x)
+        lost = problem.values(x, derivatives=True) is None
+        return (1e3, np.zeros(x.size)) if lost else (v.objective, v.gradient)
+
+    def count(x: Array) -> None:
+        nonlocal n
+        n += 1
+        if progress is not None:
+            progress(n, "least power")
+
+    found = minimize(
+        power, x0, jac=True, method="SLSQP", bounds=problem.bounds(), callback=count,
+        constraints=[{"type": "ineq", "fun": lambda x: values(x).margins, "jac": lambda x: values(x).jacobian}],
+        options={"maxiter": steps, "ftol": _TOLERANCE},
+    )  # fmt: skip
+    return np.asarray(found.x), n, bool(found.success)
+
+
+def _unreachable(problem: Problem, x: Array, share: float) -> list[Fault]:
+    """The thrust nearest to the one asked for, and what stands in the way."""
+    v = problem.values(x)
+    words = [] if v is None else problem.active(v)
+    hint = f"Reached then: {'; '.join(words)}" if words else "A larger disk or more speed reaches more"
+    faults = []
+    for k, p in enumerate(problem.need.points):
+        at = "static" if p.airspeed_m_s == 0.0 else f"at {p.airspeed_m_s:g} m/s"
+        speed = "any speed" if p.rpm is None else f"{p.rpm:g} rev/min"
+        nearest = max(share, 0.0) * p.thrust_N
+        name = "--static-thrust" if p.weight == 0.0 else "--thrust"
+        faults.append(Fault(name, "", f"{p.thrust_N:g} N {at}, {speed}", f"up to {nearest:.3g} N within the limits",
+                            hint if k == 0 else ""))  # fmt: skip
+    return faults
+
+
+def as_built_variants(model: Model, prior: Prior) -> list[tuple[Effect, ...]]:
+    """Effects of rotors as built that count alike: their mean and covariance are those of the population.
+
+    Cubature points of degree three (Arasaratnam and Haykin 2009, IEEE Trans. Automatic Control 54, eq. 16-18), with the
+    variance of the heavy tail.
+    """
+    K = len(NAMES)
+    variance = float(prior.weights @ prior.sizes**2)
+    root = np.linalg.cholesky(prior.cov * variance * K + 1e-12 * np.eye(K))
+    return [(*model.effects, as_built(prior.mean + sign * root[:, k])) for k in range(K) for sign in (1.0, -1.0)]
+
+
+def improve(found: Found, variants: Sequence[Sequence[Effect]], progress: Progress | None = None) -> Found:
+    """The same for the mean of several rotors, from the blade that was found."""
+    problem = replace(found.problem, variants=tuple(tuple(v) for v in variants))
+    return optimise(problem, found.best, progress)

@@ -1,0 +1,192 @@
+"""What a blade is asked to do and within which limits; a request that cannot be is refused with all its faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from bemt.base.errors import Fault, InputError
+from bemt.design.materials import MATERIALS, SAFETY, Material
+
+if TYPE_CHECKING:
+    from bemt.air import Air
+
+STALL_MARGIN = 0.15
+"""Share of the section's largest lift coefficient that is kept in hand: declared [1]."""
+MIN_CHORD_MM = 5.0
+"""Least chord: a printed tip narrower than this has no section left; of small rotors `MIN_CHORD` [mm]."""
+MIN_CHORD = 0.04
+"""Least chord of small rotors over their diameter [1]."""
+FAST = 150.0  # No airspeed of a propeller of section theory [m/s]
+WIDEST = 0.3
+"""Largest chord over the tip radius; that of slow flyers is 0.28 [1]."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One operating point.
+
+    Parameters
+    ----------
+    thrust_N : float
+        Least thrust [N].
+    airspeed_m_s : float
+        Along the shaft [m/s].
+    rpm : float or None
+        Speed; None: whatever gives the thrust with the least power [rev/min].
+    weight : float
+        Share of the time, of which the mean power is taken; 0: a floor only [1].
+    """
+
+    thrust_N: float
+    airspeed_m_s: float = 0.0
+    rpm: float | None = None
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the blade must keep to.
+
+    Parameters
+    ----------
+    min_chord_m, min_thickness_m : float
+        Least chord and least greatest thickness anywhere [m].
+    max_tip_mach : float
+        Helical tip Mach number.
+    stall_margin : float
+        The lift coefficient stays below (1 - margin) times the section's largest at the same Reynolds number.
+    material : Material
+        Gives density and strength.
+    safety : float
+        Strength over stress, at least.
+    """
+
+    min_chord_m: float = MIN_CHORD_MM * 1e-3
+    min_thickness_m: float = 0.0
+    max_tip_mach: float = 0.8
+    stall_margin: float = STALL_MARGIN
+    material: Material = MATERIALS["pla"]
+    safety: float = SAFETY
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """Points, size and limits of a blade, checked.
+
+    Parameters
+    ----------
+    points : tuple of Point
+        The static floor, if any, is the last.
+    R, Rhub : float
+        Tip and hub radius [m].
+    blades : int
+        Number of blades.
+    limits : Limits
+        What it must keep to.
+    air : Air
+        State of the air.
+    """
+
+    points: tuple[Point, ...]
+    R: float
+    Rhub: float
+    blades: int
+    limits: Limits
+    air: Air
+
+    @property
+    def slow(self) -> float:
+        """Speed above which the tip is too fast at the fastest airspeed [rev/min]."""
+        fast = max(abs(p.airspeed_m_s) for p in self.points)
+        tip = math.sqrt(max((self.limits.max_tip_mach * float(self.air.a_sound)) ** 2 - fast**2, 0.0))
+        return 60.0 * tip / (2.0 * math.pi * self.R)
+
+
+def point_of(text: str) -> Point:
+    """Read ``thrust=6,airspeed=15,rpm=7000,weight=1``; rpm and weight may be left out.
+
+    >>> point_of("thrust=6,airspeed=15")
+    Point(thrust_N=6.0, airspeed_m_s=15.0, rpm=None, weight=1.0)
+    """
+    names = {"thrust": "thrust_N", "airspeed": "airspeed_m_s", "rpm": "rpm", "weight": "weight"}
+    found: dict[str, float] = {}
+    faults = []
+    for part in text.split(","):
+        key, _, value = (word.strip() for word in part.partition("="))
+        try:
+            if key not in names or names[key] in found:
+                raise ValueError
+            found[names[key]] = float(value)
+        except ValueError:
+            faults.append(
+                Fault("--point", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
+            )
+    if "thrust_N" not in found and not faults:
+        faults.append(Fault("--point", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
+    if faults:
+        raise InputError(faults)
+    return Point(**found)
+
+
+def required(
+    points: Sequence[Point], diameter_m: float, hub_ratio: float, blades: int, air: Air, *,
+    static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float | None = None,
+    min_thickness_mm: float = 0.0, max_tip_mach: float = 0.8, stall_margin: float = STALL_MARGIN,
+    material: str = "pla", safety: float = SAFETY,
+) -> Requirement:  # fmt: skip
+    """Check a request; all faults at once."""
+    D = 1e3 * diameter_m
+    faults: list[Fault] = []
+    if min_chord_mm is None:
+        min_chord_mm = min(MIN_CHORD_MM, MIN_CHORD * D)
+
+    def check(name: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
+        if not low <= value <= high:  # not a number fails too
+            ends = f"a number from {low:g} to {high:g}"
+            faults.append(Fault(name, "", f"{value:g}", f"{ends} {unit}".rstrip(), hint))
+
+    for p in points:
+        check("--thrust", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
+        check("--airspeed", p.airspeed_m_s, 0.0, FAST, "m/s", "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "")
+        check("--point", p.weight, 0.0, 1e6, "", "weight is a share of time")
+        if p.rpm is not None:
+            check("--rpm", p.rpm, 100.0, 3e5, "rev/min", "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else "")
+    if static_thrust_N is not None:
+        check("--static-thrust", static_thrust_N, 1e-3, 1e4, "N")
+    if static_rpm is not None:
+        check("--static-rpm", static_rpm, 100.0, 3e5, "rev/min")
+        if static_thrust_N is None:
+            faults.append(Fault("--static-rpm", "", f"{static_rpm:g}", "nothing without --static-thrust"))
+    check("--min-chord-mm", min_chord_mm, 0.1, 0.2 * D if D > 0.0 else 1e3, "mm", "At most a fifth of the diameter")
+    check("--min-thickness-mm", min_thickness_mm, 0.0, 0.05 * D if D > 0.0 else 1e3, "mm", "At most D / 20")
+    check("--max-tip-mach", max_tip_mach, 0.05, 0.95, "", "Section theory ends below Mach 1")
+    check("--stall-margin", stall_margin, 0.0, 0.8)
+    check("--safety", safety, 1.0, 50.0)
+    if not points:
+        faults.append(Fault("--thrust, --point", "", "neither", "one of them", "As in --thrust 6 --rpm 7000"))
+    elif sum(p.weight for p in points) == 0.0:
+        faults.append(Fault("--point", "", "weight 0 everywhere", "one weight above 0"))
+    if material not in MATERIALS:
+        faults.append(Fault("--material", "", material, f"one of {', '.join(MATERIALS)}"))
+    if not faults:
+        for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
+            mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
+            if mach > max_tip_mach:
+                top = (
+                    60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
+                )
+                faults.append(Fault("--rpm", "", f"{rpm or 0.0:g} rev/min, tip Mach {mach:.2f}",
+                                    f"a tip Mach up to {max_tip_mach:g}",
+                                    f"That is {top:.0f} rev/min at {V:g} m/s"))  # fmt: skip
+    if faults:
+        raise InputError(list(dict.fromkeys(faults)))
+    every = tuple(points)
+    if static_thrust_N is not None:
+        every = (*every, Point(static_thrust_N, 0.0, static_rpm, 0.0))
+    limits = Limits(
+        min_chord_mm * 1e-3, min_thickness_mm * 1e-3, max_tip_mach, stall_margin, MATERIALS[material], safety
+    )
+    return Requirement(every, 0.5 * diameter_m, 0.5 * hub_ratio * diameter_m, blades, limits, air)
