@@ -72,7 +72,7 @@ MAY: dict[str, set[str]] = {
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
     "bemt.diagnose.interval_scales": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},
-    "bemt.proof.follow|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
+    "bemt.proof.follow|bemt.proof.loop|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},
     "bemt.flight.read|bemt.flight.crazyflie|bemt.flight.px4|bemt.flight.table": {"files"},
     "bemt.cfd.*": {"files", "clock", "environment"},
