@@ -1,0 +1,248 @@
+"""Two rotors on one axis, solved together: each works in what the other induces.  SI, radians.
+
+The annuli of each rotor are balanced by the axial kernel, unchanged; the other rotor enters as an onset velocity of
+every annulus.  ``w = V + (from the other) + v`` is the axial velocity in a disk, v the mean that its own annulus
+induces (Prandtl's factor times that at the blade).  The wake of either rotor is a bundle of vortex cylinders, one per
+edge of its annuli, of strength ``v_j - v_(j+1)``; A(r, z) is what they induce a distance z ahead of their disk
+(:func:`bemt.effects.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
+of vortex cylinders", not checked).
+
+Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
+
+Lower rotor, inside the wake of the upper one: each streamtube arrives with ``v + a (v - A_upper(r, z))`` more than the
+wind, 2 v - A with a = 1 as the cylinders say, and on the radius that continuity gives::
+
+    r_lower dr_lower w_lower = r dr w
+
+Outside it feels their upwash, ``-a A_upper``.  ``a`` is the share of the speed-up that takes place: in hover the wake
+ends at the radius R / sqrt(1 + a), 0.707 R by momentum theory (a = 1); measured wakes end at 0.78 R (Landgrebe 1972, J.
+AHS 17(4), not checked) to 0.82 R (Leishman and Ananthan 2008, J. AHS 53(1), not checked).  The swirl of the upper
+wake, twice that in its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes
+from that of blades that turn with it.  A rotor has no swirl ahead of it.
+
+That momentum balance is the one of Leishman and Ananthan (2008), whose lower rotor sees 2 v on half of its area at any
+distance; equation numbers not checked.  Limits (tested): far apart the upper rotor is alone; at z = 0 both see the
+mean velocity of both, so that equal thrusts cost sqrt(2) of the ideal power of two rotors far apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.bem import kernel as K
+from bemt.bem import residual as res
+from bemt.bem import solver
+from bemt.effects.vortex_cylinder import ahead
+
+if TYPE_CHECKING:
+    from bemt.bem.solver import Prepared, Solution
+
+__all__ = ["WAKE_RADIUS", "Pair", "PairSolution", "solve"]
+
+Array = NDArray[np.float64]
+
+WAKE_RADIUS = 0.78
+"""Radius of the developed wake in hover over that of its rotor (Landgrebe 1972) [1]."""
+_TOL, _MOST = 1e-8, 200  # of the tip speed; steps
+_OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
+_RAD_PER_RPM = math.pi / 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two prepared open rotors on one axis.
+
+    Attributes
+    ----------
+    upper, lower : Prepared
+        The rotor upstream and the one in its wake.
+    spacing_m : float
+        Distance of their disks [m].
+    opposite : bool
+        Whether they turn against each other.
+    wake_radius : float
+        Radius of the upper rotor's developed wake in hover over its own, 0.707 by momentum theory [1].
+    interference : float
+        Factor on all that the rotors induce at each other; 0: two rotors alone [1].
+    """
+
+    upper: Prepared
+    lower: Prepared
+    spacing_m: float
+    opposite: bool = True
+    wake_radius: float = WAKE_RADIUS
+    interference: float = 1.0
+
+    @cached_property
+    def _influence(self) -> tuple[Array, Array, Array]:
+        """A of the upper rotor at its own stations and outside of its wake, that of the lower at the upper's."""
+        upper, lower, z = _edges(self.upper), _edges(self.lower), self.spacing_m
+        stations = self.upper.stations.r[:, None]
+        outside = self.upper.rotor.R * _OUTSIDE[:, None]
+        return ahead(stations, upper[1:], z), ahead(outside, upper[1:], z), ahead(stations, lower[1:], z)
+
+
+@dataclass(frozen=True, eq=False)
+class PairSolution:
+    """Results of both rotors at P points; NaN and flagged where either, or their exchange, did not converge."""
+
+    upper: Solution
+    lower: Solution
+    onset: tuple[Array, Array]  # Mean axial onset of upper and lower, weighted by the area [m/s]
+    converged: NDArray[np.bool_]
+    steps: int
+
+
+def _edges(prep: Prepared) -> Array:
+    """Edges of the annuli, (N + 1,) [m]."""
+    s = prep.stations
+    return np.concatenate([s.r - 0.5 * s.dr, [s.r[-1] + 0.5 * s.dr[-1]]])
+
+
+def _strengths(v: Array) -> Array:
+    """Strengths of the vortex cylinders at the outer edges of annuli, (P, N), of the velocities in them [m/s]."""
+    return v - np.concatenate([v[:, 1:], np.zeros((v.shape[0], 1))], axis=1)
+
+
+class _Rotor:
+    """One rotor at P points, each with an onset of its own."""
+
+    def __init__(self, prep: Prepared, points: Array) -> None:
+        self.prep, self.points = prep, points
+        self.entry, self.st, self.tab, self.par = prep.kernel
+        n, P = self.st.shape[0], points.shape[0]
+        self.out, self.radial = np.empty((P, K.N_OUT)), np.empty((P, n, K.N_RADIAL))
+        self.axial, self.swirl = np.zeros((P, n)), np.zeros((P, n))
+
+    def solve(self, which: NDArray[np.intp]) -> None:
+        """Balance the annuli of some points with the onset that they have now."""
+        st = self.st.copy()
+        for p in which:
+            st[:, K.S_AXIAL] = self.st[:, K.S_AXIAL] + self.axial[p]
+            st[:, K.S_TANG] = self.st[:, K.S_TANG] + self.swirl[p]
+            self.entry(self.points[p : p + 1], st, self.tab, self.par, self.out[p : p + 1], self.radial[p : p + 1])
+
+    @property
+    def onset(self) -> Array:
+        """Axial onset of each annulus, (P, N) [m/s]."""
+        own = self.points[:, K.P_V, None] * self.st[:, K.S_AXIAL_FACTOR] + self.st[:, K.S_AXIAL]
+        return np.asarray(own + self.axial)
+
+    @property
+    def induced(self) -> Array:
+        """Mean axial velocity that each annulus induces in the disk, (P, N) [m/s]."""
+        return np.asarray(self.radial[:, :, 7] * (self.radial[:, :, 5] - self.onset))
+
+    @property
+    def whirl(self) -> Array:
+        """Angular momentum behind the disk per mass, r times twice the swirl in it, (P, N) [m2/s]."""
+        return np.asarray(2.0 * self.radial[:, :, 7] * self.radial[:, :, 6] * self.prep.stations.r)
+
+    def mean(self) -> Array:
+        """Mean of the axial onset over the disk, (P,) [m/s]."""
+        s = self.prep.stations
+        return np.asarray(self.onset @ (s.r * s.dr) / np.sum(s.r * s.dr))
+
+
+def solve(pair: Pair, rpm: Array, lower_rpm: Array | None, V: Array, rho: Array, mu: Array, a_sound: Array
+          ) -> PairSolution:  # fmt: skip
+    """Solve points, (P,) each [rev/min], [m/s], [kg/m3], [Pa s], [m/s].
+
+    ``lower_rpm`` None balances the torques: the speed of the lower rotor at which its torque is that of the upper one.
+
+    Raises ValueError for a rotor in a duct, and for balanced torques of rotors that turn alike.
+    """
+    if pair.upper.duct is not None or pair.lower.duct is not None:
+        raise ValueError("pair: got a ducted rotor; expected two open rotors")
+    if lower_rpm is None and not pair.opposite:
+        raise ValueError("lower_rpm: got balanced torques of rotors that turn alike; expected opposite senses")
+    balanced = lower_rpm is None
+    n = np.array(rpm, dtype=float)
+    m = n.copy() if lower_rpm is None else np.array(lower_rpm, dtype=float)
+    fields = (V, rho, mu, a_sound)
+    upper, lower = (
+        _Rotor(prep, np.stack([_RAD_PER_RPM * speed, *fields], axis=1))
+        for prep, speed in ((pair.upper, n), (pair.lower, m))
+    )
+    tip = upper.points[:, K.P_OMEGA] * pair.upper.rotor.R
+    busy = np.flatnonzero(V >= 0.0)
+    settled = np.zeros(n.size, dtype=bool)
+    relax, before = np.ones(n.size), np.full(n.size, np.inf)
+    upper.solve(np.arange(n.size))
+    lower.solve(np.arange(n.size))
+    steps = 0
+    while busy.size and steps < _MOST:
+        steps += 1
+        change = np.zeros(n.size)
+        exchanged = _exchange(pair, upper, lower)
+        for rotor, name, new in ((lower, "axial", exchanged[1]), (lower, "swirl", exchanged[2]),
+                                 (upper, "axial", exchanged[0])):  # fmt: skip
+            old = getattr(rotor, name)
+            step = new - old
+            change = np.fmax(change, np.max(np.abs(step), axis=1) / tip)
+            step = np.where(np.isfinite(step), step, 0.0)
+            old[busy] += (relax[:, None] * step)[busy]
+        if balanced:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                ratio = np.sqrt(upper.out[:, K.O_Q] / lower.out[:, K.O_Q])
+            ratio = np.where(np.isfinite(ratio), np.clip(ratio, 0.5, 2.0), 1.0)
+            change = np.fmax(change, np.abs(ratio - 1.0))
+            lower.points[busy, K.P_OMEGA] *= ratio[busy] ** relax[busy]
+        upper.solve(busy)
+        lower.solve(busy)
+        relax = np.where(change > 0.9 * before, np.maximum(0.5 * relax, 0.1), relax)
+        before = change
+        settled[busy] = change[busy] < _TOL
+        busy = busy[~settled[busy]]
+    return _collected(pair, upper, lower, settled, steps)
+
+
+def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, Array]:
+    """Axial onset of the upper rotor's annuli, axial and tangential onset of the lower one's, (P, N) [m/s]."""
+    inside, outside, suction = pair._influence
+    gain = 1.0 / pair.wake_radius**2 - 1.0
+    v, V = upper.induced, upper.points[:, K.P_V, None]
+    own = _strengths(v)
+    faster = v - own @ inside.T  # by which a streamtube speeds up
+    add = v + gain * np.where(faster * v > 0.0, faster, 0.0)
+    # radii on which streamtubes arrive: from the axis outwards, the hub with the innermost
+    up, low = _edges(pair.upper), _edges(pair.lower)
+    r = pair.lower.stations.r
+    drawn = np.stack([np.interp(s.r, r, one) for s, one in ((pair.upper.stations, row) for row in lower.induced)])
+    shrink = np.maximum(upper.onset + v, 1e-9) / np.maximum(V + add + drawn, 1e-9)
+    if pair.spacing_m <= 0.0:
+        shrink = np.ones_like(shrink)
+    area = np.diff(up**2) * shrink
+    squares = np.concatenate([up[0] ** 2 * shrink[:, :1], area], axis=1).cumsum(axis=1)
+    flux, spin = (np.concatenate([x[:, :1] * squares[:, :1], x * area], axis=1).cumsum(axis=1)
+                  for x in (add, upper.whirl))  # fmt: skip
+    shares = np.empty((v.shape[0], r.size))
+    axial, whirl = np.empty_like(shares), np.empty_like(shares)
+    upwash = own @ outside.T
+    for p, edge in enumerate(squares):
+        bounds = np.concatenate([[0.0], edge])
+        of = [np.interp(low**2, bounds, np.concatenate([[0.0], total])) for total in (flux[p], spin[p], edge)]
+        axial[p], whirl[p], shares[p] = (np.diff(x) / np.diff(low**2) for x in of)
+        beyond = np.interp(r / math.sqrt(edge[-1]), _OUTSIDE, upwash[p])
+        axial[p] -= (1.0 - shares[p]) * gain * beyond
+    sense = 1.0 if pair.opposite else -1.0
+    f = pair.interference
+    return f * (_strengths(lower.induced) @ suction.T), f * axial, f * sense * whirl / r
+
+
+def _collected(pair: Pair, upper: _Rotor, lower: _Rotor, settled: NDArray[np.bool_], steps: int) -> PairSolution:
+    """Results of both rotors, NaN where the pair did not converge."""
+    parts = []
+    for rotor in (upper, lower):
+        rpm = rotor.points[:, K.P_OMEGA] / _RAD_PER_RPM
+        out = rotor.out.copy()
+        out[~settled, K.O_STATUS] = np.maximum(out[~settled, K.O_STATUS], K.NOT_CONVERGED)
+        parts.append(solver._collect(rotor.prep, rpm, rotor.points, out, np.empty((rpm.size, 0, K.N_RADIAL))))
+    ok = settled & parts[0].converged & parts[1].converged
+    return PairSolution(parts[0], parts[1], (upper.mean(), lower.mean()), ok, steps)
