@@ -50,6 +50,7 @@ Array = NDArray[np.float64]
 WAKE_RADIUS = 0.78
 """Radius of the developed wake in hover over that of its rotor (Landgrebe 1972) [1]."""
 _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
+_MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
 _OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
 _RAD_PER_RPM = math.pi / 30.0
 
@@ -171,57 +172,70 @@ def solve(pair: Pair, rpm: Array, lower_rpm: Array | None, V: Array, rho: Array,
         for prep, speed in ((pair.upper, n), (pair.lower, m))
     )
     tip = upper.points[:, K.P_OMEGA] * pair.upper.rotor.R
-    busy = np.flatnonzero(V >= 0.0)
-    settled = np.zeros(n.size, dtype=bool)
-    relax, before = np.ones(n.size), np.full(n.size, np.inf)
-    upper.solve(np.arange(n.size))
-    lower.solve(np.arange(n.size))
+    along = V >= 0.0  # the wake goes from the upper to the lower rotor
+    settled = ~along
+    mixer = _Anderson()
+    x = np.zeros((n.size, upper.axial.shape[1] + 2 * lower.axial.shape[1] + 1))
+    cut = np.cumsum([upper.axial.shape[1], lower.axial.shape[1], lower.axial.shape[1]])
     steps = 0
-    while busy.size and steps < _MOST:
+    while steps < _MOST:
+        busy = np.flatnonzero(~settled)
+        upper.axial, lower.axial, lower.swirl, turned = np.split(x, cut, axis=1)
+        lower.points[:, K.P_OMEGA] = _RAD_PER_RPM * m * np.exp(turned[:, 0] / tip)
+        upper.solve(busy if steps else np.arange(n.size))
+        lower.solve(busy if steps else np.arange(n.size))
+        if not busy.size:
+            break
         steps += 1
-        change = np.zeros(n.size)
-        exchanged = _exchange(pair, upper, lower)
-        for rotor, name, new in ((lower, "axial", exchanged[1]), (lower, "swirl", exchanged[2]),
-                                 (upper, "axial", exchanged[0])):  # fmt: skip
-            old = getattr(rotor, name)
-            step = new - old
-            change = np.fmax(change, np.max(np.abs(step), axis=1) / tip)
-            step = np.where(np.isfinite(step), step, 0.0)
-            old[busy] += (relax[:, None] * step)[busy]
+        faster = np.zeros((n.size, 1))
         if balanced:
             with np.errstate(invalid="ignore", divide="ignore"):
-                ratio = np.sqrt(upper.out[:, K.O_Q] / lower.out[:, K.O_Q])
-            ratio = np.where(np.isfinite(ratio), np.clip(ratio, 0.5, 2.0), 1.0)
-            change = np.fmax(change, np.abs(ratio - 1.0))
-            lower.points[busy, K.P_OMEGA] *= ratio[busy] ** relax[busy]
-        upper.solve(busy)
-        lower.solve(busy)
-        relax = np.where(change > 0.9 * before, np.maximum(0.5 * relax, 0.1), relax)
-        before = change
-        settled[busy] = change[busy] < _TOL
-        busy = busy[~settled[busy]]
-    return _collected(pair, upper, lower, settled, steps)
+                step = 0.5 * np.log(upper.out[:, K.O_Q] / lower.out[:, K.O_Q])
+            faster[:, 0] = turned[:, 0] + tip * np.clip(np.where(np.isfinite(step), step, 0.0), -0.3, 0.3)
+        new = np.concatenate([*_exchange(pair, upper, lower), faster], axis=1)
+        lost = ~np.isfinite(new).all(axis=1)
+        new[lost] = 0.5 * x[lost]
+        settled = settled | (np.max(np.abs(new - x), axis=1) < _TOL * tip) & ~lost
+        x = np.where(settled[:, None], x, mixer.next(x, new))
+    return _collected(pair, upper, lower, settled & along, steps)
+
+
+class _Anderson:
+    """Fixed-point steps of many points, each sped up by its last ones (Anderson 1965; Walker and Ni 2011, eq. 2.2)."""
+
+    def __init__(self) -> None:
+        self.x: list[Array] = []
+        self.f: list[Array] = []
+
+    def next(self, x: Array, new: Array) -> Array:
+        """Give the next state of each point, (P, S), from this one and what the fixed-point map makes of it."""
+        self.x, self.f = [*self.x, x][-_MEMORY - 1 :], [*self.f, new - x][-_MEMORY - 1 :]
+        if len(self.x) < 2:
+            return new
+        dx, df = (np.diff(np.stack(v, axis=2), axis=2) for v in (self.x, self.f))
+        f = self.f[-1]
+        normal = np.einsum("psi,psj->pij", df, df)
+        size = np.trace(normal, axis1=1, axis2=2)[:, None, None] + 1e-300
+        normal = normal + 1e-10 * size * np.eye(normal.shape[1])
+        weights = np.linalg.solve(normal, np.einsum("psi,ps->pi", df, f)[..., None])[..., 0]
+        # far from linear: the plain step
+        weights[np.max(np.abs(weights), axis=1, initial=0.0) > _WILD] = 0.0
+        return np.asarray(x + f - np.einsum("psi,pi->ps", dx + df, weights))
 
 
 def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, Array]:
     """Axial onset of the upper rotor's annuli, axial and tangential onset of the lower one's, (P, N) [m/s]."""
     inside, outside, suction = pair._influence
-    gain = 1.0 / pair.wake_radius**2 - 1.0
-    v, V = upper.induced, upper.points[:, K.P_V, None]
+    v, V, w = upper.induced, upper.points[:, K.P_V, None], upper.onset + upper.induced
     own = _strengths(v)
-    faster = v - own @ inside.T  # by which a streamtube speeds up
-    add = v + gain * np.where(faster * v > 0.0, faster, 0.0)
+    drawn = np.stack([np.interp(pair.upper.stations.r, pair.lower.stations.r, one) for one in lower.induced])
+    add, area, kept = _streamtubes(pair, v, V, w, v - own @ inside.T, drawn)
+    up, low, r = _edges(pair.upper), _edges(pair.lower), pair.lower.stations.r
+    area = np.diff(up**2) * area
     # radii on which streamtubes arrive: from the axis outwards, the hub with the innermost
-    up, low = _edges(pair.upper), _edges(pair.lower)
-    r = pair.lower.stations.r
-    drawn = np.stack([np.interp(s.r, r, one) for s, one in ((pair.upper.stations, row) for row in lower.induced)])
-    shrink = np.maximum(upper.onset + v, 1e-9) / np.maximum(V + add + drawn, 1e-9)
-    if pair.spacing_m <= 0.0:
-        shrink = np.ones_like(shrink)
-    area = np.diff(up**2) * shrink
-    squares = np.concatenate([up[0] ** 2 * shrink[:, :1], area], axis=1).cumsum(axis=1)
+    squares = np.concatenate([up[0] ** 2 / np.diff(up**2)[0] * area[:, :1], area], axis=1).cumsum(axis=1)
     flux, spin = (np.concatenate([x[:, :1] * squares[:, :1], x * area], axis=1).cumsum(axis=1)
-                  for x in (add, upper.whirl))  # fmt: skip
+                  for x in (add, kept * upper.whirl))  # fmt: skip
     shares = np.empty((v.shape[0], r.size))
     axial, whirl = np.empty_like(shares), np.empty_like(shares)
     upwash = own @ outside.T
@@ -229,11 +243,29 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
         bounds = np.concatenate([[0.0], edge])
         of = [np.interp(low**2, bounds, np.concatenate([[0.0], total])) for total in (flux[p], spin[p], edge)]
         axial[p], whirl[p], shares[p] = (np.diff(x) / np.diff(low**2) for x in of)
-        beyond = np.interp(r / math.sqrt(edge[-1]), _OUTSIDE, upwash[p])
-        axial[p] -= (1.0 - shares[p]) * gain * beyond
+        axial[p] -= (1.0 - shares[p]) * np.interp(r / math.sqrt(edge[-1]), _OUTSIDE, upwash[p])
     sense = 1.0 if pair.opposite else -1.0
     f = pair.interference
     return f * (_strengths(lower.induced) @ suction.T), f * axial, f * sense * whirl / r
+
+
+def _streamtubes(pair: Pair, v: Array, V: Array, w: Array, faster: Array, drawn: Array) -> tuple[Array, Array, Array]:
+    """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area and mass over the disk's [1].
+
+    The last is what is left of a property that the wake shares with the air that it takes along.
+    """
+    if pair.spacing_m <= 0.0:
+        return v, np.ones_like(v), np.ones_like(v)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = np.clip(np.where(v != 0.0, faster / v, 0.0), 0.0, 1.0)
+        slip = np.clip(np.where(w > 0.0, v / w, 0.0), 0.0, 1.0)
+    ideal = v * (1.0 + grown)
+    more = 1.0 + (2.0 * pair.wake_radius**2 - 1.0) * grown * slip  # area over that without air taken along
+    momentum = (V + ideal) * ideal / more
+    add = np.where(ideal > 0.0, np.sqrt(np.maximum(0.25 * V * V + momentum, 0.0)) - 0.5 * V, ideal)
+    area = np.maximum(w, 1e-9) / np.maximum(V + ideal + drawn, 1e-9) * more
+    kept = (V + ideal) / np.maximum((V + add) * more, 1e-9)
+    return add, area, kept
 
 
 def _collected(pair: Pair, upper: _Rotor, lower: _Rotor, settled: NDArray[np.bool_], steps: int) -> PairSolution:
