@@ -28,31 +28,36 @@ mean velocity of both, so that equal thrusts cost sqrt(2) of the ideal power of 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from bemt import coefficients as co
+from bemt.air import Air
 from bemt.bem import kernel as K
-from bemt.bem import residual as res
 from bemt.bem import solver
-from bemt.effects.vortex_cylinder import ahead
+from bemt.bem.model import Model
+from bemt.dataset import Dataset
+from bemt.effects import to_text
+from bemt.effects.vortex_cylinder import WAKE_RADIUS, ahead
 
 if TYPE_CHECKING:
     from bemt.bem.solver import Prepared, Solution
+    from bemt.effects import Effect
 
-__all__ = ["WAKE_RADIUS", "Pair", "PairSolution", "solve"]
+__all__ = ["LOADS", "RATIOS", "Pair", "PairModel", "PairSolution", "solve"]
 
 Array = NDArray[np.float64]
 
-WAKE_RADIUS = 0.78
-"""Radius of the developed wake in hover over that of its rotor (Landgrebe 1972) [1]."""
 _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
 _MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
 _OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
 _RAD_PER_RPM = math.pi / 30.0
+_REACH = np.array([0.6, 1.0, 1.7])  # speeds of the lower rotor with balanced torques, over that of the upper one
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,3 +283,142 @@ def _collected(pair: Pair, upper: _Rotor, lower: _Rotor, settled: NDArray[np.boo
         parts.append(solver._collect(rotor.prep, rpm, rotor.points, out, np.empty((rpm.size, 0, K.N_RADIAL))))
     ok = settled & parts[0].converged & parts[1].converged
     return PairSolution(parts[0], parts[1], (upper.mean(), lower.mean()), ok, steps)
+
+
+LOADS = ("upper_thrust_N", "upper_torque_Nm", "lower_thrust_N", "lower_torque_Nm", "reaction_torque_Nm")
+"""Channels of a pair beside the usual ones, which are totals."""
+RATIOS = ("upper_thrust_ratio", "lower_thrust_ratio", "thrust_ratio")
+"""Thrust over that of the same rotor alone at the same speeds; of both rotors together."""
+
+
+@dataclass(frozen=True, eq=False)
+class PairModel:
+    """Two models on one axis, solved together as one of them is.
+
+    Attributes
+    ----------
+    upper, lower : Model
+        The rotor upstream and the one in its wake.
+    spacing_m, opposite, wake_radius, interference
+        As in :class:`Pair`.
+    rpm_ratio : float
+        Speed of the lower rotor over that of the upper one [1].
+    lower_rpm : float or None
+        Its speed, if it does not follow that of the upper one [rev/min].
+    torque_balance : bool
+        Whether the lower rotor turns at the speed of equal torques instead.
+    """
+
+    upper: Model
+    lower: Model
+    spacing_m: float
+    opposite: bool = True
+    wake_radius: float = WAKE_RADIUS
+    interference: float = 1.0
+    rpm_ratio: float = 1.0
+    lower_rpm: float | None = None
+    torque_balance: bool = False
+
+    @property
+    def rotors(self) -> tuple[Model, Model]:
+        """Upper and lower model."""
+        return self.upper, self.lower
+
+    @property
+    def diameter_m(self) -> float:
+        """Diameter of the upper rotor, to which coefficients refer [m]."""
+        return self.upper.diameter_m
+
+    @property
+    def hub_diameter_m(self) -> float:
+        """Hub diameter of the upper rotor [m]."""
+        return self.upper.hub_diameter_m
+
+    @property
+    def pitch_m(self) -> float:
+        """Geometric pitch of the upper rotor at 0.75 R [m]."""
+        return self.upper.pitch_m
+
+    @property
+    def solidity(self) -> float:
+        """Blade area of the upper rotor over its disk area [1]."""
+        return self.upper.solidity
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Physics of the upper rotor."""
+        return self.upper.effects
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks of the section tables."""
+        return tuple(dict.fromkeys((*self.upper.notes, *self.lower.notes)))
+
+    def at_speeds(self, rpm: ArrayLike, V: ArrayLike, air: Air) -> PairModel:
+        """Model with the tables of the Reynolds and Mach numbers that these points reach."""
+        if self.torque_balance:
+            reach = np.multiply.outer(_REACH, rpm)
+        else:
+            reach = np.asarray(np.multiply(rpm, self.rpm_ratio) if self.lower_rpm is None else self.lower_rpm)
+        return replace(self, upper=self.upper.at_speeds(rpm, V, air), lower=self.lower.at_speeds(reach, V, air))
+
+    def solve(
+        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0
+    ) -> Dataset:
+        """Solve operating points; ``rpm`` is that of the upper rotor, thrust, torque and power are totals.
+
+        Coefficients refer to diameter and speed of the upper rotor. ``reaction_torque_Nm`` is what the vehicle gets
+        about the axis, the upper rotor's counted positive. Raises ValueError for a wind that is not along the shaft.
+        """
+        if np.any(np.asarray(side) != 0.0):
+            raise ValueError("side: got in-plane wind on a coaxial pair; expected axial flow")
+        air = Air.from_density() if air is None else air
+        fields = np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
+        n, speed, rho, mu, a = (np.atleast_1d(v).ravel().astype(float) for v in fields)
+        lower = None if self.torque_balance else n * self.rpm_ratio
+        if self.lower_rpm is not None:
+            lower = np.full(n.shape, self.lower_rpm)
+        pair = Pair(
+            self.upper.prep, self.lower.prep, self.spacing_m, self.opposite, self.wake_radius, self.interference
+        )
+        found = solve(pair, n, lower, speed, rho, mu, a)
+        return self._dataset(found, n, speed, rho, a, mu)
+
+    def _dataset(self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array) -> Dataset:
+        nan = np.where(found.converged, 1.0, np.nan)
+        parts, m = (found.upper, found.lower), found.lower.rpm * nan
+        T, Q = (np.array([getattr(one, key) * nan for one in parts]) for key in ("T", "Q"))
+        power = Q * np.array([n, m]) * _RAD_PER_RPM
+        air = cast("Air", SimpleNamespace(rho=rho, mu=mu, a_sound=a))
+        turning = np.where(found.converged, found.lower.rpm, n)
+        alone = np.array([
+            solver.solve(model.prep, speed, V, air).T for model, speed in zip(self.rotors, (n, turning), strict=True)
+        ])  # fmt: skip
+        D, rev = self.diameter_m, n / 60.0
+        total, mass = T.sum(axis=0), found.lower.mass_flow * nan
+        CT, CP, J = co.CT(total, rho, rev, D), co.CP(power.sum(axis=0), rho, rev, D), V / (rev * D)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio, whole = T / alone, total / alone.sum(axis=0)
+            exhaust = np.where(mass > 0.0, V + total / mass, np.nan)
+        sign = -1.0 if self.opposite else 1.0
+        values = {
+            "rpm": n, "airspeed_m_s": V, "density_kg_m3": rho, "thrust_N": total,
+            "torque_Nm": power.sum(axis=0) / (n * _RAD_PER_RPM), "power_W": power.sum(axis=0), "CT": CT, "CP": CP,
+            "J": J, "eta": co.eta(J, CT, CP), "M_tip": co.M_tip(rev, D, a),
+            "Re75": co.Re75(self.upper.chord75_m, rev, D, V, rho, mu), "exhaust_speed_m_s": exhaust,
+            "duct_share": 0.0 * total, "mass_flow_kg_s": mass, "lower_rpm": m,
+            "upper_thrust_N": T[0], "upper_torque_Nm": Q[0], "lower_thrust_N": T[1], "lower_torque_Nm": Q[1],
+            "reaction_torque_Nm": Q[0] + sign * Q[1], "upper_thrust_ratio": ratio[0], "lower_thrust_ratio": ratio[1],
+            "thrust_ratio": whole, "upper_onset_m_s": found.onset[0] * nan, "lower_onset_m_s": found.onset[1] * nan,
+        }  # fmt: skip
+        words = tuple(
+            (
+                *(f"first rotor: {word}" for word in one), *(f"second rotor: {word}" for word in two),
+                *(() if ok else ("the exchange between the two rotors did not settle",)),
+            )
+            for one, two, ok in zip(found.upper.flags, found.lower.flags, found.converged, strict=True)
+        )  # fmt: skip
+        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
+                      "stations": self.upper.n_stations}  # fmt: skip
+        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=words, provenance=provenance,
+                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip

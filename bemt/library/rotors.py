@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
+from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.dataset import Dataset
 from bemt.library.given import numbers, path_text
@@ -31,6 +32,7 @@ CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
+PAIRED = ("lower_rpm", *LOADS, *RATIOS)
 OBLIQUE = ("sideslip_rad", "H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
@@ -165,13 +167,14 @@ class Propeller:
         n, V, angle = self._turned(n, V, angle_deg)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
         found = lattice.solve(self.case, n, V, density, bands, angle)
-        names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else OBLIQUE)) if key in found]
+        more = DUCTED if self.case.ducted else (*OBLIQUE, *PAIRED)
+        names = [key for key in (*CHANNELS, *more) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
         notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "
                  "blade elements (numerics)",)  # fmt: skip
         about = {"source": "bemt", "file": self.case.path.as_posix()}
         return Dataset("bemt", self.name, {key: found[key] for key in names}, flags=found.flags, provenance=about,
-                       u_by=by, notes=notes if bands else ())  # fmt: skip
+                       u_by=by, notes=notes if bands else (), units=found.units)  # fmt: skip
 
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
