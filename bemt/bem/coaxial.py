@@ -76,6 +76,8 @@ class Pair:
         Radius of the upper rotor's developed wake in hover over its own, 0.707 by momentum theory [1].
     interference : float
         Factor on all that the rotors induce at each other; 0: two rotors alone [1].
+    swirl : float
+        Share of the upper rotor's swirl that reaches the lower one [1].
     """
 
     upper: Prepared
@@ -84,6 +86,7 @@ class Pair:
     opposite: bool = True
     wake_radius: float = WAKE_RADIUS
     interference: float = 1.0
+    swirl: float = 1.0
 
     @cached_property
     def _influence(self) -> tuple[Array, Array, Array]:
@@ -251,7 +254,7 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
         axial[p] -= (1.0 - shares[p]) * np.interp(r / math.sqrt(edge[-1]), _OUTSIDE, upwash[p])
     sense = 1.0 if pair.opposite else -1.0
     f = pair.interference
-    return f * (_strengths(lower.induced) @ suction.T), f * axial, f * sense * whirl / r
+    return f * (_strengths(lower.induced) @ suction.T), f * axial, f * pair.swirl * sense * whirl / r
 
 
 def _streamtubes(pair: Pair, v: Array, V: Array, w: Array, faster: Array, drawn: Array) -> tuple[Array, Array, Array]:
@@ -299,7 +302,7 @@ class PairModel:
     ----------
     upper, lower : Model
         The rotor upstream and the one in its wake.
-    spacing_m, opposite, wake_radius, interference
+    spacing_m, opposite, wake_radius, interference, swirl
         As in :class:`Pair`.
     rpm_ratio : float
         Speed of the lower rotor over that of the upper one [1].
@@ -318,6 +321,7 @@ class PairModel:
     rpm_ratio: float = 1.0
     lower_rpm: float | None = None
     torque_balance: bool = False
+    swirl: float = 1.0
 
     @property
     def rotors(self) -> tuple[Model, Model]:
@@ -379,8 +383,9 @@ class PairModel:
         if self.lower_rpm is not None:
             lower = np.full(n.shape, self.lower_rpm)
         pair = Pair(
-            self.upper.prep, self.lower.prep, self.spacing_m, self.opposite, self.wake_radius, self.interference
-        )
+            self.upper.prep, self.lower.prep, self.spacing_m, self.opposite, self.wake_radius, self.interference,
+            self.swirl,
+        )  # fmt: skip
         found = solve(pair, n, lower, speed, rho, mu, a)
         return self._dataset(found, n, speed, rho, a, mu)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bemt.base.units import INCH
-from bemt.effects.vortex_cylinder import WAKE_RADIUS
+from bemt.effects.vortex_cylinder import SWIRL, WAKE_RADIUS
 from bemt.rotors.population import chord_sd, population
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 
@@ -110,7 +110,14 @@ PAIR = (
         1.0,
         0.8,
         1.2,
-        "declared; blades that pass each other, mixing and the parts between the rotors are not modelled",
+        "declared; blades that pass each other and mixing with the air outside are not modelled",
+    ),
+    Unknown(
+        "second_rotor.swirl",
+        SWIRL,
+        0.0,
+        1.0,
+        "not known; 1 without anything between the rotors, less behind motors and arms, which straighten the flow",
     ),
 )
 _STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",

@@ -19,13 +19,16 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["WAKE_RADIUS", "ahead", "on_axis"]
+__all__ = ["SWIRL", "WAKE_RADIUS", "ahead", "on_axis"]
 
 Array = NDArray[np.float64]
 
 WAKE_RADIUS = 0.78
 """Radius of the developed wake in hover over that of its rotor: Landgrebe 1972, J. American Helicopter Society 17(4),
 not checked; Leishman and Ananthan 2008, J. AHS 53(1), give 0.82 (not checked); momentum theory 0.707 [1]."""
+SWIRL = 0.5
+"""Share of the swirl behind a rotor that reaches one in its wake: all of it by the balance of angular momentum, none
+where motors and arms between the rotors straighten the flow; the middle, declared [1]."""
 
 
 def on_axis(z_over_R: float) -> float:
