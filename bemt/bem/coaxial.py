@@ -9,20 +9,21 @@ of vortex cylinders", not checked).
 
 Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
 
-Lower rotor, inside the wake of the upper one: each streamtube arrives with ``v + a (v - A_upper(r, z))`` more than the
-wind, 2 v - A with a = 1 as the cylinders say, and on the radius that continuity gives::
+Lower rotor, inside the wake of the upper one: without air from outside each streamtube would arrive with ``2 v - A`` more
+than the wind and with the area that continuity gives, w / (V + 2 v - A + v_lower).  Measured wakes are wider: in hover
+they end at k R, k = 0.78 (Landgrebe 1972, J. AHS 17(4), not checked) to 0.82 (Leishman and Ananthan 2008, J. AHS 53(1),
+not checked), 0.707 by momentum theory.  Such a wake has taken air along: its area is larger by ``1 + (2 k^2 - 1) s``, s
+from 0 at the disk to 1 far behind, and its velocity u so much smaller that its momentum, (V + u) u times area, stays.
+In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its diameters the wake is a turbulent jet whose speed
+falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115, eq. 22 of a free jet, not checked).
 
-    r_lower dr_lower w_lower = r dr w
+Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The swirl of the upper wake, twice that in
+its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
+that turn with it.  A rotor has no swirl ahead of it.
 
-Outside it feels their upwash, ``-a A_upper``.  ``a`` is the share of the speed-up that takes place: in hover the wake
-ends at the radius R / sqrt(1 + a), 0.707 R by momentum theory (a = 1); measured wakes end at 0.78 R (Landgrebe 1972, J.
-AHS 17(4), not checked) to 0.82 R (Leishman and Ananthan 2008, J. AHS 53(1), not checked).  The swirl of the upper
-wake, twice that in its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes
-from that of blades that turn with it.  A rotor has no swirl ahead of it.
-
-That momentum balance is the one of Leishman and Ananthan (2008), whose lower rotor sees 2 v on half of its area at any
-distance; equation numbers not checked.  Limits (tested): far apart the upper rotor is alone; at z = 0 both see the
-mean velocity of both, so that equal thrusts cost sqrt(2) of the ideal power of two rotors far apart.
+With k = 0.707 and far apart that is the balance of Leishman and Ananthan (2008; equation numbers not checked), whose
+lower rotor sees 2 v on half of its area.  Limits (tested): both rotors are alone at a great distance; at z = 0 both see
+the velocity that both induce, so that equal thrusts cost sqrt(2) times the ideal power of two rotors alone.
 """
 
 from __future__ import annotations
@@ -53,9 +54,14 @@ __all__ = ["LOADS", "RATIOS", "Pair", "PairModel", "PairSolution", "solve"]
 
 Array = NDArray[np.float64]
 
+JET = 6.2
+"""Length of a jet over its diameter from which its speed falls as 1/z (Albertson et al. 1950, Trans. ASCE 115) [1]."""
 _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
 _MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
+_PASSES = 3  # through the radii of the streamtubes and what the lower rotor adds to their speed there
 _OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
+_UNSETTLED = "not converged: the exchange between the two rotors did not settle"
+_BACKWARDS = "not solved: in descent the wake of the first rotor does not reach the second"
 _RAD_PER_RPM = math.pi / 30.0
 _REACH = np.array([0.6, 1.0, 1.7])  # speeds of the lower rotor with balanced torques, over that of the upper one
 
@@ -236,12 +242,16 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
     inside, outside, suction = pair._influence
     v, V, w = upper.induced, upper.points[:, K.P_V, None], upper.onset + upper.induced
     own = _strengths(v)
-    drawn = np.stack([np.interp(pair.upper.stations.r, pair.lower.stations.r, one) for one in lower.induced])
-    add, area, kept = _streamtubes(pair, v, V, w, v - own @ inside.T, drawn)
     up, low, r = _edges(pair.upper), _edges(pair.lower), pair.lower.stations.r
-    area = np.diff(up**2) * area
-    # radii on which streamtubes arrive: from the axis outwards, the hub with the innermost
-    squares = np.concatenate([up[0] ** 2 / np.diff(up**2)[0] * area[:, :1], area], axis=1).cumsum(axis=1)
+    drawn = np.zeros_like(v)
+    for _ in range(_PASSES):
+        add, area, kept = _streamtubes(pair, v, V, w, v - own @ inside.T, drawn)
+        area = np.diff(up**2) * area
+        # radii on which streamtubes arrive, from the axis outwards; the hub's area shrinks as that of all
+        hub = up[0] ** 2 * area.sum(axis=1, keepdims=True) / np.sum(np.diff(up**2))
+        squares = np.concatenate([hub, area], axis=1).cumsum(axis=1)
+        arrive = np.sqrt(0.5 * (squares[:, 1:] + squares[:, :-1]))
+        drawn = np.stack([np.interp(at, r, one) for at, one in zip(arrive, lower.induced, strict=True)])
     flux, spin = (np.concatenate([x[:, :1] * squares[:, :1], x * area], axis=1).cumsum(axis=1)
                   for x in (add, kept * upper.whirl))  # fmt: skip
     shares = np.empty((v.shape[0], r.size))
@@ -268,10 +278,14 @@ def _streamtubes(pair: Pair, v: Array, V: Array, w: Array, faster: Array, drawn:
         grown = np.clip(np.where(v != 0.0, faster / v, 0.0), 0.0, 1.0)
         slip = np.clip(np.where(w > 0.0, v / w, 0.0), 0.0, 1.0)
     ideal = v * (1.0 + grown)
-    more = 1.0 + (2.0 * pair.wake_radius**2 - 1.0) * grown * slip  # area over that without air taken along
+    # area over that without air taken along: of the developed wake, then of a jet
+    jet = max(pair.spacing_m / (JET * 2.0 * pair.wake_radius * pair.upper.rotor.R), 1.0) ** 2
+    more = (1.0 + (2.0 * pair.wake_radius**2 - 1.0) * grown * slip) * (1.0 + (jet - 1.0) * slip)
     momentum = (V + ideal) * ideal / more
     add = np.where(ideal > 0.0, np.sqrt(np.maximum(0.25 * V * V + momentum, 0.0)) - 0.5 * V, ideal)
-    area = np.maximum(w, 1e-9) / np.maximum(V + ideal + drawn, 1e-9) * more
+    area = np.maximum(w, 1e-9) / np.maximum(V + ideal + drawn, 1e-9)
+    # at the ends of the blades, where nothing is induced, the flow of the neighbours would seem to spread it
+    area = np.where(v >= 0.0, np.minimum(area, 1.0), np.minimum(area, 4.0)) * more
     kept = (V + ideal) / np.maximum((V + add) * more, 1e-9)
     return add, area, kept
 
@@ -419,9 +433,9 @@ class PairModel:
         words = tuple(
             (
                 *(f"first rotor: {word}" for word in one), *(f"second rotor: {word}" for word in two),
-                *(() if ok else ("the exchange between the two rotors did not settle",)),
+                *(() if ok else (_BACKWARDS if behind else _UNSETTLED,)),
             )
-            for one, two, ok in zip(found.upper.flags, found.lower.flags, found.converged, strict=True)
+            for one, two, ok, behind in zip(found.upper.flags, found.lower.flags, found.converged, V < 0.0, strict=True)
         )  # fmt: skip
         provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
                       "stations": self.upper.n_stations}  # fmt: skip
