@@ -18,8 +18,8 @@ from bemt.bem.coaxial import Pair
 from bemt.case.load import with_changes
 from bemt.case.propagate import prepared
 from bemt.effects import standard, without
-from bemt.effects.vortex_cylinder import ahead, on_axis
 from bemt.sections.polars import linear_polar
+from bemt.vortex_cylinder import ahead, on_axis
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -169,7 +169,9 @@ def test_any_pair_is_solved_or_flagged() -> None:
             )
             for D in 0.25 * rng.uniform(0.7, 1.4, 2)
         )  # fmt: skip
-        pair = Pair(one, two, rng.uniform(0.0, 0.3), bool(rng.integers(2)), rng.uniform(0.71, 0.9), rng.uniform(0.7, 1.3))
+        pair = Pair(
+            one, two, rng.uniform(0.0, 0.3), bool(rng.integers(2)), rng.uniform(0.71, 0.9), rng.uniform(0.7, 1.3)
+        )
         found = solved(pair, rng.uniform(2000, 9000), rng.uniform(0.0, 25.0, 4), rng.uniform(0.5, 1.6))
         loads = np.array([found.upper.T, found.lower.T, found.upper.Q, found.lower.Q])
         assert np.array_equal(np.isfinite(loads).all(axis=0), found.converged)
@@ -194,7 +196,9 @@ def test_a_pair_has_bands_by_origin_and_its_own_unknowns() -> None:
     # most of what is not known of the blades cancels in the ratio
     relative = found.u["lower_thrust_N"][0] / found["lower_thrust_N"][0]
     assert found.u["lower_thrust_ratio"][0] / found["lower_thrust_ratio"][0] < 0.6 * relative
-    known = pair.replaced({f"second_rotor.{k}": v for k, v in (("wake_radius", 0.78), ("interference", 1.0), ("swirl", 1.0))})
+    known = pair.replaced(
+        {f"second_rotor.{k}": v for k, v in (("wake_radius", 0.78), ("interference", 1.0), ("swirl", 1.0))}
+    )
     assert known.solve(rpm=6000.0).u["lower_thrust_ratio"][0] < 0.6 * found.u["lower_thrust_ratio"][0]
 
 
@@ -232,7 +236,11 @@ def test_a_faulty_second_rotor_is_refused_with_its_key(table: dict[str, object],
 
 def test_what_knows_one_rotor_only_refuses_a_pair() -> None:
     pair = bemt.propeller("10x5").coaxial(0.2)
-    for ask in (lambda: pair.along_blade(5000.0), lambda: pair.gradient(5000.0), lambda: pair.solve(5000.0, 3.0, angle_deg=30.0)):
+    for ask in (
+        lambda: pair.along_blade(5000.0),
+        lambda: pair.gradient(5000.0),
+        lambda: pair.solve(5000.0, 3.0, angle_deg=30.0),
+    ):
         with pytest.raises(InputError):
             ask()
     around = pair.replaced({"model.effects_on": ["coaxial_neighbour"]})

@@ -4,18 +4,18 @@ The annuli of each rotor are balanced by the axial kernel, unchanged; the other 
 every annulus.  ``w = V + (from the other) + v`` is the axial velocity in a disk, v the mean that its own annulus
 induces (Prandtl's factor times that at the blade).  The wake of either rotor is a bundle of vortex cylinders, one per
 edge of its annuli, of strength ``v_j - v_(j+1)``; A(r, z) is what they induce a distance z ahead of their disk
-(:func:`bemt.effects.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
+(:func:`bemt.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
 of vortex cylinders", not checked).
 
 Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
 
-Lower rotor, inside the wake of the upper one: without air from outside each streamtube would arrive with ``2 v - A`` more
-than the wind and with the area that continuity gives, w / (V + 2 v - A + v_lower).  Measured wakes are wider: in hover
-they end at k R, k = 0.78 (Landgrebe 1972, J. AHS 17(4), not checked) to 0.82 (Leishman and Ananthan 2008, J. AHS 53(1),
-not checked), 0.707 by momentum theory.  Such a wake has taken air along: its area is larger by ``1 + (2 k^2 - 1) s``, s
-from 0 at the disk to 1 far behind, and its velocity u so much smaller that its momentum, (V + u) u times area, stays.
-In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its diameters the wake is a turbulent jet whose speed
-falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115, eq. 22 of a free jet, not checked).
+Lower rotor, inside the wake of the upper one: without air from outside each streamtube would arrive with ``2 v - A``
+more than the wind, and with the area that continuity gives, w / (V + 2 v - A + v_lower).  Measured wakes are wider: in
+hover they end at k R, k = 0.78 (Landgrebe 1972, J. AHS 17(4), not checked) to 0.82 (Leishman and Ananthan 2008, J. AHS
+53(1), not checked), 0.707 by momentum theory.  Such a wake has taken air along: its area is larger by
+``1 + (2 k^2 - 1) s``, s from 0 at the disk to 1 far behind, and its velocity u so much smaller that its momentum,
+(V + u) u times area, stays.  In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its diameters the wake
+is a turbulent jet whose speed falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115, not checked).
 
 Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The swirl of the upper wake, twice that in
 its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
@@ -44,7 +44,7 @@ from bemt.bem import solver
 from bemt.bem.model import Model
 from bemt.dataset import Dataset
 from bemt.effects import to_text
-from bemt.effects.vortex_cylinder import WAKE_RADIUS, ahead
+from bemt.vortex_cylinder import WAKE_RADIUS, ahead
 
 if TYPE_CHECKING:
     from bemt.bem.solver import Prepared, Solution
@@ -122,7 +122,7 @@ def _edges(prep: Prepared) -> Array:
 
 def _strengths(v: Array) -> Array:
     """Strengths of the vortex cylinders at the outer edges of annuli, (P, N), of the velocities in them [m/s]."""
-    return v - np.concatenate([v[:, 1:], np.zeros((v.shape[0], 1))], axis=1)
+    return np.asarray(v - np.concatenate([v[:, 1:], np.zeros((v.shape[0], 1))], axis=1))
 
 
 class _Rotor:
@@ -157,7 +157,7 @@ class _Rotor:
     @property
     def whirl(self) -> Array:
         """Angular momentum behind the disk per mass, r times twice the swirl in it, (P, N) [m2/s]."""
-        return np.asarray(2.0 * self.radial[:, :, 7] * self.radial[:, :, 6] * self.prep.stations.r)
+        return np.asarray(2.0 * self.radial[:, :, 7] * self.radial[:, :, 6] * self.prep.stations.r, dtype=float)
 
     def mean(self) -> Array:
         """Mean of the axial onset over the disk, (P,) [m/s]."""
@@ -268,9 +268,9 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
 
 
 def _streamtubes(pair: Pair, v: Array, V: Array, w: Array, faster: Array, drawn: Array) -> tuple[Array, Array, Array]:
-    """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area and mass over the disk's [1].
+    """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area over that in the disk [1].
 
-    The last is what is left of a property that the wake shares with the air that it takes along.
+    The third is what is left of a property per mass that the wake shares with the air that it takes along [1].
     """
     if pair.spacing_m <= 0.0:
         return v, np.ones_like(v), np.ones_like(v)

@@ -68,7 +68,8 @@ class PairError:
         """Half widths of the 68 and 95 % intervals of all channels."""
         from bemt.case.propagate import loads_of, model_error
 
-        narrow, wide = [], []
+        narrow: list[Loads] = []
+        wide: list[Loads] = []
         for case, model, met, factor in zip(self.cases, self.model.rotors, self.alone, self.factors, strict=True):
             for out, u in zip((narrow, wide), model_error(case, model, met, self.air), strict=True):
                 out.append(loads_of(met, model.diameter_m, factor * u))
@@ -84,7 +85,10 @@ class PairError:
             share = 0.5 * np.abs(upper["thrust_N"] / found["upper_thrust_N"])
         gust = np.where(np.isfinite(share), share, 0.0) * np.abs(met.airspeed_m_s - found.airspeed_m_s)
         T = [upper["thrust_N"], np.hypot(lower["thrust_N"], gust * np.abs(up.thrust_N - down.thrust_N) / (2.0 * step))]
-        Q = [upper["torque_Nm"], np.hypot(lower["torque_Nm"], gust * np.abs(up.torque_Nm - down.torque_Nm) / (2 * step))]
+        Q = [
+            upper["torque_Nm"],
+            np.hypot(lower["torque_Nm"], gust * np.abs(up.torque_Nm - down.torque_Nm) / (2 * step)),
+        ]
         add = (lambda a, b: a + b) if self.alike else np.hypot
         thrust = add(*T)
         power = add(*(q * rpm for q, rpm in zip(Q, (found.rpm, met.rpm), strict=True))) * np.pi / 30.0

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import effects
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
-from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.bem.coaxial import PairModel
+from bemt.bem.duct import DuctFlow, duct_flow
 from bemt.bem.model import Model, acts_on_points
 from bemt.rotors import k1k2
 from bemt.sections import polars
@@ -128,15 +128,15 @@ def prepare_pair(case: Case, n_stations: int | None = None, second: Case | None 
     told = case.file.second_rotor
     assert told is not None  # the caller asks for a pair
     lower = case.second() if second is None else second
-    models = tuple(prepare_case(one, None, n_stations, oblique=True, alone=True) for one in (case, lower))
-    for one, model in zip((case, lower), models, strict=True):
+    first, other = (prepare_case(one, None, n_stations, oblique=True, alone=True) for one in (case, lower))
+    for one, model in ((case, first), (lower, other)):
         around = [effect.id for effect in model.effects if acts_on_points(effect)]
         if around:
             got, hint = ", ".join(around), "Their law is that of one rotor"
             raise InputError(Fault(one.path.as_posix(), "model.effects_on", got, "none of them with a pair", hint))
     ratio = 1.0 if told.rpm_ratio is None else told.rpm_ratio
     return PairModel(
-        *models, told.spacing_m(case.diameter_m), told.turns == "opposite", told.wake_radius, told.interference,
+        first, other, told.spacing_m(case.diameter_m), told.turns == "opposite", told.wake_radius, told.interference,
         ratio, told.rpm, told.torque_balance, told.swirl,
     )  # fmt: skip
 

@@ -91,7 +91,9 @@ class Points:
         return rpm, V, air_arrays(airs, which.reshape(-1))
 
 
-def solve_at(model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1) -> Dataset:
+def solve_at(
+    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1
+) -> Dataset:
     """A model at points (P,) with their angle between wind and shaft [deg].
 
     With any angle, airspeed and J are those given, and the loads of the hub are there, 0 in axial flow.
@@ -308,7 +310,9 @@ def _zero_thrust_J(case: Case) -> float:
     def find() -> float:
         from bemt.case.prepare import prepare_case
 
-        return zero_thrust(coefficients(prepare_case(case, oblique=True, alone=True), case.air()), case.as_built().drawn, case.rpm)
+        return zero_thrust(
+            coefficients(prepare_case(case, oblique=True, alone=True), case.air()), case.as_built().drawn, case.rpm
+        )
 
     return case.kept("J of zero thrust", find)
 

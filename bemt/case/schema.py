@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from bemt.air import LIQUID
 from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
 from bemt.case.drive_schema import DriveTable
-from bemt.effects.vortex_cylinder import SWIRL, WAKE_RADIUS
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.vortex_cylinder import SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = [
@@ -256,7 +256,9 @@ class SecondRotorTable(Table):
         "radius of the developed wake of the first rotor in hover over its own", "", 0.7071, 1, default=WAKE_RADIUS
     )
     interference: float = entry("factor on what the rotors induce at each other", "", 0, 2, default=1.0)
-    swirl: float = entry("share of the first rotor's swirl that reaches it", "", 0, 1, _percent("swirl", 1.5), default=SWIRL)
+    swirl: float = entry(
+        "share of the first rotor's swirl that reaches it", "", 0, 1, _percent("swirl", 1.5), default=SWIRL
+    )
 
     def spacing_m(self, diameter_m: float) -> float:
         """Distance of the disks, for the diameter of the first rotor [m]. [m]"""

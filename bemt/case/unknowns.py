@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from bemt.base.units import INCH
-from bemt.effects.vortex_cylinder import SWIRL, WAKE_RADIUS
 from bemt.rotors.population import chord_sd, population
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.vortex_cylinder import SWIRL, WAKE_RADIUS
 
 __all__ = [
     "AIR",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.effects.base import Array, Effect, Flow, Parameter, choice
-from bemt.effects.vortex_cylinder import on_axis
+from bemt.vortex_cylinder import on_axis
 
 _SIDES = ("upstream", "downstream")
 

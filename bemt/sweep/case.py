@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bemt import __version__, effects
 from bemt.base import units
-from bemt.bem.coaxial import LOADS, RATIOS
+from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.case import Case
 from bemt.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
 from bemt.dataset import Dataset
@@ -173,7 +173,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
         "drive": full_document(case),
-        "fan": _fan(case, ready, nominal) if case.ducted else None,
+        "fan": None if isinstance(ready, PairModel) or not case.ducted else _fan(case, ready, nominal),
         "pair": _pair(case, nominal) if case.paired else None,
         "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
         "faults": [],
@@ -239,7 +239,7 @@ def _assumption(moved: Moved) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _description(case: Case, ready: Model, stations: int) -> dict[str, Any]:
+def _description(case: Case, ready: Model | PairModel, stations: int) -> dict[str, Any]:
     air = case.air()
     return {
         "rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "angle_deg": case.angle_deg, "density_kg_m3": air.rho,

@@ -14,8 +14,8 @@ WIDTH = 118
 CSV_COLUMNS = (
     "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",
     "u_input", "u_model", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
-    "angle_deg", "H_force_N", "upper_thrust_N", "lower_thrust_N", "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags",
-    "origin", "remark",
+    "angle_deg", "H_force_N", "upper_thrust_N", "lower_thrust_N", "bemt_error_pct", "bemt_u_val", "k1k2_error_pct",
+    "k1k2_u_val", "converged", "flags", "origin", "remark",
 )  # fmt: skip
 
 
@@ -187,7 +187,13 @@ def case_text(result: Mapping[str, Any]) -> str:
     ]
     if result.get("drive"):
         lines += ["", _wrap(result["drive"]["text"], "  "), ""]
-    lines += [_main_table(result), *_fan_lines(result["fan"]), *_pair_lines(result.get("pair")), *_comparison_lines(result), *_audit_lines(result)]
+    lines += [
+        _main_table(result),
+        *_fan_lines(result["fan"]),
+        *_pair_lines(result.get("pair")),
+        *_comparison_lines(result),
+        *_audit_lines(result),
+    ]
     if result["assumptions"]:
         bemt = result["rows"][0]
         low, high = bemt["thrust_N_range"]

@@ -49,7 +49,7 @@ def ahead(r: ArrayLike, R: ArrayLike, z: float) -> Array:
     from scipy.special import ellipk, elliprf, elliprj
 
     r, R = np.broadcast_arrays(np.asarray(r, dtype=float), np.asarray(R, dtype=float))
-    inside = np.heaviside(R - r, 0.5)
+    inside: Array = np.heaviside(R - r, 0.5)
     if z <= 0.0:
         return inside
     both = np.maximum(r * R, 1e-30 * R * R)
