@@ -73,7 +73,7 @@ def main() -> None:
     """Draw thrust of the lower rotor over that alone, over the spacing; print the table."""
     data = os.environ.get("BEMT_DATA")
     z = np.linspace(0.02, 1.1, 28)
-    fig, axes = plt.subplots(1, 2, figsize=(11, 4.4), sharey=True, layout="constrained")
+    fig, axes = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, layout="constrained")
     for axis, (label, inches, rpm) in zip(axes, PAIRS, strict=True):
         found = predicted(label, rpm, z)
         ratio, u = (np.array([d["lower_thrust_ratio"][0] if k == 0 else d.u["lower_thrust_ratio"][0] for d in found])
@@ -90,7 +90,7 @@ def main() -> None:
             axis.errorbar(at, values[:, 1], values[:, 2], fmt="o", color="C0", mec="k", ms=5, capsize=2,
                           label="second rotor, measured")  # fmt: skip
             carried = values[:, 1] - values[:, 4] * values[:, 0]
-            axis.plot(at, carried, "o", mfc="none", color="C0", ms=6, label="the same, without the drag of its mount")
+            axis.plot(at, carried, "o", mfc="none", color="C0", ms=6, label="second rotor, measured, less mount")
             for d, s in zip(predicted(label, rpm, SPACINGS), SPACINGS, strict=True):
                 row = points[s]
                 rest = row[1] - row[4] * row[0]
@@ -106,7 +106,8 @@ def main() -> None:
         )
         axis.grid(alpha=0.3)
     axes[0].set_ylabel("thrust over that of the rotor alone")
-    axes[0].legend(fontsize=8, loc="lower left")
+    handles, words = axes[0].get_legend_handles_labels()
+    fig.legend(handles, words, fontsize=8, ncols=4, loc="outside lower center")
     fig.savefig(HERE / "img" / "coaxial.png", dpi=110)
 
 

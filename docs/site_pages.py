@@ -40,7 +40,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "How to": ("choose.md", "notebooks/*", "flight_logs.md", "exports.md", "adding.md", "scaling.md", "trust.md"),
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
-    "Theory": ("believe.md", "theory.md", "oblique.md", "effects.md", "diagnosis.md"),
+    "Theory": ("believe.md", "theory.md", "oblique.md", "coaxial.md", "effects.md", "diagnosis.md"),
     "Project": (
         "structure.md",
         "reports/README.md",

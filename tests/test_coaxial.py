@@ -246,3 +246,19 @@ def test_what_knows_one_rotor_only_refuses_a_pair() -> None:
     around = pair.replaced({"model.effects_on": ["coaxial_neighbour"]})
     with pytest.raises(InputError, match="coaxial_neighbour"):
         around.solve(5000.0)
+
+
+@pytest.mark.slow
+def test_measured_pairs_lie_in_the_band_of_their_label(shared_data: Path) -> None:
+    """Two propellers at six spacings, less the drag of the mount that the stand itself tells (docs/coaxial.md)."""
+    from docs.coaxial_spacing import measured
+
+    folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
+    for label, inches, rpm in (("15x5", 15, 5000.0), ("11x5", 11, 6000.0)):
+        off, together = [], []
+        for z, row in measured(folder, inches).items():
+            found = bemt.propeller(label).coaxial(z).solve(rpm)
+            lower = row[1] - row[4] * row[0]
+            off.append((found["lower_thrust_ratio"][0] - lower) / found.u["lower_thrust_ratio"][0])
+            together.append(found["thrust_ratio"][0] - 0.5 * (row[0] + lower))
+        assert np.abs(off).max() < 2.0 and np.abs(together).max() < 0.045, label
