@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document
 from bemt.exports.performance import Performance, table_loads
 
 if TYPE_CHECKING:
@@ -98,9 +99,16 @@ def _cell(axis, x):
 """Python that looks the table up, for files that go to other programs: standard library only."""
 
 
+def still_hub() -> HubTable:
+    """Hub table of a rotor without loads across the shaft."""
+    two = np.array([0.0, 1.0])
+    return HubTable(two, two, two, np.zeros((6, 2, 2, 2)))
+
+
 def table_module(job: Job, title: str) -> str:
-    """Python text of the table and its lookup."""
+    """Python text of the tables, axial and of the hub, and their lookup."""
     doc = table_document(job)
+    hub = hub_document(job.hub or still_hub())
     values = [
         f"{name} = {doc[key]!r}"
         for name, key in (
@@ -116,8 +124,9 @@ def table_module(job: Job, title: str) -> str:
     return (
         f'"""{head}"""\n\nimport bisect\nimport math\n\nSENSE = {job.performance.sense}  # +1 right-handed\n'
         + "\n".join(values)
-        + "\n"
+        + f"\nHUB = {hub!r}\n"
         + TABLE_CODE
+        + WRENCH_CODE
     )
 
 
@@ -127,3 +136,10 @@ def run_module(text: str, rpm: Array, V: Array) -> tuple[Array, Array]:
     exec(compile(text, "<export>", "exec"), space)
     pairs = np.array([space["loads"](float(n), float(v)) for n, v in zip(rpm, V, strict=True)])
     return pairs[:, 0], pairs[:, 1]
+
+
+def run_hub(text: str, rpm: Array, V: Array, side: Array) -> Array:
+    """Loads of the hub by the lookup of such a text, (6, P)."""
+    space: dict[str, Any] = {}
+    exec(compile(text, "<export>", "exec"), space)
+    return np.array([space["hub"](*map(float, at)) for at in zip(rpm, V, side, strict=True)]).T
