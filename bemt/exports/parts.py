@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
-from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document
+from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document, hub_loads
 from bemt.exports.performance import Performance, table_loads
 
 if TYPE_CHECKING:
@@ -51,6 +51,22 @@ def static_fit(table: Performance) -> tuple[float, float]:
     W = table.rpm * np.pi / 30.0
     T, Q = table.thrust_N[:, table.at_rest], table.torque_Nm[:, table.at_rest]
     return tuple(float(np.sum(W**2 / y) / np.sum((W**2 / y) ** 2)) for y in (T, Q))  # type: ignore[return-value]
+
+
+def edgewise(job: Job) -> tuple[Array, Array, Array]:
+    """Speed [rev/min], airspeed across the shaft [m/s] and loads (6, P) where models of few numbers are fitted."""
+    t, hub = job.performance, job.hub
+    assert hub is not None  # an open rotor
+    rpm, share = (v.ravel() for v in np.meshgrid(t.rpm[t.rpm >= 0.5 * t.rpm[-1]], np.linspace(0.1, 1.0, 10)))
+    V = share * np.interp(rpm, t.rpm, t.J_zero) * rpm / 60.0 * t.diameter_m
+    loads = hub_loads(hub_document(hub), t.rho, t.diameter_m, rpm, 0.0 * V, V)
+    loads[:2] += t.lookup(rpm, 0.0 * V)
+    return rpm, V, loads
+
+
+def slope(x: Array, y: Array) -> float:
+    """K of y = k x by least squares."""
+    return float(np.sum(x * y) / np.sum(x * x))
 
 
 def table_document(job: Job) -> dict[str, Any]:
