@@ -152,7 +152,12 @@ def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
 
     _save("jsbsim", job, folder)
     rpm, v, F, M, rho = [], [], [], [], []
-    for throttle, axial, y, z in ((0.6, 4.0, 5.0, 0.0), (0.5, 0.0, 0.0, 9.0), (0.8, 6.0, -6.0, 3.0), (0.7, -1.0, 4.0, -8.0)):
+    for throttle, axial, y, z in (
+        (0.6, 4.0, 5.0, 0.0),
+        (0.5, 0.0, 0.0, 9.0),
+        (0.8, 6.0, -6.0, 3.0),
+        (0.7, -1.0, 4.0, -8.0),
+    ):
         fdm = program.FGFDMExec(str(folder))
         fdm.set_debug_level(0)
         fdm.set_aircraft_path("aircraft")
@@ -616,7 +621,9 @@ def _hub_rows(kept: dict[str, Any]) -> str:
             cells = [_percent(run["hub_pct"][name]) for name in HUB]
             rows.append(f"| `{word}` | {read} | {' | '.join(cells)} | {run['hub_points']} |")
         else:
-            rows.append(f"| `{word}` | text only: {TEXT.get(word, 'formula of its source')} | - | - | - | - | - | - | - |")
+            rows.append(
+                f"| `{word}` | text only: {TEXT.get(word, 'formula of its source')} | - | - | - | - | - | - | - |"
+            )
     return "\n".join(rows)
 
 
@@ -682,13 +689,13 @@ Two scripts run the exported 10x5 in a simulator without a controller: [hover.py
 ## Loads across the shaft
 
 A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
-hub. Seven targets carry them (`--hold hub`); the others say in their notes that they do not. Tables run over speed and the
-advance ratios along and across the shaft; their angle is atan2 of the two. `table` also writes them as a CSV with the
-angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those of
+hub. Seven targets carry them (`--hold hub`); the others say in their notes that they do not. Tables run over speed and
+the advance ratios along and across the shaft; their angle is atan2 of the two. `table` also writes them as a CSV with
+the angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those of
 stiff blades and come out too large; see [Wind from any side](oblique.md).
 
-Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, wind from any side, in per
-cent of the thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
+Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, wind from any side, in
+per cent of the thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
 
 | target | run in | thrust | torque | H | Y | roll | pitch | points |
 |---|---|---|---|---|---|---|---|---|

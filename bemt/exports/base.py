@@ -199,6 +199,9 @@ class Export(ABC):
                 got, wanted = f"the target {self.id}: {self.holds}", f"a target that holds {FEATURES[word]}"
                 others = f"It represents {', '.join(sorted(self.features)) or 'shape only'}"
                 out.append(Fault(job.file, f"--hold {word}", got, wanted, others))
+        if job.case.ducted and "hub" in job.hold and "hub" in self.features:
+            got = "a ducted rotor, whose loads across the shaft are not solved"
+            out.append(Fault(job.file, "--hold hub", got, "an open rotor"))
         where = f"--format {self.id}"
         if job.case.ducted and self.kind != "loads" and "duct" not in self.features:
             holds = f"The target represents {self.holds}"
@@ -316,7 +319,9 @@ class LoadsExport(Export):
             return None
         exact = oblique_loads(job.case, *at)
         rest = solve_points(job.case, rpm[keep], 0.0)
-        full = np.array([rest.thrust_N, rest.torque_Nm, *[rest.thrust_N] * 2, *[0.5 * table.diameter_m * rest.thrust_N] * 2])
+        full = np.array(
+            [rest.thrust_N, rest.torque_Nm, *[rest.thrust_N] * 2, *[0.5 * table.diameter_m * rest.thrust_N] * 2]
+        )
         share = 100.0 * np.abs(got - exact) / full
         return {
             name: _worst(row)

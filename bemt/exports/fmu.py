@@ -94,8 +94,8 @@ class FmuExport(LoadsExport):
     holds = "tables CT(J, rpm), CP(J, rpm) and of the hub over J along and across the shaft in Python; density an input"
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     conventions = (
-        "inputs rpm [rev/min], airspeed_m_s (z, along the thrust), velocity_x_m_s, velocity_y_m_s, density_kg_m3; outputs "
-        "thrust_N, torque_Nm, force_x_N, force_y_N, moment_x_Nm, moment_y_Nm, sense; loads follow each step"
+        "inputs rpm [rev/min], airspeed_m_s (z, along the thrust), velocity_x_m_s, velocity_y_m_s, density_kg_m3; "
+        "outputs thrust_N, torque_Nm, force_x_N, force_y_N, moment_x_Nm, moment_y_Nm, sense; loads follow each step"
     )
     source = "pythonfmu 0.7; the machine that runs the FMU needs Python with pythonfmu"
     needs = ("pythonfmu",)

@@ -70,8 +70,8 @@ class GazeboExport(LoadsExport):
             "the constants hold at rest; thrust does not fall with airspeed here: see fit_error_pct.thrust.flight",
             "rotorDragCoefficient and rollingMomentCoefficient are fitted in edgewise flow up to the airspeed of zero "
             "thrust; pitch moment, side force and the gain of thrust across the shaft are not in this model",
-            "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that of "
-            "this rotor, negative for a left-handed one; on a vehicle whose rotors turn both ways it cancels",
+            "the plugin's rolling moment does not know the direction of rotation: the sign of its coefficient is that "
+            "of this rotor, negative for a left-handed one; on a vehicle whose rotors turn both ways it cancels",
             "a right-handed propeller turns clockwise seen from behind, which is from below on a multicopter: ccw from "
             "above; check turningDirection with the axis of your joint",
             "the plugin of PX4's gazebo-classic also fades thrust with airspeed by a rule of its own (1 - V/25)",

@@ -2,8 +2,8 @@
 
 Coefficients refer to diameter and speed like CT: forces over rho n^2 D^4, moments over rho n^2 D^5.  Thrust and power
 are changes against axial flow at the same axial advance ratio, so that the finer axial table of
-:mod:`bemt.exports.performance` stays what it is.  With u the direction in which the rotor moves through the air in the
-plane of its disk, z along the thrust, s = +1 for a right-handed rotor and a = s u x z the side on which blades advance::
+`bemt.exports.performance` stays what it is.  With u the direction in which the rotor moves through the air in the plane
+of its disk, z along the thrust, s = +1 for a right-handed rotor and a = s u x z the side on which blades advance::
 
     force  = (T + dT) z - H u + Y a
     moment = -s (Q + dQ) z + roll a x z + pitch u x z
@@ -73,7 +73,9 @@ def hub_of(case: Case, table: Performance) -> HubTable:
     if bad.any():
         at = np.argwhere(bad)[0]
         where = f"{rpm[at[0]]:.0f} rev/min, J {J[at[1]]:.2g} along and {side[at[2]]:.2g} across the shaft"
-        raise InputError(Fault(case.path.as_posix(), where, "not converged", "a converged point", "Nothing was written"))
+        raise InputError(
+            Fault(case.path.as_posix(), where, "not converged", "a converged point", "Nothing was written")
+        )
     for k in range(1, side.size):
         values[..., k] = np.where(np.isnan(values[..., k]), values[..., k - 1], values[..., k])
     return HubTable(rpm, J, side, np.nan_to_num(values))
@@ -147,15 +149,18 @@ def hub(rpm, axial_m_s, side_m_s, density_kg_m3=DENSITY):
     return T + dT, Q + dQ, H, Y, roll, pitch
 
 
-def wrench(rpm, velocity_m_s, density_kg_m3=DENSITY):
-    """Force [N] and moment [N m] on the vehicle, x y z; velocity of the hub through the air, z along the thrust."""
+def wrench(rpm, velocity_m_s, density_kg_m3=DENSITY, sense=SENSE):
+    """Force [N] and moment [N m] on the vehicle, x y z; velocity of the hub through the air, z along the thrust.
+
+    `sense` -1 is the mirror image of a right-handed propeller.
+    """
     x, y, z = velocity_m_s
     side = math.hypot(x, y)
     T, Q, H, Y, roll, pitch = hub(rpm, z, side, density_kg_m3)
     if side > 0.0:
         x, y = x / side, y / side
-    force = -H * x + Y * SENSE * y, -H * y - Y * SENSE * x, T
-    moment = -roll * SENSE * x + pitch * y, -roll * SENSE * y - pitch * x, -SENSE * Q
+    force = -H * x + Y * sense * y, -H * y - Y * sense * x, T
+    moment = -roll * sense * x + pitch * y, -roll * sense * y - pitch * x, -sense * Q
     return force, moment
 '''
 """Python that looks the table up, behind `bemt.exports.parts.TABLE_CODE`: standard library only."""

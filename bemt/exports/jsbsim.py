@@ -24,8 +24,8 @@ class JsbsimExport(LoadsExport):
     id = "jsbsim"
     title = "JSBSim propeller with a stand"
     holds = (
-        "tables CT(J, rpm), CP(J, rpm), and of the hub over J along and across the shaft as external reactions, linear, "
-        "held at the ends; density of the simulation"
+        "tables CT(J, rpm), CP(J, rpm), and of the hub over J along and across the shaft as external reactions, "
+        "linear, held at the ends; density of the simulation"
     )
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation", "hub"})
     conventions = (
@@ -101,8 +101,8 @@ class JsbsimExport(LoadsExport):
             "the system file serves engine 0; repeat it for others",
             "sense stands in the thruster element of the aircraft file, where JSBSim reads it: take it into yours",
             "a stopped propeller (0 rev/min) has neither thrust nor drag in JSBSim",
-            "the external reactions of the aircraft file carry what a wind across the shaft adds: take them into yours, "
-            "with the location of the propeller; its shaft along body x; the shaft power stays that of axial flow",
+            "the external reactions of the aircraft file carry what a wind across the shaft adds: take them into "
+            "yours, with the location of the propeller; its shaft along body x; the shaft power stays that of axial flow",
             "tip Mach number changes with speed at the air of the table only",
         ]
 

@@ -28,6 +28,7 @@ class Propeller:
         if min(self.site, *self.actuators) < 0:
             raise ValueError(f"the model has no site and six actuators of {{prefix}}")
         self.density = (model.opt.density or DENSITY) if density_kg_m3 is None else density_kg_m3
+        self.sense = SENSE  # -1 for the mirror image of a right-handed propeller
         self.rpm = 0.0
 
     def velocity(self, model, data):
@@ -40,7 +41,7 @@ class Propeller:
 
     def __call__(self, model, data):
         """Force [N] and moment [N m] in the axes of the site now; both are written to data.ctrl."""
-        force, moment = wrench(self.rpm, self.velocity(model, data), self.density)
+        force, moment = wrench(self.rpm, self.velocity(model, data), self.density, self.sense)
         data.ctrl[self.actuators] = (*force, *moment)
         return force, moment
 '''

@@ -17,8 +17,8 @@ class RotorpyExport(LoadsExport):
     id = "rotorpy"
     title = "RotorPy rotor parameters"
     holds = (
-        "T = k_eta W^2 - k_z W V + k_h V_xy^2 (CT linear in J, needs aero=True), Q = k_m W^2, H = k_d W V_xy, pitch moment "
-        "-k_flap W V_xy; density baked in"
+        "T = k_eta W^2 - k_z W V + k_h V_xy^2 (CT linear in J, needs aero=True), Q = k_m W^2, H = k_d W V_xy, pitch "
+        "moment -k_flap W V_xy; density baked in"
     )
     features = frozenset({"torque", "airspeed", "rest", "rotation", "hub"})
     conventions = (
@@ -56,9 +56,9 @@ rotor_direction = {-t.sense}
         """What this model class leaves out."""
         return [
             "torque does not change with airspeed in this model; no Reynolds or Mach number",
-            "k_d, k_h and k_flap are fitted in edgewise flow up to the airspeed of zero thrust; in this model side force "
-            "and roll moment are 0, and torque does not change with a wind across the shaft",
-            f"density {job.performance.rho:g} kg/m3 is in all three constants: scale them with yours",
+            "k_d, k_h and k_flap are fitted in edgewise flow up to the airspeed of zero thrust; in this model side "
+            "force and roll moment are 0, and torque does not change with a wind across the shaft",
+            f"density {job.performance.rho:g} kg/m3 is in all constants: scale them with yours",
             "k_eta weighs all speeds of the table alike; export with --rpm near the speed that you fly",
         ]
 
@@ -86,8 +86,7 @@ def _fit_hub(job: Job) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
     rpm, V, loads = edgewise(job)
     W, rest = rpm * np.pi / 30.0, job.performance.lookup(rpm, 0.0 * rpm)[0]
-    return tuple(slope(x / rest, y / rest) for x, y in (
-        (W * V, loads[2]), (V**2, loads[0] - rest), (W * V, -loads[5])))  # type: ignore[return-value]
+    return tuple(slope(x / rest, y / rest) for x, y in ((W * V, loads[2]), (V**2, loads[0] - rest), (W * V, -loads[5])))  # type: ignore[return-value]
 
 
 def _fit(job: Job) -> tuple[float, float, float]:

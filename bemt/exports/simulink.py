@@ -20,7 +20,9 @@ class SimulinkExport(LoadsExport):
 
     id = "simulink"
     title = "Simulink lookup tables (.mat)"
-    holds = "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    holds = (
+        "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    )
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     source = "MATLAB documentation: n-D Lookup Table, interpolation linear, extrapolation clip"
 

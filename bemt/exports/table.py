@@ -88,7 +88,9 @@ class TableExport(LoadsExport):
 
     id = "table"
     title = "tables as CSV, JSON and a C header"
-    holds = "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    holds = (
+        "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    )
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     source = "own format"
 
