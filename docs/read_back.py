@@ -691,8 +691,8 @@ Two scripts run the exported 10x5 in a simulator without a controller: [hover.py
 A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
 hub. Seven targets carry them (`--hold hub`); the others say in their notes that they do not. Tables run over speed and
 the advance ratios along and across the shaft; their angle is atan2 of the two. `table` also writes them as a CSV with
-the angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those of
-stiff blades and come out too large; see [Wind from any side](oblique.md).
+the angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those
+of stiff blades and come out too large; see [Wind from any side](oblique.md).
 
 Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, wind from any side, in
 per cent of the thrust at rest, its torque, and thrust times radius; "-": the target has no such load.

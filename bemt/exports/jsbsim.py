@@ -102,7 +102,8 @@ class JsbsimExport(LoadsExport):
             "sense stands in the thruster element of the aircraft file, where JSBSim reads it: take it into yours",
             "a stopped propeller (0 rev/min) has neither thrust nor drag in JSBSim",
             "the external reactions of the aircraft file carry what a wind across the shaft adds: take them into "
-            "yours, with the location of the propeller; its shaft along body x; the shaft power stays that of axial flow",
+            "yours, with the location of the propeller; its shaft along body x; the shaft power stays that of axial "
+            "flow",
             "tip Mach number changes with speed at the air of the table only",
         ]
 
