@@ -374,9 +374,9 @@ class CaseFile(Table):
     rotor: RotorTable
     blade: BladeTable
     duct: DuctTable | None = None
-    second_rotor: SecondRotorTable | None = None
     operating: OperatingTable
     air: AirTable
+    second_rotor: SecondRotorTable | None = None
     drive: DriveTable | None = None
     model: ModelTable = ModelTable()
     sweep: SweepTable = SweepTable()
