@@ -146,10 +146,24 @@ def table_skewed(job: Job, folder: Path) -> Skewed:
     return Skewed(rpm, v, read[:, :3], read[:, 3:])
 
 
-def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
-    """The stand in a wind from the side; forces of the propeller and the external reactions together."""
+def _jsbsim_stand(job: Job, folder: Path) -> Any:
+    """JSBSim with the stand of the export, held down."""
     import jsbsim as program
 
+    fdm = program.FGFDMExec(str(folder))
+    fdm.set_debug_level(0)
+    fdm.set_aircraft_path("aircraft")
+    fdm.set_engine_path("engine")
+    fdm.set_systems_path("systems")
+    assert fdm.load_model(f"{job.case.name}_stand")
+    fdm.set_dt(1.0 / 2000.0)
+    fdm.run_ic()
+    fdm["forces/hold-down"] = 1
+    return fdm
+
+
+def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
+    """The stand in a wind from the side; forces of the propeller and the external reactions together."""
     _save("jsbsim", job, folder)
     rpm, v, F, M, rho = [], [], [], [], []
     for throttle, axial, y, z in (
@@ -158,15 +172,7 @@ def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
         (0.8, 6.0, -6.0, 3.0),
         (0.7, -1.0, 4.0, -8.0),
     ):
-        fdm = program.FGFDMExec(str(folder))
-        fdm.set_debug_level(0)
-        fdm.set_aircraft_path("aircraft")
-        fdm.set_engine_path("engine")
-        fdm.set_systems_path("systems")
-        assert fdm.load_model(f"{job.case.name}_stand")
-        fdm.set_dt(1.0 / 2000.0)
-        fdm.run_ic()
-        fdm["forces/hold-down"] = 1
+        fdm = _jsbsim_stand(job, folder)
         for way, speed in (("north", axial), ("east", y), ("down", z)):
             fdm[f"atmosphere/wind-{way}-fps"] = -speed / 0.3048
         fdm["propulsion/set-running"] = -1
@@ -271,20 +277,10 @@ def gazebo_skewed(job: Job, folder: Path) -> Skewed:
 
 def jsbsim(job: Job, folder: Path) -> Ran:
     """The stand of the export in a wind tunnel, at the speeds that it settles to; without power it windmills."""
-    import jsbsim as program
-
     _save("jsbsim", job, folder)
     rows, rolls = [], []
     for V, throttle in ((0.0, 0.1), (0.0, 0.6), (6.0, 0.05), (12.0, 0.5), (20.0, 0.8), (20.0, 0.0), (25.0, 0.02)):
-        fdm = program.FGFDMExec(str(folder))
-        fdm.set_debug_level(0)
-        fdm.set_aircraft_path("aircraft")
-        fdm.set_engine_path("engine")
-        fdm.set_systems_path("systems")
-        assert fdm.load_model(f"{job.case.name}_stand")
-        fdm.set_dt(1.0 / 2000.0)
-        fdm.run_ic()
-        fdm["forces/hold-down"] = 1
+        fdm = _jsbsim_stand(job, folder)
         fdm["atmosphere/wind-north-fps"] = -V / 0.3048
         fdm["propulsion/set-running"] = -1
         for step in range(8000):

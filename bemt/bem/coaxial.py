@@ -60,6 +60,7 @@ _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
 _MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
 _PASSES = 3  # through the radii of the streamtubes and what the lower rotor adds to their speed there
 _OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
+_BLOCK = 512  # points that are solved together, which bounds the memory
 _UNSETTLED = "not converged: the exchange between the two rotors did not settle"
 _BACKWARDS = "not solved: in descent the wake of the first rotor does not reach the second"
 _RAD_PER_RPM = math.pi / 30.0
@@ -400,10 +401,22 @@ class PairModel:
             self.upper.prep, self.lower.prep, self.spacing_m, self.opposite, self.wake_radius, self.interference,
             self.swirl,
         )  # fmt: skip
-        found = solve(pair, n, lower, speed, rho, mu, a)
-        return self._dataset(found, n, speed, rho, a, mu)
+        parts = []
+        for k in range(0, n.size, _BLOCK):
+            at = slice(k, k + _BLOCK)
+            found = solve(pair, n[at], None if lower is None else lower[at], speed[at], rho[at], mu[at], a[at])
+            parts.append(self._channels(found, n[at], speed[at], rho[at], a[at], mu[at]))
+        values = {key: np.concatenate([one[key] for one, _ in parts]) for key in parts[0][0]}
+        flags = tuple(words for _, some in parts for words in some)
+        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
+                      "stations": self.upper.n_stations}  # fmt: skip
+        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=flags, provenance=provenance,
+                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
 
-    def _dataset(self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array) -> Dataset:
+    def _channels(
+        self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array
+    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+        """Channels and flags of solved points."""
         nan = np.where(found.converged, 1.0, np.nan)
         parts, m = (found.upper, found.lower), found.lower.rpm * nan
         T, Q = (np.array([getattr(one, key) * nan for one in parts]) for key in ("T", "Q"))
@@ -437,7 +450,4 @@ class PairModel:
             )
             for one, two, ok, behind in zip(found.upper.flags, found.lower.flags, found.converged, V < 0.0, strict=True)
         )  # fmt: skip
-        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
-                      "stations": self.upper.n_stations}  # fmt: skip
-        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=words, provenance=provenance,
-                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
+        return values, words
