@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SWIRL", "WAKE_RADIUS", "ahead", "on_axis"]
+__all__ = ["MOUNT_DRAG", "SWIRL", "WAKE_RADIUS", "ahead", "on_axis"]
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,9 @@ not checked; Leishman and Ananthan 2008, J. AHS 53(1), give 0.82 (not checked); 
 SWIRL = 0.5
 """Share of the swirl behind a rotor that reaches one in its wake: all of it by the balance of angular momentum, none
 where motors and arms between the rotors straighten the flow; the middle, declared [1]."""
+MOUNT_DRAG = 0.03
+"""Drag of what carries a rotor in the wake of another one, over the thrust of that one: motor and arm cover 2 to 6 % of
+the disk, drag coefficient 1, dynamic pressure 0.6 to 1 of the disk loading; declared [1]."""
 
 
 def on_axis(z_over_R: float) -> float:

@@ -89,18 +89,13 @@ def main() -> None:
             axis.plot(at, values[:, 0], "s", color="C1", mec="k", ms=5, label="first rotor, measured")
             axis.errorbar(at, values[:, 1], values[:, 2], fmt="o", color="C0", mec="k", ms=5, capsize=2,
                           label="second rotor, measured")  # fmt: skip
-            carried = values[:, 1] - values[:, 4] * values[:, 0]
-            axis.plot(at, carried, "o", mfc="none", color="C0", ms=6, label="second rotor, measured, less mount")
             for d, s in zip(predicted(label, rpm, SPACINGS), SPACINGS, strict=True):
                 row = points[s]
-                rest = row[1] - row[4] * row[0]
-                both = 0.5 * (row[0] + rest)
-                print(
-                    f"{inches} in, z/D {s:g}: lower {d['lower_thrust_ratio'][0]:.3f} (u "
-                    f"{d.u['lower_thrust_ratio'][0]:.3f}), measured {row[1]:.3f}, without mount {rest:.3f}; both "
-                    f"{d['thrust_ratio'][0]:.3f}, measured {0.5 * (row[0] + row[1]):.3f} and {both:.3f}; lower torque "
-                    f"over upper {d['lower_torque_Nm'][0] / d['upper_torque_Nm'][0]:.3f}, measured {row[3]:.3f}"
-                )
+                thrust, both = d["lower_thrust_ratio"][0], d["thrust_ratio"][0]
+                torque = d["lower_torque_Nm"][0] / d["upper_torque_Nm"][0]
+                print(f"{inches} in, z/D {s:g}: lower {thrust:.3f} (u {d.u['lower_thrust_ratio'][0]:.3f}), measured "
+                      f"{row[1]:.3f}; both {both:.3f}, measured {0.5 * (row[0] + row[1]):.3f}; lower torque over upper "
+                      f"{torque:.3f}, measured over alone {row[3]:.3f}; mount {row[4]:+.3f}")  # fmt: skip
         axis.set(
             xlabel="distance over diameter z/D", xlim=(0, 1.1), ylim=(0.3, 1.1), title=f"{label}, equal speeds, at rest"
         )

@@ -179,6 +179,25 @@ def test_any_pair_is_solved_or_flagged() -> None:
     assert good >= 0.97 * 160
 
 
+def test_a_point_does_not_depend_on_its_neighbours() -> None:
+    pair = prepared(bemt.propeller("10x5").coaxial(0.2).case)
+    rpm, V = np.linspace(2000.0, 9000.0, 12), np.linspace(0.0, 12.0, 12)
+    whole = pair.solve(rpm, V, AIR)
+    for i in (0, 5, 11):
+        one = pair.solve(rpm[i], V[i], AIR)
+        for name in (*coaxial.LOADS, *coaxial.RATIOS):
+            assert one[name][0] == pytest.approx(whole[name][i], rel=1e-9, abs=1e-9)
+
+
+def test_the_drag_of_the_mount_takes_from_the_thrust_alone() -> None:
+    free, carried = (
+        bemt.propeller("10x5").coaxial(0.2).replaced({"second_rotor.mount_drag": share}).solve(6000.0, bands=False)
+        for share in (0.0, 0.04)
+    )
+    taken = free["lower_thrust_N"][0] - carried["lower_thrust_N"][0]
+    assert taken == pytest.approx(0.04 * free["upper_thrust_N"][0]) and carried.power_W[0] == free.power_W[0]
+
+
 def test_descent_is_refused_not_guessed() -> None:
     pair = bemt.propeller("10x5").coaxial(0.2)
     found = prepared(pair.case).solve([5000.0, 5000.0], [-2.0, 0.0], AIR)
@@ -188,7 +207,7 @@ def test_descent_is_refused_not_guessed() -> None:
 
 def test_a_pair_has_bands_by_origin_and_its_own_unknowns() -> None:
     pair = bemt.propeller("10x5").coaxial(0.3)
-    assert {f"second_rotor.{k}" for k in ("wake_radius", "interference", "swirl")} <= set(pair.unknowns)
+    assert {f"second_rotor.{k}" for k in ("wake_radius", "interference", "swirl", "mount_drag")} <= set(pair.unknowns)
     found = pair.solve(rpm=6000.0)
     for name in (*coaxial.LOADS, *coaxial.RATIOS, "thrust_N", "power_W"):
         assert found.u[name][0] > 0.0, name
@@ -196,9 +215,8 @@ def test_a_pair_has_bands_by_origin_and_its_own_unknowns() -> None:
     # most of what is not known of the blades cancels in the ratio
     relative = found.u["lower_thrust_N"][0] / found["lower_thrust_N"][0]
     assert found.u["lower_thrust_ratio"][0] / found["lower_thrust_ratio"][0] < 0.6 * relative
-    known = pair.replaced(
-        {f"second_rotor.{k}": v for k, v in (("wake_radius", 0.78), ("interference", 1.0), ("swirl", 1.0))}
-    )
+    usual = {"wake_radius": 0.78, "interference": 1.0, "swirl": 1.0, "mount_drag": 0.03}
+    known = pair.replaced({f"second_rotor.{key}": value for key, value in usual.items()})
     assert known.solve(rpm=6000.0).u["lower_thrust_ratio"][0] < 0.6 * found.u["lower_thrust_ratio"][0]
 
 
@@ -250,7 +268,7 @@ def test_what_knows_one_rotor_only_refuses_a_pair() -> None:
 
 @pytest.mark.slow
 def test_measured_pairs_lie_in_the_band_of_their_label(shared_data: Path) -> None:
-    """Two propellers at six spacings, less the drag of the mount that the stand itself tells (docs/coaxial.md)."""
+    """Two propellers at six spacings, as measured (docs/coaxial.md)."""
     from docs.coaxial_spacing import measured
 
     folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
@@ -258,7 +276,6 @@ def test_measured_pairs_lie_in_the_band_of_their_label(shared_data: Path) -> Non
         off, together = [], []
         for z, row in measured(folder, inches).items():
             found = bemt.propeller(label).coaxial(z).solve(rpm)
-            lower = row[1] - row[4] * row[0]
-            off.append((found["lower_thrust_ratio"][0] - lower) / found.u["lower_thrust_ratio"][0])
-            together.append(found["thrust_ratio"][0] - 0.5 * (row[0] + lower))
-        assert np.abs(off).max() < 2.0 and np.abs(together).max() < 0.045, label
+            off.append((found["lower_thrust_ratio"][0] - row[1]) / found.u["lower_thrust_ratio"][0])
+            together.append(found["thrust_ratio"][0] - 0.5 * (row[0] + row[1]))
+        assert np.abs(off).max() < 2.5 and np.median(np.abs(off)) < 2.0 and np.abs(together).max() < 0.045, label

@@ -325,6 +325,9 @@ class PairModel:
         Its speed, if it does not follow that of the upper one [rev/min].
     torque_balance : bool
         Whether the lower rotor turns at the speed of equal torques instead.
+    mount_drag : float
+        Drag of what carries the lower rotor in the wake of the upper one, over the thrust of that one; it takes from
+        the thrust of the lower rotor [1].
     """
 
     upper: Model
@@ -337,6 +340,7 @@ class PairModel:
     lower_rpm: float | None = None
     torque_balance: bool = False
     swirl: float = 1.0
+    mount_drag: float = 0.0
 
     @property
     def rotors(self) -> tuple[Model, Model]:
@@ -420,6 +424,7 @@ class PairModel:
         nan = np.where(found.converged, 1.0, np.nan)
         parts, m = (found.upper, found.lower), found.lower.rpm * nan
         T, Q = (np.array([getattr(one, key) * nan for one in parts]) for key in ("T", "Q"))
+        T[1] -= self.mount_drag * np.maximum(T[0], 0.0)
         power = Q * np.array([n, m]) * _RAD_PER_RPM
         air = cast("Air", SimpleNamespace(rho=rho, mu=mu, a_sound=a))
         turning = np.where(found.converged, found.lower.rpm, n)

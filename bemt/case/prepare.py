@@ -137,7 +137,7 @@ def prepare_pair(case: Case, n_stations: int | None = None, second: Case | None 
     ratio = 1.0 if told.rpm_ratio is None else told.rpm_ratio
     return PairModel(
         first, other, told.spacing_m(case.diameter_m), told.turns == "opposite", told.wake_radius, told.interference,
-        ratio, told.rpm, told.torque_balance, told.swirl,
+        ratio, told.rpm, told.torque_balance, told.swirl, told.mount_drag,
     )  # fmt: skip
 
 

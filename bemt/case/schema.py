@@ -18,7 +18,7 @@ from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, sh
 from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
-from bemt.vortex_cylinder import SWIRL, WAKE_RADIUS
+from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = [
@@ -258,6 +258,14 @@ class SecondRotorTable(Table):
     interference: float = entry("factor on what the rotors induce at each other", "", 0, 2, default=1.0)
     swirl: float = entry(
         "share of the first rotor's swirl that reaches it", "", 0, 1, _percent("swirl", 1.5), default=SWIRL
+    )
+
+    mount_drag: float = entry(
+        "drag of what carries it in the wake of the first rotor, over the thrust of that one",
+        "",
+        0,
+        0.5,
+        default=MOUNT_DRAG,
     )
 
     def spacing_m(self, diameter_m: float) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd, population
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
-from bemt.vortex_cylinder import SWIRL, WAKE_RADIUS
+from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 
 __all__ = [
     "AIR",
@@ -118,6 +118,13 @@ PAIR = (
         0.0,
         1.0,
         "not known; 1 without anything between the rotors, less behind motors and arms, which straighten the flow",
+    ),
+    Unknown(
+        "second_rotor.mount_drag",
+        MOUNT_DRAG,
+        0.0,
+        0.06,
+        "declared; motor and arm cover 2 to 6 % of the disk. A stand reads it while the first rotor turns alone",
     ),
 )
 _STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
