@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from pathlib import Path
 
@@ -267,14 +268,16 @@ def test_what_knows_one_rotor_only_refuses_a_pair() -> None:
 
 
 @pytest.mark.slow
-def test_measured_pairs_lie_in_the_band_of_their_label(shared_data: Path) -> None:
+def test_measured_pairs_lie_in_the_band_of_their_label(project: Path, shared_data: Path) -> None:
     """Two propellers at six spacings, as measured (docs/coaxial.md)."""
-    from docs.coaxial_spacing import measured
-
+    spec = importlib.util.spec_from_file_location("docs_coaxial_spacing", project / "docs/coaxial_spacing.py")
+    assert spec is not None and spec.loader is not None
+    page = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(page)
     folder = shared_data / "contrasts" / "coax_spacing_15in_11in"
     for label, inches, rpm in (("15x5", 15, 5000.0), ("11x5", 11, 6000.0)):
         off, together = [], []
-        for z, row in measured(folder, inches).items():
+        for z, row in page.measured(folder, inches).items():
             found = bemt.propeller(label).coaxial(z).solve(rpm)
             off.append((found["lower_thrust_ratio"][0] - row[1]) / found.u["lower_thrust_ratio"][0])
             together.append(found["thrust_ratio"][0] - 0.5 * (row[0] + row[1]))
