@@ -113,10 +113,10 @@ def hub_loads(doc: dict[str, Any], rho: float, D: float, rpm: Array, V: Array, s
 def wrench_of(thrust: Array, torque: Array, hub: Array, u: Array, sense: int) -> tuple[Array, Array]:
     """Force [N] and moment [N m] on the vehicle, (P, 3) each, z along the thrust; u (P, 2) as in the module's text.
 
-    >>> hub = np.array([[0.0], [0.0], [1.0], [0.0], [2.0], [3.0]])
+    >>> hub = np.array([[0.0], [0.0], [1.0], [0.5], [2.0], [3.0]])
     >>> force, moment = wrench_of(np.array([9.0]), np.array([0.5]), hub, np.array([[1.0, 0.0]]), 1)
     >>> force.tolist(), moment.tolist()
-    ([[-1.0, 0.0, 9.0]], [[-2.0, -3.0, -0.5]])
+    ([[-1.0, -0.5, 9.0]], [[-2.0, -3.0, -0.5]])
     """
     H, Y, roll, pitch = hub[2:]
     x, y = u[:, 0], u[:, 1]
