@@ -25,7 +25,7 @@ from bemt.exports.performance import Performance
 if TYPE_CHECKING:
     from bemt.case import Case
 
-__all__ = ["COEFFICIENTS", "HubTable", "hub_document", "hub_loads", "hub_of", "wrench_of"]
+__all__ = ["COEFFICIENTS", "HubTable", "hub_document", "hub_loads", "hub_of"]
 
 Array = NDArray[np.float64]
 
@@ -108,21 +108,6 @@ def hub_loads(doc: dict[str, Any], rho: float, D: float, rpm: Array, V: Array, s
         by = {"dCP": D / (2.0 * np.pi), "CMroll": D, "CMpitch": D}.get(name, 1.0)
         out.append(value * scale * by)
     return np.array(out)
-
-
-def wrench_of(thrust: Array, torque: Array, hub: Array, u: Array, sense: int) -> tuple[Array, Array]:
-    """Force [N] and moment [N m] on the vehicle, (P, 3) each, z along the thrust; u (P, 2) as in the module's text.
-
-    >>> hub = np.array([[0.0], [0.0], [1.0], [0.5], [2.0], [3.0]])
-    >>> force, moment = wrench_of(np.array([9.0]), np.array([0.5]), hub, np.array([[1.0, 0.0]]), 1)
-    >>> force.tolist(), moment.tolist()
-    ([[-1.0, -0.5, 9.0]], [[-2.0, -3.0, -0.5]])
-    """
-    H, Y, roll, pitch = hub[2:]
-    x, y = u[:, 0], u[:, 1]
-    force = np.stack([-H * x + Y * sense * y, -H * y - Y * sense * x, thrust], axis=1)
-    moment = np.stack([-roll * sense * x + pitch * y, -roll * sense * y - pitch * x, -sense * torque], axis=1)
-    return force, moment
 
 
 WRENCH_CODE = '''
