@@ -29,7 +29,7 @@ from bemt.base.tables import write_atomic
 from bemt.case import load_case
 from bemt.exports import exports
 from bemt.exports.base import Job, LoadsExport, entry
-from bemt.exports.performance import solve_points
+from bemt.exports.performance import oblique_loads, solve_points
 
 DOCS = Path(__file__).resolve().parent
 CASES = DOCS.parent / "cases"
@@ -46,6 +46,38 @@ class Ran:
     torque_Nm: Any  # Of the shaft, positive where the rotor is driven
     sense: int  # +1 right-handed, from the sign of the torque on the vehicle
     rho: Any = None  # Where the program has an atmosphere of its own [kg/m3]
+
+
+@dataclass(frozen=True, eq=False)
+class Skewed:
+    """What a program put on the vehicle in a wind across the shaft: force and moment (P, 3), z along the thrust."""
+
+    rpm: Any  # [rev/min]
+    velocity_m_s: Any  # (P, 3), of the hub through the air
+    force_N: Any
+    moment_Nm: Any
+    rho: Any = None
+
+    def loads(self, sense: int) -> np.ndarray:
+        """Thrust, torque, H, Y, roll and pitch moment, (6, P)."""
+        v, F, M = (np.asarray(a, dtype=float) for a in (self.velocity_m_s, self.force_N, self.moment_Nm))
+        u = np.zeros_like(v)
+        u[:, :2] = v[:, :2] / np.hypot(v[:, 0], v[:, 1])[:, None]
+        z = np.array([0.0, 0.0, 1.0])
+        a = sense * np.cross(u, z)
+        along = ((F, u, -1.0), (F, a, 1.0), (M, np.cross(a, z), 1.0), (M, np.cross(u, z), 1.0))
+        return np.array([F[:, 2], -sense * M[:, 2], *(sign * np.sum(x * y, axis=1) for x, y, sign in along)])
+
+
+def skewed(job: Job, count: int, seed: int = 11) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds [rev/min] and velocities (P, 3) [m/s] from 10 to 110 deg to the shaft, from any side."""
+    t = job.performance
+    rng = np.random.default_rng(seed)
+    rpm = rng.uniform(0.5 * t.rpm[-1], t.rpm[-1], count)
+    wind = rng.uniform(0.2, 0.9, count) * np.interp(rpm, t.rpm, t.J_zero) * rpm / 60.0 * t.diameter_m
+    angle, side = np.radians(rng.uniform(10.0, 110.0, count)), rng.uniform(0.0, 2.0 * np.pi, count)
+    ways = np.sin(angle) * np.cos(side), np.sin(angle) * np.sin(side), np.cos(angle)
+    return rpm, wind[:, None] * np.stack(ways, axis=1)
 
 
 def points(job: Job, count: int, seed: int = 7) -> tuple[np.ndarray, np.ndarray]:
@@ -87,29 +119,168 @@ def table(job: Job, folder: Path) -> Ran:
     main += f'printf("%d 0\\n", {name.upper()}_SENSE); return 0; }}\n'
     (folder / "main.c").write_text(main, encoding="utf-8")
     program = str(folder / "program")
-    flags = ["-std=c99", "-Wall", "-Werror", "-o", program, str(folder / "main.c")]
+    flags = ["-std=c99", "-Wall", "-Werror", "-o", program, str(folder / "main.c"), "-lm"]
     subprocess.run([shutil.which("cc") or "gcc", *flags], check=True)
     out = subprocess.run([program], check=True, capture_output=True, text=True).stdout
     T, Q = np.array([line.split() for line in out.splitlines()], dtype=float).T
     return Ran(rpm, V, T[:-1], Q[:-1], int(T[-1]))
 
 
-def jsbsim(job: Job, folder: Path) -> Ran:
-    """The stand of the export in a wind tunnel, at the speeds that it settles to; without power it windmills."""
+def table_skewed(job: Job, folder: Path) -> Skewed:
+    """C header, compiled."""
+    _save("table", job, folder)
+    name, rho = job.case.name, job.performance.rho
+    rpm, v = skewed(job, 60)
+    calls = "".join(
+        f"{{ double v[3] = {{{x!r}, {y!r}, {z!r}}}; {name}_wrench({n!r}, v, {rho!r}, F, M); "
+        'printf("%.17g %.17g %.17g %.17g %.17g %.17g\\n", F[0], F[1], F[2], M[0], M[1], M[2]); }\n'
+        for n, (x, y, z) in zip(rpm.tolist(), v.tolist(), strict=True)
+    )
+    main = f'#include <stdio.h>\n#include "{name}.h"\nint main(void) {{ double F[3], M[3];\n{calls}return 0; }}\n'
+    (folder / "main.c").write_text(main, encoding="utf-8")
+    program = str(folder / "program")
+    flags = ["-std=c99", "-Wall", "-Werror", "-o", program, str(folder / "main.c"), "-lm"]
+    subprocess.run([shutil.which("cc") or "gcc", *flags], check=True)
+    out = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    read = np.array([line.split() for line in out.splitlines()], dtype=float)
+    return Skewed(rpm, v, read[:, :3], read[:, 3:])
+
+
+def _jsbsim_stand(job: Job, folder: Path) -> Any:
+    """JSBSim with the stand of the export, held down."""
     import jsbsim as program
 
+    fdm = program.FGFDMExec(str(folder))
+    fdm.set_debug_level(0)
+    fdm.set_aircraft_path("aircraft")
+    fdm.set_engine_path("engine")
+    fdm.set_systems_path("systems")
+    assert fdm.load_model(f"{job.case.name}_stand")
+    fdm.set_dt(1.0 / 2000.0)
+    fdm.run_ic()
+    fdm["forces/hold-down"] = 1
+    return fdm
+
+
+def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
+    """The stand in a wind from the side; forces of the propeller and the external reactions together."""
+    _save("jsbsim", job, folder)
+    rpm, v, F, M, rho = [], [], [], [], []
+    for throttle, axial, y, z in (
+        (0.6, 4.0, 5.0, 0.0),
+        (0.5, 0.0, 0.0, 9.0),
+        (0.8, 6.0, -6.0, 3.0),
+        (0.7, -1.0, 4.0, -8.0),
+    ):
+        fdm = _jsbsim_stand(job, folder)
+        for way, speed in (("north", axial), ("east", y), ("down", z)):
+            fdm[f"atmosphere/wind-{way}-fps"] = -speed / 0.3048
+        fdm["propulsion/set-running"] = -1
+        for step in range(8000):
+            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 1000 else throttle
+            turns = fdm["propulsion/engine/propeller-rpm"]
+            fdm.run()
+        density = fdm["atmosphere/rho-slugs_ft3"] * 515.378818
+        force = [fdm[f"forces/fb{a}-external-lbs"] * 4.4482216152605 for a in "xyz"]
+        moment = [fdm[f"moments/{a}-external-lbsft"] * 1.3558179483314 for a in "lmn"]
+        force[0] += fdm["propulsion/engine/thrust-lbs"] * 4.4482216152605
+        power = fdm["propulsion/engine/propeller-power-ftlbps"] * 1.3558179483314
+        moment[0] -= job.performance.sense * power / (turns * np.pi / 30.0)
+        # body x is the thrust: (y, z, x) is right-handed with z along it
+        rpm.append(turns)
+        v.append((y, z, axial))
+        F.append((force[1], force[2], force[0]))
+        M.append((moment[1], moment[2], moment[0]))
+        rho.append(density)
+    return Skewed(np.array(rpm), np.array(v), F, M, np.array(rho))
+
+
+def mujoco_skewed(job: Job, folder: Path) -> Skewed:
+    """Forces that the actuators put on the body."""
+    import mujoco as program
+
+    _save("mujoco", job, folder)
+    space: dict[str, Any] = {}
+    exec((folder / f"{job.case.name}_mujoco.py").read_text(encoding="utf-8"), space)
+    model = program.MjModel.from_xml_path(str(folder / f"{job.case.name}.xml"))
+    data = program.MjData(model)
+    propeller = space["Propeller"](model)
+    rpm, v = skewed(job, 24)
+    found = []
+    for n, velocity in zip(rpm, v, strict=True):
+        program.mj_resetData(model, data)
+        data.qvel[:3] = velocity
+        program.mj_forward(model, data)
+        propeller.rpm = n
+        propeller(model, data)
+        program.mj_forward(model, data)
+        found.append(data.qfrc_actuator[:6].copy())
+    read = np.array(found)
+    return Skewed(rpm, v, read[:, :3], read[:, 3:])
+
+
+def rotorpy_skewed(job: Job, folder: Path) -> Skewed:
+    """Force and moment of a vehicle on which one rotor turns, about the hub of that rotor."""
+    from rotorpy.vehicles.hummingbird_params import quad_params
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    space: dict[str, Any] = {}
+    exec(next((_save("rotorpy", job, folder)).glob("*.py")).read_text(encoding="utf-8"), {}, space)
+    own = space["rotor_direction"]
+    way = {"rotor_directions": np.array([own, -own, own, -own]), "c_Dx": 0.0, "c_Dy": 0.0, "c_Dz": 0.0}
+    vehicle = Multirotor({**quad_params, **space["rotor_params"], **way}, aero=True)
+    place = vehicle.rotor_geometry[0]
+    rpm, v = skewed(job, 20)
+    found = []
+    for n, velocity in zip(rpm, v, strict=True):
+        force, moment = vehicle.compute_body_wrench(np.zeros(3), np.array([n * np.pi / 30.0, 0, 0, 0]), velocity)
+        # the gain of thrust k_h V^2 is there for the three rotors at rest too, about the centre that all four balance
+        gain = 0.25 * vehicle.compute_body_wrench(np.zeros(3), np.zeros(4), velocity)[0]
+        own_force = force - 3.0 * gain
+        found.append((*own_force, *(moment - np.cross(place, own_force - gain))))
+    read = np.array(found)
+    return Skewed(rpm, v, read[:, :3], read[:, 3:])
+
+
+def fmu_skewed(job: Job, folder: Path) -> Skewed:
+    """Co-simulation by fmpy."""
+    import fmpy
+
+    _save("fmu", job, folder)
+    rpm, v = skewed(job, 12)
+    names = ("rpm", "velocity_x_m_s", "velocity_y_m_s", "airspeed_m_s")
+    kinds = [("time", "<f8"), *((name, "<f8") for name in names)]
+    signals = np.array([(float(i), n, *w) for i, (n, w) in enumerate(zip(rpm, v.tolist(), strict=True))], dtype=kinds)
+    words = ["force_x_N", "force_y_N", "thrust_N", "moment_x_Nm", "moment_y_Nm", "torque_Nm", "sense"]
+    last = float(rpm.size - 1)
+    found = fmpy.simulate_fmu(str(folder / f"{job.case.name}.fmu"), stop_time=last, step_size=1.0, output_interval=1.0,
+                              input=signals, output=words)[1:]  # fmt: skip
+    read = np.array([found[word] for word in words]).T
+    read[:, 5] *= -read[:, 6]
+    return Skewed(rpm[:-1], v[:-1], read[:, :3], read[:, 3:6])
+
+
+def gazebo_skewed(job: Job, folder: Path) -> Skewed:
+    """The formula of the plugin (MulticopterMotorModel.cc) on the file as libsdformat prints it."""
+    path = next(_save("gazebo", job, folder).glob("*.sdf"))
+    text = subprocess.run(["ign", "sdf", "-p", str(path)], capture_output=True, text=True, check=True).stdout
+    k = {word: float(value) for word, value in re.findall(r"<(\w+C\w+)>([-\d.e+]+)</", text)}
+    rpm, v = skewed(job, 20)
+    W, across = rpm * np.pi / 30.0, v * [1.0, 1.0, 0.0]
+    turns = 1.0 if "<turningDirection>ccw<" in text else -1.0
+    force = -k["rotorDragCoefficient"] * W[:, None] * across
+    moment = -k["rollingMomentCoefficient"] * W[:, None] * across
+    force[:, 2] = k["motorConstant"] * W**2
+    moment[:, 2] = -turns * k["momentConstant"] * force[:, 2]
+    return Skewed(rpm, v, force, moment)
+
+
+def jsbsim(job: Job, folder: Path) -> Ran:
+    """The stand of the export in a wind tunnel, at the speeds that it settles to; without power it windmills."""
     _save("jsbsim", job, folder)
     rows, rolls = [], []
     for V, throttle in ((0.0, 0.1), (0.0, 0.6), (6.0, 0.05), (12.0, 0.5), (20.0, 0.8), (20.0, 0.0), (25.0, 0.02)):
-        fdm = program.FGFDMExec(str(folder))
-        fdm.set_debug_level(0)
-        fdm.set_aircraft_path("aircraft")
-        fdm.set_engine_path("engine")
-        fdm.set_systems_path("systems")
-        assert fdm.load_model(f"{job.case.name}_stand")
-        fdm.set_dt(1.0 / 2000.0)
-        fdm.run_ic()
-        fdm["forces/hold-down"] = 1
+        fdm = _jsbsim_stand(job, folder)
         fdm["atmosphere/wind-north-fps"] = -V / 0.3048
         fdm["propulsion/set-running"] = -1
         for step in range(8000):
@@ -160,7 +331,7 @@ def rotorpy(job: Job, folder: Path) -> Ran:
     still = dict.fromkeys(("c_Dx", "c_Dy", "c_Dz", "k_d", "k_h", "k_flap"), 0.0)
     own = space["rotor_direction"]
     way = {"rotor_directions": np.array([own, -own, own, -own])}
-    vehicle = Multirotor({**quad_params, **space["rotor_params"], **still, **way}, aero=True)
+    vehicle = Multirotor({**quad_params, **still, **space["rotor_params"], **way}, aero=True)
     rpm, V = flight(job, 20)
     T, about = [], []
     for n, v in zip(rpm, V, strict=True):
@@ -283,17 +454,20 @@ class Program:
     modules: tuple[str, ...] = ()  # Python packages that it needs
     tools: tuple[str, ...] = ()  # Commands that it needs
     loads: bool = True  # Whether the program itself computes thrust and torque
+    skewed: Callable[[Job, Path], Skewed] | None = None  # The same in a wind across the shaft
 
 
 OPENFOAM = ["sh", "-c", "WM_PROJECT_DIR=${WM_PROJECT_DIR:-/usr/share/openfoam} blockMesh"]
 PROGRAMS = {
-    "table": Program(table, _first(["cc", "--version"], r"(\d+\.\d+\.\d+)", "GCC"), tools=("cc",)),
-    "jsbsim": Program(jsbsim, _package("jsbsim"), ("jsbsim",)),
-    "mujoco": Program(mujoco, _package("mujoco"), ("mujoco",)),
-    "rotorpy": Program(rotorpy, _package("rotorpy"), ("rotorpy",)),
-    "fmu": Program(fmu, lambda: f"{_package('fmpy')()}, {_package('pythonfmu')()}", ("fmpy", "pythonfmu")),
+    "table": Program(table, _first(["cc", "--version"], r"(\d+\.\d+\.\d+)", "GCC"), tools=("cc",),
+                     skewed=table_skewed),
+    "jsbsim": Program(jsbsim, _package("jsbsim"), ("jsbsim",), skewed=jsbsim_skewed),
+    "mujoco": Program(mujoco, _package("mujoco"), ("mujoco",), skewed=mujoco_skewed),
+    "rotorpy": Program(rotorpy, _package("rotorpy"), ("rotorpy",), skewed=rotorpy_skewed),
+    "fmu": Program(fmu, lambda: f"{_package('fmpy')()}, {_package('pythonfmu')()}", ("fmpy", "pythonfmu"),
+                   skewed=fmu_skewed),
     "gazebo": Program(gazebo, _first(["ign", "sdf", "--versions"], r"(\d+\.\d+\.\d+)", "libsdformat"), tools=("ign",),
-                      loads=False),
+                      loads=False, skewed=gazebo_skewed),
     "rotor-disk": Program(rotor_disk, _first(OPENFOAM, r"OPENFOAM=(\w+)", "OpenFOAM"),
                           tools=("simpleFoam", "blockMesh")),
     "flow360": Program(flow360, _package("flow360"), ("flow360",), loads=False),
@@ -330,6 +504,32 @@ def compared(word: str, job: Job) -> dict[str, Any]:
     return out
 
 
+HUB = ("thrust", "torque", "H", "Y", "roll", "pitch")
+
+
+def hub_compared(word: str, job: Job) -> dict[str, Any]:
+    """One run in a wind across the shaft: in per cent of thrust at rest, its torque, and thrust times radius."""
+    run, target = PROGRAMS[word].skewed, exports()[word]
+    if run is None or not isinstance(target, LoadsExport):
+        return {}
+    with tempfile.TemporaryDirectory() as place:
+        ran = run(job, Path(place))
+    rpm, v = np.asarray(ran.rpm, dtype=float), np.asarray(ran.velocity_m_s, dtype=float)
+    at = rpm, v[:, 2], np.hypot(v[:, 0], v[:, 1])
+    rest, R = solve_points(job.case, rpm, 0.0), 0.5 * job.performance.diameter_m
+    full = np.array([rest.thrust_N, rest.torque_Nm, rest.thrust_N, rest.thrust_N, R * rest.thrust_N, R * rest.thrust_N])
+    scale = 1.0 if ran.rho is None else np.asarray(ran.rho) / job.case.air().rho
+    got = ran.loads(job.performance.sense) / scale
+    written = target.hub_loads(target.write(job), *at)
+    assert written is not None
+    exact = oblique_loads(job.case, *at)
+    off = 100.0 * np.max(np.abs(got - exact) / full, axis=1)
+    file = 100.0 * np.nanmax(np.abs(got - np.where(np.isnan(written), got, written)) / full)
+    held = ~np.isnan(written).any(axis=1)
+    named = {name: float(x) if there else None for name, x, there in zip(HUB, off, held, strict=True)}
+    return {"hub_points": int(rpm.size), "hub_pct": named, "hub_formula_pct": float(file)}
+
+
 def example(rotation: str = "right") -> Job:
     """The 10x5 of `cases/`, up to 10,000 rev/min, at 8 m/s."""
     return Job(load_case(CASES / "prop_10x5/case.toml").replaced({"rotor.rotation": rotation}), 10_000.0, 8.0)
@@ -347,10 +547,15 @@ def measured(word: str) -> dict[str, Any]:
 
 
 def _child(word: str) -> dict[str, Any]:
-    right, left = (compared(word, example(hand)) for hand in ("right", "left"))
-    both = {key: max(value, left[key]) for key, value in right.items() if key.endswith("_pct")}
+    right, left = (compared(word, example(hand)) | hub_compared(word, example(hand)) for hand in ("right", "left"))
+    hub = {}
+    if "hub_pct" in right:
+        pairs = {k: (right["hub_pct"][k], left["hub_pct"][k]) for k in HUB}
+        hub = {"hub_points": right["hub_points"],
+               "hub_pct": {k: None if None in pair else max(pair) for k, pair in pairs.items()}}  # fmt: skip
+    both = {key: max(value, left[key]) for key, value in right.items() if key.endswith("_pct") and key != "hub_pct"}
     kept = right["sense_kept"] and left["sense_kept"]
-    return {"program": PROGRAMS[word].version(), "points": right["points"], "sense_kept": kept, **both}
+    return {"program": PROGRAMS[word].version(), "points": right["points"], "sense_kept": kept, **both, **hub}
 
 
 SEEN = {
@@ -401,6 +606,23 @@ def _program(word: str, kept: dict[str, Any]) -> str:
     return f"text only: {TEXT.get(word, 'formula of its source')} | - | - | {held} | - |"
 
 
+def _hub_rows(kept: dict[str, Any]) -> str:
+    rows = []
+    for word, target in exports().items():
+        if "hub" not in target.features:
+            continue
+        run = kept.get(word, {})
+        if "hub_pct" in run:
+            read = run["program"] if PROGRAMS[word].loads else f"read: {run['program']}; formula of its source"
+            cells = [_percent(run["hub_pct"][name]) for name in HUB]
+            rows.append(f"| `{word}` | {read} | {' | '.join(cells)} | {run['hub_points']} |")
+        else:
+            rows.append(
+                f"| `{word}` | text only: {TEXT.get(word, 'formula of its source')} | - | - | - | - | - | - | - |"
+            )
+    return "\n".join(rows)
+
+
 def page() -> str:
     """Text of docs/exports.md."""
     job = example()
@@ -431,7 +653,7 @@ Generated by `python docs/read_back.py`; do not edit.
 
 writes each target into a folder of its name, together with `manifest.json`: what the target can represent, the fit
 error, the band of the prediction, conventions, the direction of rotation, and the valid range. With `--hold reynolds`
-(or torque, airspeed, windmill, mach, density, rest, duct, sections, rotation) a target that cannot represent it is
+(or torque, airspeed, windmill, mach, density, rest, duct, sections, rotation, hub) a target that cannot represent it is
 refused; the others are written and the exit code is 2. Another format into the same folder keeps what is there; the
 manifest lists both, and the terminal names formats that were written from another state of the case.
 
@@ -459,6 +681,23 @@ note in the manifest says what three quarters of that density would change.
 
 Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
 `drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
+
+## Loads across the shaft
+
+A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
+hub. Seven targets carry them (`--hold hub`); the others say in their notes that they do not. Tables run over speed and
+the advance ratios along and across the shaft; their angle is atan2 of the two. `table` also writes them as a CSV with
+the angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those
+of stiff blades and come out too large; see [Wind from any side](oblique.md).
+
+Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, wind from any side, in
+per cent of the thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
+
+| target | run in | thrust | torque | H | Y | roll | pitch | points |
+|---|---|---|---|---|---|---|---|---|
+{_hub_rows(kept)}
+
+In JSBSim the loads act as external reactions of the aircraft file, and the shaft power stays that of axial flow.
 
 ## Disks for flow solvers
 

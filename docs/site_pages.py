@@ -50,7 +50,15 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     ),
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
-    "Theory": ("believe.md", "theory.md", "oblique.md", "duct.md", "effects.md", "diagnosis.md"),
+    "Theory": (
+        "believe.md",
+        "theory.md",
+        "oblique.md",
+        "duct.md",
+        "coaxial.md",
+        "effects.md",
+        "diagnosis.md",
+    ),
     "Project": (
         "structure.md",
         "reports/README.md",

@@ -247,6 +247,10 @@ def test_the_program_says_what_was_written_and_what_bemt_says(word: str, project
     if word not in READ:
         return
     stated = entry(exports()[word], job, written(word, job))["fit_error_pct"]
+    assert found["hub_formula_pct"] <= READ[word]
+    if word in TABLES:
+        assert max(found["hub_pct"].values()) <= 2.0
+    assert found["hub_pct"]["H"] <= 1.0
     for name in ("thrust", "torque"):
         assert found[f"{name}_formula_pct"] <= READ[word]
         assert found[f"{name}_pct"] <= (1.5 if word in TABLES else 1.1 * stated[name]["flight"] + 0.1)
@@ -264,6 +268,39 @@ def test_the_committed_runs_lie_within_their_limits(project: Path) -> None:
     assert max(kept["rotor-disk"]["thrust_pct"], kept["rotor-disk"]["torque_pct"]) <= 0.5
     for word in set(exports()) - set(kept) - {"stl", "obj", "step", "openfoam", "dfdc", "xrotor"}:
         assert re.search(rf"\| `{word}` .*text only: ", page), word
+
+
+@pytest.mark.parametrize("word", [word for word in LOADS if "hub" in exports()[word].features])
+def test_loads_across_the_shaft_are_what_bemt_says(word: str, job: Job, fan: Job) -> None:
+    files = written(word, job)
+    stated = exports()[word].checked(job, files)["oblique_error_pct"]
+    held = {name: stated[name] for name in ("H", "Y", "roll", "pitch") if stated[name] is not None}
+    assert held["H"] <= 1.0 and len(held) >= 2
+    if word in TABLES:
+        assert len(held) == 4 and max(*held.values(), stated["thrust"], stated["torque"]) <= 2.5
+    refused = exports()[word].faults(Job(fan.case, hold=("hub",)))
+    assert any(fault.where == "--hold hub" for fault in refused)
+
+
+def test_a_target_without_loads_across_the_shaft_says_so(job: Job) -> None:
+    for word in (word for word in LOADS if "hub" not in exports()[word].features):
+        assert any("across the shaft" in note for note in entry(exports()[word], job, written(word, job))["notes"])
+        assert exports()[word].faults(Job(job.case, job.rpm, hold=("hub",)))
+
+
+def test_the_force_points_downstream_and_the_moment_lifts_the_advancing_side(job: Job) -> None:
+    """A rotor that turns counter-clockwise seen from above and moves along +x advances at -y."""
+    space: dict[str, Any] = {}
+    exec(str(written("mujoco", job)["prop_10x5_mujoco.py"]).split("class Propeller")[0], space)
+    T, Q, H, _, roll, pitch = space["hub"](8000.0, 0.0, 8.0)
+    assert H > 0.0 and roll > 0.0
+    for way, side in (((8.0, 0.0, 0.0), (0.0, -1.0, 0.0)), ((0.0, 8.0, 0.0), (1.0, 0.0, 0.0))):
+        force, moment = space["wrench"](8000.0, way)
+        u, advancing = np.array(way) / 8.0, np.array(side)
+        assert np.dot(force, u) == pytest.approx(-H) and force[2] == pytest.approx(T) and moment[2] == pytest.approx(-Q)
+        # thrust at a place r makes the moment r x z
+        assert np.dot(moment, np.cross(advancing, [0.0, 0.0, 1.0])) == pytest.approx(roll)
+        assert np.dot(moment, np.cross(u, [0.0, 0.0, 1.0])) == pytest.approx(pitch)
 
 
 def test_two_units_in_one_process_keep_their_own_tables(job: Job, tmp_path: Path) -> None:

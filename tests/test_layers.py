@@ -29,6 +29,7 @@ ROOMS: tuple[str, ...] = (
     "gaussian|gaussian.*",
     "air",
     "coefficients",
+    "vortex_cylinder",
     "dataset|dataset.*",
     "sections|sections.*",
     "effects|effects.*",

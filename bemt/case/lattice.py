@@ -39,6 +39,8 @@ def solve(
     """Solve points [rev/min], [m/s], [deg] between wind and shaft, (P,), in one air [kg/m3], with bands and flags."""
     if case.angle_deg or np.any(0.0 if angle_deg is None else angle_deg):
         return propagate(case, rpm, airspeed_m_s, density_kg_m3, angle_deg=angle_deg, bands=bands).points
+    if case.paired:
+        return propagate(case, rpm, airspeed_m_s, density_kg_m3, bands=bands).points
     own = any(item.key.startswith("operating.") for item in case.assumptions)
     if not bands or own or rpm.size <= FEW:
         return propagate(case, rpm, airspeed_m_s, density_kg_m3, bands=bands).points

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import os
 import re
 import tomllib
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
@@ -132,6 +133,45 @@ class Case:
             raise InputError(
                 Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
             )
+
+    @property
+    def paired(self) -> bool:
+        """Whether there is a second rotor on the axis."""
+        return self.file.second_rotor is not None
+
+    def one_rotor_only(self) -> None:
+        """Refuse a second rotor, for what knows one rotor only."""
+        if self.paired:
+            hint = "sweep and the library's solve take a pair"
+            raise InputError(Fault(self.path.as_posix(), "second_rotor", "two rotors", "one rotor here", hint))
+
+    def second(self) -> Case:
+        """Give the case of the second rotor: its blades and section tables; all else is that of the pair."""
+        second = self.file.second_rotor
+        assert second is not None  # the caller asks for a pair
+        if second.label is None and second.case is None:
+            return self.once("second", lambda: replace(self, written=_less(self.written), file=_alone(self.file)))
+
+        def other() -> Case:
+            try:
+                if second.case is not None:
+                    found = load_case(self.folder / second.case)
+                else:
+                    from bemt.case import fresh
+
+                    found = case_of(fresh.label_text(str(second.label)), self.folder)
+            except InputError as error:
+                where = "second_rotor.label" if second.case is None else "second_rotor.case"
+                raise InputError([
+                    Fault(self.path.as_posix(), where, f"{f.file}: {f.where}: {f.got}".strip(": "), f.expected, f.hint)
+                    for f in error.faults
+                ]) from error  # fmt: skip
+            if found.ducted or found.paired:
+                got = "a rotor in a duct" if found.ducted else "a pair"
+                raise InputError(Fault(self.path.as_posix(), "second_rotor", got, "one open rotor"))
+            return found
+
+        return self.once("second", other)
 
     @property
     def references_path(self) -> Path | None:
@@ -264,6 +304,8 @@ class Case:
         names += dat if isinstance(dat, tuple) else [dat]
         names += [polar.file for polar in self.file.polars]
         names += [blade.as_built.file] if blade.as_built is not None else []
+        if self.file.second_rotor is not None and self.file.second_rotor.case is not None:
+            names += [os.path.relpath(path, self.folder) for path in self.second().files()]
         runs = [p for run in self.run_paths for p in (run, *_exports(run)) if p.is_file()]
         return [self.path, *(self.folder / name for name in names if name), *runs]
 
@@ -275,6 +317,15 @@ class Case:
             data = repr(self.written).encode() if made_here else path.read_bytes()
             digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
         return digest.hexdigest()
+
+
+def _alone(file: CaseFile) -> CaseFile:
+    """A case without its second rotor."""
+    return file.model_copy(update={"second_rotor": None})
+
+
+def _less(written: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in written.items() if key != "second_rotor"}
 
 
 def _exports(run: Path) -> list[Path]:
@@ -346,6 +397,8 @@ def _checked(path: Path, document: dict[str, Any], out: Collector) -> Case:
         raise InputError(out.faults)
     case = Case(path, document, file, _assumptions(file))
     _check_build(case)
+    if case.paired:
+        case.second()
     return case
 
 

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import effects
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
+from bemt.bem.coaxial import PairModel
 from bemt.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
-from bemt.bem.model import Model
+from bemt.bem.model import Model, acts_on_points
 from bemt.case.load import Assumption
 from bemt.effects.tip_gap import GAP_LOSS, TipGap
 from bemt.rotors import k1k2
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from geometry.rotor import Rotor
 
-__all__ = ["duct_unknowns", "k1k2_case", "prepare_case"]
+__all__ = ["duct_unknowns", "k1k2_case", "prepare_case", "prepare_pair"]
 
 Array = NDArray[np.float64]
 
@@ -128,19 +129,41 @@ def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
 
 
 def prepare_case(
-    case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None, oblique: bool = False
-) -> Model:
+    case: Case, overrides: Mapping[str, Any] | None = None, n_stations: int | None = None, oblique: bool = False,
+    alone: bool = False,
+) -> Model:  # fmt: skip
     """Rotor, section tables, duct and effects of a case; InputError if the changed values make none.
 
     ``oblique`` says that the caller solves at the angle of the case. All others know axial flow only: a case with an
-    angle is refused, lest its wind is taken as axial.
+    angle is refused, lest its wind is taken as axial. ``alone`` says that the caller wants the first rotor of a pair by
+    itself; all others are refused one.
     """
     case = case.replaced(overrides)
     if not oblique:
         case.axial_only()
+    if not alone:
+        case.one_rotor_only()
     if case.file.polars or case.file.blade.as_built is not None or cache.watched():
         return _model(case, n_stations)  # of files that may have changed
     return case.once(("model", n_stations), lambda: _model(case, n_stations))
+
+
+def prepare_pair(case: Case, n_stations: int | None = None, second: Case | None = None) -> PairModel:
+    """Both rotors of a coaxial case; ``second`` replaces the case of the second one."""
+    told = case.file.second_rotor
+    assert told is not None  # the caller asks for a pair
+    lower = case.second() if second is None else second
+    first, other = (prepare_case(one, None, n_stations, oblique=True, alone=True) for one in (case, lower))
+    for one, model in ((case, first), (lower, other)):
+        around = [effect.id for effect in model.effects if acts_on_points(effect)]
+        if around:
+            got, hint = ", ".join(around), "Their law is that of one rotor"
+            raise InputError(Fault(one.path.as_posix(), "model.effects_on", got, "none of them with a pair", hint))
+    ratio = 1.0 if told.rpm_ratio is None else told.rpm_ratio
+    return PairModel(
+        first, other, told.spacing_m(case.diameter_m), told.turns == "opposite", told.wake_radius, told.interference,
+        ratio, told.rpm, told.torque_balance, told.swirl, told.mount_drag,
+    )  # fmt: skip
 
 
 def _model(case: Case, n_stations: int | None) -> Model:
@@ -162,7 +185,8 @@ def k1k2_case(
 ) -> Dataset:  # fmt: skip
     """K1/K2 at points [rev/min], [m/s], for the stated pitch, else that at 0.75 R; a duct counts its annulus only.
 
-    It knows axial flow only: NaN and flagged where the wind, at an angle [deg], is not along the shaft.
+    It knows one rotor in axial flow: NaN and flagged for a pair, and where the wind, at an angle [deg], is not along
+    the shaft.
     """
     case = case.replaced(overrides)
     pitch = case.stated_pitch_m
@@ -172,10 +196,13 @@ def k1k2_case(
     found = k1k2.estimate(case.diameter_m, pitch, rpm, airspeed_m_s, air, hub, case.ducted)
     angle = np.asarray(case.angle_deg if angle_deg is None else angle_deg, dtype=float)
     skewed = np.broadcast_to((angle != 0.0) & (np.asarray(airspeed_m_s) != 0.0), (len(found),))
+    why = "K1/K2 knows axial flow only"
+    if case.paired:
+        skewed, why = np.ones(len(found), dtype=bool), "K1/K2 knows one rotor only"
     if not np.any(skewed):
         return found
     nan = np.where(skewed, np.nan, 1.0)
     values = {key: v * nan if key in ("thrust_N", "CT") else v for key, v in found.values.items()}
-    words = (("K1/K2 knows axial flow only",) if one else () for one in skewed)
+    words = ((why,) if one else () for one in skewed)
     flags = tuple((*f, *more) for f, more in zip(found.flags, words, strict=True))
     return dataclasses.replace(found, values=values, u={"thrust_N": found.u["thrust_N"] * nan}, flags=flags)

@@ -18,7 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import air_arrays
+from bemt.base.errors import Fault, InputError
+from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.bem.model import HUB_LOADS
+from bemt.case.pair_error import PairError
 from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
@@ -38,8 +41,10 @@ Answers = Mapping[str, Array]
 Progress = Callable[[int, int, str], None]
 
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
-"""Channels that get a band."""
+"""Channels that get a band; of a coaxial pair also its `LOADS` and `RATIOS`."""
 
+_THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
+_TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
 _UNMEASURED = "oblique flow: the model's own error is that of axial flow at the speed along the shaft"
 
 
@@ -64,7 +69,7 @@ class Points:
         n, V, rho, angle = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, dtype=float)) for v in given))
         return Points(case, n.ravel(), V.ravel(), rho.ravel(), angle.ravel())
 
-    def solve(self, model: Model, changed: Case, threads: int) -> Dataset:
+    def solve(self, model: Model | PairModel, changed: Case, threads: int) -> Dataset:
         """A model of a changed case solved at the points."""
         rpm, V, air = at = self.conditions(changed)
         model = model.at_speeds(*at)
@@ -86,7 +91,9 @@ class Points:
         return rpm, V, air_arrays(airs, which.reshape(-1))
 
 
-def solve_at(model: Model, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1) -> Dataset:
+def solve_at(
+    model: Model | PairModel, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1
+) -> Dataset:
     """A model at points (P,) with their angle between wind and shaft [deg].
 
     With any angle, airspeed and J are those given, and the loads of the hub are there, 0 in axial flow.
@@ -130,7 +137,7 @@ class Propagated:
     nominal: Answers  # The banded channels of the points
     moved: tuple[Moved, ...]
     refined: Answers | None  # With twice the blade elements
-    model: Model  # The rotor of the case, prepared
+    model: Model | PairModel  # The rotor of the case, prepared, or both of a pair
     model95: Answers  # 95 % half widths from the model's own error
 
     def half_width95(self, channel: str) -> Array:
@@ -155,9 +162,10 @@ class Propagated:
             other = answer(self.refined)
             for key, v in values.items():
                 squares["numerics"][key] += (np.asarray(other[key]) - v) ** 2
-        for together in (("thrust_N", "CT"), ("torque_Nm", "power_W", "CP")) if "model" in squares else ():
+        for together in (_THRUSTS, _TORQUES) if "model" in squares else ():
             u = self.points.u_by["model"]
-            ends = [answer(nominal | {k: nominal[k] + sign * u[k] for k in together}) for sign in (-1.0, 1.0)]
+            ends = [answer(nominal | {k: nominal[k] + sign * u[k] for k in together if k in nominal})
+                    for sign in (-1.0, 1.0)]  # fmt: skip
             for key in values:
                 squares["model"][key] += (0.5 * (np.asarray(ends[1][key]) - np.asarray(ends[0][key]))) ** 2
         return values, {origin: {k: np.sqrt(v) for k, v in part.items()} for origin, part in squares.items()}
@@ -191,6 +199,22 @@ def vary(
     return tuple(out)
 
 
+def prepared(case: Case, stations: int | None = None, second: Case | None = None) -> Model | PairModel:
+    """Model of a case: of its rotor, or of both of a coaxial pair; ``second`` replaces the case of the second one."""
+    from bemt.case.prepare import prepare_case, prepare_pair
+
+    return prepare_pair(case, stations, second) if case.paired else prepare_case(case, None, stations, oblique=True)
+
+
+def _unknowns_of_second(case: Case) -> tuple[Assumption, ...]:
+    """What is not known of the blades of a second rotor that has a case of its own."""
+    told = case.file.second_rotor
+    if told is None or (told.label is None and told.case is None):
+        return ()
+    shared = ("air.", "operating.", "drive.")
+    return tuple(item for item in case.second().assumptions if not item.key.startswith(shared))
+
+
 def propagate(
     case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike | None = None,
@@ -204,17 +228,23 @@ def propagate(
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
-    from bemt.case.prepare import duct_unknowns, prepare_case
+    from bemt.case.prepare import duct_unknowns
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3, angle_deg)
+    if case.paired and np.any(points.angle_deg != 0.0):
+        got, expected = f"{np.max(points.angle_deg):g} deg on a coaxial pair", "0 deg: it is solved in axial flow only"
+        raise InputError(Fault(case.path.as_posix(), "angle_deg", got, expected))
     # the motor's unknowns move no load at a given speed
     own = (*(item for item in case.assumptions if not item.key.startswith("drive.")), *duct_unknowns(case))
     declared = own if unknowns is None else tuple(unknowns)
-    steps, done = 3 + sum(len(item.values) for item in declared), 0
+    of_second = _unknowns_of_second(case) if unknowns is None else ()
+    steps, done = 3 + sum(len(item.values) for item in (*declared, *of_second)), 0
 
-    def solved(changed: Case, what: str, stations: int | None = None) -> tuple[Model, Dataset]:
+    def solved(
+        changed: Case, what: str, stations: int | None = None, second: Case | None = None
+    ) -> tuple[Model | PairModel, Dataset]:
         nonlocal done
-        model = prepare_case(changed, None, stations, oblique=True).at_speeds(*points.conditions(changed))
+        model = prepared(changed, stations, second).at_speeds(*points.conditions(changed))
         found = points.solve(model, changed, threads)
         done += 1
         if progress is not None:
@@ -222,14 +252,19 @@ def propagate(
         return model, found
 
     def channels(found: Dataset) -> dict[str, Array]:
-        return {key: np.asarray(found[key], dtype=float) for key in BANDED}
+        keys = (*BANDED, *LOADS, *RATIOS) if case.paired else BANDED
+        return {key: np.asarray(found[key], dtype=float) for key in keys}
 
     model, found = solved(case, "nominal")
     beside, skewed = found, (points.angle_deg != 0.0) & (points.airspeed_m_s != 0.0)
     if np.any(skewed):  # axial flow at the speed along the shaft
         at = points.conditions(case)
         beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
-    factor, words = validity_of(case, beside.J, beside.Re75, beside.M_tip)
+    if isinstance(model, PairModel):
+        error = PairError.of(case, model, found, points.conditions(case)[2])
+        words = error.words
+    else:
+        factor, words = validity_of(case, beside.J, beside.Re75, beside.M_tip)
     turned = (((_UNMEASURED,) if one else ()) for one in skewed)
     flags = tuple((*a, *b, *c) for a, b, c in zip(found.flags, words, turned, strict=True))
     nominal = channels(found)
@@ -238,8 +273,14 @@ def propagate(
         return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
-    widths = _model_error(case, model, beside, points.conditions(case)[2])
-    narrow, wide = (_loads(found, model.diameter_m, factor * u) for u in widths)
+    if of_second:
+        moved += vary(case.second(), nominal, lambda changed, what: channels(solved(case, what, None, changed)[1]),
+                      of_second)  # fmt: skip
+    if isinstance(model, PairModel):
+        narrow, wide = error.widths()
+    else:
+        widths = model_error(case, model, beside, points.conditions(case)[2])
+        narrow, wide = (loads_of(found, model.diameter_m, factor * u) for u in widths)
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
@@ -252,7 +293,7 @@ def propagate(
     return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
 
 
-def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
+def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
     """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
     What the population expects beside the nominal result counts too, as a root sum of squares.
@@ -271,7 +312,9 @@ def _zero_thrust_J(case: Case) -> float:
     def find() -> float:
         from bemt.case.prepare import prepare_case
 
-        return zero_thrust(coefficients(prepare_case(case, oblique=True), case.air()), case.as_built().drawn, case.rpm)
+        return zero_thrust(
+            coefficients(prepare_case(case, oblique=True, alone=True), case.air()), case.as_built().drawn, case.rpm
+        )
 
     return case.kept("J of zero thrust", find)
 
@@ -291,7 +334,7 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
-def _loads(points: Dataset, D: float, u: Array) -> dict[str, Array]:
+def loads_of(points: Dataset, D: float, u: Array) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's

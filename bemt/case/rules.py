@@ -40,7 +40,7 @@ def check_case(out: Collector, document: Mapping[str, Any], folder: Path) -> Cas
 
 def check_shape(out: Collector, case: CaseFile) -> None:
     """Check what joins the sizes of rotor, blade and duct."""
-    for rule in (_check_rotor, _check_pitch, _check_duct):
+    for rule in (_check_rotor, _check_pitch, _check_duct, _check_pair):
         rule(out, case)
 
 
@@ -238,6 +238,28 @@ def _check_duct(out: Collector, case: CaseFile) -> None:
             out.add(f"duct.{key}", shown(value), f"at most length_mm, {duct.length_mm:g}")
 
 
+def _check_pair(out: Collector, case: CaseFile) -> None:
+    second = case.second_rotor
+    if second is None:
+        return
+    if case.duct is not None:
+        out.add("second_rotor", "a second rotor with a duct", "two open rotors")
+    if case.drive is not None:
+        out.add("second_rotor", "a second rotor with [drive]", "one of them", "A drive turns one rotor")
+    angles = [case.operating.angle_deg, *case.sweep.axes().get("angle_deg", ())]
+    if any(angles):
+        where = "operating.angle_deg" if angles[0] else "sweep.angle_deg"
+        out.add(where, f"{max(angles):g} deg on a coaxial pair", "0 deg", "A pair is solved in axial flow only")
+    speeds = [case.operating.airspeed_m_s, *case.sweep.axes().get("airspeed_m_s", ())]
+    if min(speeds) < 0.0:
+        where = "operating.airspeed_m_s" if speeds[0] < 0.0 else "sweep.airspeed_m_s"
+        got = f"{min(speeds):g} m/s on a coaxial pair"
+        out.add(where, got, "0 m/s or more", "The wake of the first rotor has to reach the second")
+    whole = second.spacing_m(case.rotor.diameter_m) / case.rotor.diameter_m
+    if second.spacing_mm is not None and whole > 20.0:
+        out.add("second_rotor.spacing_mm", shown(second.spacing_mm), "at most 20 diameters of the first rotor")
+
+
 def _check_sweep(out: Collector, case: CaseFile) -> None:
     sweep = case.sweep.axes()
     if "density_kg_m3" in sweep and ("altitude_m" in sweep or "temperature_C" in sweep):
@@ -254,6 +276,8 @@ def _check_sweep(out: Collector, case: CaseFile) -> None:
         out.add("sweep.pitch_in", "an axis", "nothing, because the blade comes from stations")
     if "tip_gap_mm" in sweep and case.duct is None:
         out.add("sweep.tip_gap_mm", "an axis", "nothing, because there is no duct")
+    if "z_over_D" in sweep and case.second_rotor is None:
+        out.add("sweep.z_over_D", "an axis", "nothing, because there is no second rotor")
     points = math.prod(axis.size for axis in sweep.values())
     if points > MAX_GRID:
         out.add("sweep", f"a grid of {points} points", f"{MAX_GRID} points or fewer", "Take fewer values")

@@ -18,6 +18,7 @@ from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, sh
 from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "OperatingTable",
     "PolarTable",
     "RotorTable",
+    "SecondRotorTable",
     "SectionTable",
     "StatorTable",
     "SweepTable",
@@ -238,6 +240,53 @@ class DuctTable(Table):
         return _metres_of(self.inner_diameter_in, self.inner_diameter_mm)
 
 
+class SecondRotorTable(Table):
+    """[second_rotor]: a rotor downstream on the same axis, solved together with the first; both are open.
+
+    Its blades are those of the first unless label or case says otherwise.
+    """
+
+    label: str | None = entry("label of another propeller, such as 10x5")
+    case: str | None = entry("case file of another propeller, or its folder")
+    spacing_mm: float | None = entry("distance of the two disks", "mm", 0, 20_000, _metres("spacing_mm", 0.999))
+    z_over_D: float | None = entry("distance of the two disks over the diameter of the first", "", 0, 20)
+    turns: Literal["opposite", "same"] = entry("sense of rotation against that of the first", default="opposite")
+    rpm_ratio: float | None = entry("its speed over that of the first; 1 if no speed is given", "", 0.1, 10)
+    rpm: float | None = entry("its speed, whatever that of the first", RPM)
+    torque_balance: bool = entry("let it turn at the speed at which both torques are equal", default=False)
+    wake_radius: float = entry(
+        "radius of the developed wake of the first rotor in hover over its own", "", 0.7071, 1, default=WAKE_RADIUS
+    )
+    interference: float = entry("factor on what the rotors induce at each other", "", 0, 2, default=1.0)
+    swirl: float = entry(
+        "share of the first rotor's swirl that reaches it", "", 0, 1, _percent("swirl", 1.5), default=SWIRL
+    )
+
+    mount_drag: float = entry(
+        "drag of what carries it in the wake of the first rotor, over the thrust of that one",
+        "",
+        0,
+        0.5,
+        default=MOUNT_DRAG,
+    )
+
+    def spacing_m(self, diameter_m: float) -> float:
+        """Distance of the disks, for the diameter of the first rotor [m]. [m]"""
+        return 1e-3 * self.spacing_mm if self.spacing_mm is not None else (self.z_over_D or 0.0) * diameter_m
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One geometry, one speed; balanced torques need opposite senses."""
+        if self.label is not None and self.case is not None:
+            yield "label", "a label and a case", "one of them"
+        speeds = [k for k in ("rpm_ratio", "rpm") if getattr(self, k) is not None] + ["torque_balance"] * (
+            self.torque_balance
+        )
+        if len(speeds) > 1:
+            yield speeds[0], " and ".join(speeds), "only one of rpm_ratio, rpm, torque_balance"
+        if self.torque_balance and self.turns == "same":
+            yield "torque_balance", "true for rotors that turn alike", 'false, or turns = "opposite"'
+
+
 class OperatingTable(Table):
     """[operating]: operating point of the case."""
 
@@ -296,6 +345,7 @@ class SweepTable(Table):
     pitch_in: Axis = entry("pitches", _PITCH_IN)
     diameter_in: Axis = entry("diameters", _DIAMETER_IN)
     tip_gap_mm: Axis = entry("tip gaps", _GAP)
+    z_over_D: Axis = entry("distances of a second rotor over the diameter", Limits("", 0, 20))
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
         """Axes: name (with its unit) to values, (N,)."""
@@ -336,6 +386,7 @@ class CaseFile(Table):
     duct: DuctTable | None = None
     operating: OperatingTable
     air: AirTable
+    second_rotor: SecondRotorTable | None = None
     drive: DriveTable | None = None
     model: ModelTable = ModelTable()
     sweep: SweepTable = SweepTable()
@@ -353,6 +404,7 @@ AXES = {
     "pitch_in": "blade.pitch_in",
     "diameter_in": "rotor.diameter_in",
     "tip_gap_mm": "duct.tip_gap_mm",
+    "z_over_D": "second_rotor.z_over_D",
 }
 """Sweep axis to the dotted key that it changes."""
 
@@ -364,6 +416,7 @@ GROUPS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     ("blade.section", ("naca", "dat", "thickness"), True),
     ("duct", ("tip_gap_mm", "inner_diameter_mm", "inner_diameter_in"), True),
     ("duct", ("exit_area_ratio", "exit_diameter_mm"), True),
+    ("second_rotor", ("spacing_mm", "z_over_D"), True),
     ("air", ("density_kg_m3", "altitude_m", "pressure_hPa", "fluid"), True),
 )
 """(table, keys, required): at most one of the keys may be given, exactly one when required."""

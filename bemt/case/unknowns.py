@@ -11,6 +11,7 @@ from typing import Any
 from bemt.base.units import INCH
 from bemt.rotors.population import chord_sd, population
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 
 __all__ = [
     "AIR",
@@ -96,6 +97,36 @@ DRIVE = (
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
     ),
 )
+PAIR = (
+    Unknown(
+        "second_rotor.wake_radius",
+        WAKE_RADIUS,
+        0.7071,
+        0.85,
+        "wake not measured; 0.707 by momentum theory, 0.78 to 0.82 measured",
+    ),
+    Unknown(
+        "second_rotor.interference",
+        1.0,
+        0.8,
+        1.2,
+        "declared; blades that pass each other and mixing with the air outside are not modelled",
+    ),
+    Unknown(
+        "second_rotor.swirl",
+        SWIRL,
+        0.0,
+        1.0,
+        "not known; 1 without anything between the rotors, less behind motors and arms, which straighten the flow",
+    ),
+    Unknown(
+        "second_rotor.mount_drag",
+        MOUNT_DRAG,
+        0.0,
+        0.06,
+        "declared; motor and arm cover 2 to 6 % of the disk. A stand reads it while the first rotor turns alone",
+    ),
+)
 _STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
            "drive.motor.idle_share": "no_load_A"}  # fmt: skip
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
@@ -161,6 +192,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
             unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
         unknowns.append(AIR)
+    if isinstance(made.get("second_rotor"), dict):
+        unknowns += PAIR
     if isinstance(made.get("drive"), dict):
         unknowns += [item for item in DRIVE if not _drive_states(made["drive"], item.key)]
     if not isinstance(declared, list):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.effects.base import Array, Effect, Flow, Parameter, choice
+from bemt.vortex_cylinder import on_axis
 
 _SIDES = ("upstream", "downstream")
 
@@ -63,7 +64,7 @@ class CoaxialNeighbour(Effect):
         >>> CoaxialNeighbour("downstream", 1e9).mean(), round(CoaxialNeighbour("downstream", 1e-9).mean(), 3)
         (0.0, 1.0)
         """
-        s = self.z_over_R / np.sqrt(1.0 + self.z_over_R**2)
+        s = on_axis(self.z_over_R)
         if self.side == "downstream":
             return float(1.0 - s)
         # speed (1 + s) v inside the radius a R of the wake, weighted by r^2: (1 + s) a^3 = a

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["exports", "target_ids"]
 
-_SHARED = {"base", "blades", "folder", "parts", "performance"}
+_SHARED = {"base", "blades", "folder", "hub", "parts", "performance"}
 """Files of this folder that are no targets."""
 
 

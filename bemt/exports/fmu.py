@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import plain_name, run_module, table_document, table_module
+from bemt.exports.parts import plain_name, run_hub, run_module, table_document, table_module
 
 Array = NDArray[np.float64]
 
@@ -25,28 +25,32 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 UNITS = {{
     "rpm": ("rev/min", {{"s": "-1", "rad": "1", "factor": "0.10471975511965977"}}, "speed of rotation"),
     "airspeed_m_s": ("m/s", {{"m": "1", "s": "-1"}}, "axial speed through the air, along the thrust"),
+    "velocity_x_m_s": ("m/s", {{"m": "1", "s": "-1"}}, "velocity through the air across the shaft, x; z is the thrust"),
+    "velocity_y_m_s": ("m/s", {{"m": "1", "s": "-1"}}, "velocity through the air across the shaft, y"),
     "density_kg_m3": ("kg/m3", {{"kg": "1", "m": "-3"}}, "air density"),
     "thrust_N": ("N", {{"kg": "1", "m": "1", "s": "-2"}}, "thrust"),
     "torque_Nm": ("N.m", {{"kg": "1", "m": "2", "s": "-2"}}, "shaft torque; the vehicle gets -sense of it"),
+    "force_x_N": ("N", {{"kg": "1", "m": "1", "s": "-2"}}, "force on the vehicle across the shaft, x"),
+    "force_y_N": ("N", {{"kg": "1", "m": "1", "s": "-2"}}, "force on the vehicle across the shaft, y"),
+    "moment_x_Nm": ("N.m", {{"kg": "1", "m": "2", "s": "-2"}}, "moment of the hub on the vehicle about x"),
+    "moment_y_Nm": ("N.m", {{"kg": "1", "m": "2", "s": "-2"}}, "moment of the hub on the vehicle about y"),
 }}
+INPUTS = ("rpm", "airspeed_m_s", "velocity_x_m_s", "velocity_y_m_s", "density_kg_m3")
 
 
 class {name}(Fmi2Slave):
-    """Inputs rpm, airspeed, density; outputs thrust, torque."""
+    """Inputs rpm, velocity through the air, density; outputs thrust, torque, force and moment across the shaft."""
 
     author = "bemt"
     description = "propeller table, {rotation}"
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        self.rpm = 0.0
-        self.airspeed_m_s = 0.0
-        self.density_kg_m3 = DENSITY
-        self.thrust_N = 0.0
-        self.torque_Nm = 0.0
+        for word in UNITS:
+            setattr(self, word, DENSITY if word == "density_kg_m3" else 0.0)
         self.sense = SENSE
         for word, (_, _, what) in UNITS.items():
-            kind = Fmi2Causality.output if word in ("thrust_N", "torque_Nm") else Fmi2Causality.input
+            kind = Fmi2Causality.input if word in INPUTS else Fmi2Causality.output
             self.register_variable(
                 Real(word, causality=kind, variability=Fmi2Variability.continuous, description=what))
         self.register_variable(Integer("sense", causality=Fmi2Causality.output, variability=Fmi2Variability.constant,
@@ -73,7 +77,11 @@ class {name}(Fmi2Slave):
         self.do_step(0.0, 0.0)
 
     def do_step(self, current_time, step_size):
-        self.thrust_N, self.torque_Nm = loads(self.rpm, self.airspeed_m_s, self.density_kg_m3)
+        velocity = self.velocity_x_m_s, self.velocity_y_m_s, self.airspeed_m_s
+        force, moment = wrench(self.rpm, velocity, self.density_kg_m3)
+        self.force_x_N, self.force_y_N, self.thrust_N = force
+        self.moment_x_Nm, self.moment_y_Nm = moment[:2]
+        self.torque_Nm = -SENSE * moment[2]
         return True
 '''
 
@@ -83,10 +91,11 @@ class FmuExport(LoadsExport):
 
     id = "fmu"
     title = "FMU, FMI 2.0 co-simulation"
-    holds = "table CT(J, rpm), CP(J, rpm) in Python; density is an input"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
+    holds = "tables CT(J, rpm), CP(J, rpm) and of the hub over J along and across the shaft in Python; density an input"
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     conventions = (
-        "inputs rpm [rev/min], airspeed_m_s, density_kg_m3; outputs thrust_N, torque_Nm, sense; loads follow each step"
+        "inputs rpm [rev/min], airspeed_m_s (z, along the thrust), velocity_x_m_s, velocity_y_m_s, density_kg_m3; "
+        "outputs thrust_N, torque_Nm, force_x_N, force_y_N, moment_x_Nm, moment_y_Nm, sense; loads follow each step"
     )
     source = "pythonfmu 0.7; the machine that runs the FMU needs Python with pythonfmu"
     needs = ("pythonfmu",)
@@ -117,3 +126,8 @@ class FmuExport(LoadsExport):
         """The lookup in the unit's source."""
         text = str(next(t for n, t in files.items() if n.endswith("_fmu.py")))
         return run_module(text.split("\nfrom xml")[0], rpm, airspeed_m_s)
+
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """The lookup in the unit's source."""
+        text = str(next(t for n, t in files.items() if n.endswith("_fmu.py")))
+        return run_hub(text.split("\nfrom xml")[0], rpm, airspeed_m_s, side_m_s)

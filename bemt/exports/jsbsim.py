@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, inertia_estimate, plain_name
+from bemt.exports.hub import COEFFICIENTS, hub_loads
+from bemt.exports.parts import header, inertia_estimate, plain_name, still_hub
 from bemt.exports.performance import table_loads
 
 Array = NDArray[np.float64]
@@ -21,14 +23,21 @@ class JsbsimExport(LoadsExport):
 
     id = "jsbsim"
     title = "JSBSim propeller with a stand"
-    holds = "tables CT(J, rpm), CP(J, rpm), linear, held at the ends; density of the simulation"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation"})
+    holds = (
+        "tables CT(J, rpm), CP(J, rpm), and of the hub over J along and across the shaft as external reactions, "
+        "linear, held at the ends; density of the simulation"
+    )
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation", "hub"})
     conventions = (
         "C_THRUST = T/(rho n^2 D^4), C_POWER = P/(rho n^3 D^5), J = V/(n D); sense in the thruster of "
         "the aircraft, +1 clockwise seen from behind; "
-        "the column of a table is rpm/1000, passed on as blade-angle by the system file"
+        "the column of a table is rpm/1000, passed on as blade-angle by the system file; what a wind across the shaft "
+        "adds acts as external reactions in BODY axes, thrust along x"
     )
-    source = "JSBSim 1.3 FGPropeller.cpp: GetThrust, GetPowerRequired; blade-angle is free with constspeed 0"
+    source = (
+        "JSBSim 1.3 FGPropeller.cpp: GetThrust, GetPowerRequired; blade-angle is free with constspeed 0; "
+        "FGExternalReactions.h: force and moment with a function"
+    )
 
     def write(self, job: Job) -> Files:
         """Root folder of JSBSim."""
@@ -74,6 +83,7 @@ class JsbsimExport(LoadsExport):
    <output>propulsion/engine[0]/blade-angle</output>
   </fcs_function>
  </channel>
+{_hub_channel(job, name)}
 </system>
 """
         return {
@@ -91,6 +101,9 @@ class JsbsimExport(LoadsExport):
             "the system file serves engine 0; repeat it for others",
             "sense stands in the thruster element of the aircraft file, where JSBSim reads it: take it into yours",
             "a stopped propeller (0 rev/min) has neither thrust nor drag in JSBSim",
+            "the external reactions of the aircraft file carry what a wind across the shaft adds: take them into "
+            "yours, with the location of the propeller; its shaft along body x; the shaft power stays that of axial "
+            "flow",
             "tip Mach number changes with speed at the air of the table only",
         ]
 
@@ -108,6 +121,114 @@ class JsbsimExport(LoadsExport):
         rho = float(text.split("density ")[1].split()[0])
         D = float(root.findtext("diameter") or "nan")
         return table_loads(speeds, J, CT, tables["C_POWER"][2], rho, D, rpm, airspeed_m_s)
+
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """Tables of the propeller and the system file, at the density that the head states."""
+        text = str(next(t for name, t in files.items() if name.endswith("_propeller.xml")))
+        rho, D = float(text.split("density ")[1].split()[0]), float(ET.fromstring(text).findtext("diameter") or "nan")
+        root = ET.fromstring(str(next(t for name, t in files.items() if name.endswith("_speed.xml"))))
+        doc: dict[str, Any] = {}
+        for node in root.iter("table"):
+            blocks = node.findall("tableData")
+            rows = [[line.split() for line in (b.text or "").strip().splitlines()] for b in blocks]
+            doc["rpm"] = [1000.0 * float(b.get("breakPoint") or "nan") for b in blocks]
+            doc["J_side"] = [float(v) for v in rows[0][0]]
+            doc["J_axial"] = [float(line[0]) for line in rows[0][1:]]
+            doc[str(node.get("name"))] = [[[float(v) for v in line[1:]] for line in block[1:]] for block in rows]
+        found = hub_loads(doc, rho, D, rpm, airspeed_m_s, side_m_s)
+        found[:2] += self.loads(files, rpm, airspeed_m_s)
+        return found
+
+
+_LBS, _LBSFT, _FT, _SLUGS = 4.4482216152605, 1.3558179483314, 0.3048, 515.378818  # N, N m, m, kg/m3 in one of them
+_AXES = (("x", 0), ("y", 1), ("z", 2))
+
+
+def _hub_channel(job: Job, name: str) -> str:
+    """Channel of the system file: what a wind across the shaft adds, in BODY axes, thrust along x."""
+    t, hub = job.performance, job.hub or still_hub()
+
+    def function(word: str, body: str) -> str:
+        return f'  <fcs_function name="fcs/{name}-{word}"><function>\n{body}\n  </function></fcs_function>'
+
+    def of(word: str) -> str:
+        return f"<property>fcs/{name}-{word}</property>"
+
+    def value(number: float) -> str:
+        return f"<value>{number:.12g}</value>"
+
+    def product(*parts: str) -> str:
+        return f"<product>{''.join(parts)}</product>"
+
+    def total(*parts: str) -> str:
+        return f"<sum>{''.join(parts)}</sum>"
+
+    def table(word: str, values: Array) -> str:
+        blocks = []
+        for n, plane in zip(hub.rpm, values, strict=True):
+            rows = "\n".join(
+                f"{j:.10g} " + " ".join(f"{v:.10g}" for v in row) for j, row in zip(hub.J, plane, strict=True)
+            )
+            head = " ".join(f"{v:.10g}" for v in hub.side)
+            blocks.append(f'<tableData breakPoint="{n / 1000.0:.9g}">\n{head}\n{rows}\n</tableData>')
+        keys = "".join(
+            f'<independentVar lookup="{lookup}">fcs/{name}-{key}</independentVar>'
+            for lookup, key in (("row", "J-axial"), ("column", "J-side"), ("table", "krpm"))
+        )
+        return f'<table name="{word}">{keys}\n' + "\n".join(blocks) + "\n</table>"
+
+    u, v, w = (f"<property>velocities/{axis}-aero-fps</property>" for axis in "uvw")
+    rev = f"<max>{of('krpm')}{value(1e-6)}</max>"
+    per_speed = _FT * 60.0 / (1000.0 * t.diameter_m)  # advance ratio of 1 ft/s at 1000 rev/min
+    rho = "<property>atmosphere/rho-slugs_ft3</property>"
+    force = _SLUGS * (1000.0 / 60.0) ** 2 * t.diameter_m**4 / _LBS
+    across = f"<sqrt>{total(product(v, v), product(w, w))}</sqrt>"
+    parts = [
+        function("J-axial", f"<quotient>{product(value(per_speed), u)}{rev}</quotient>"),
+        function("side-fps", across),
+        function("J-side", f"<quotient>{product(value(per_speed), of('side-fps'))}{rev}</quotient>"),
+        *(function(f"u{axis}", f"<quotient>{speed}<max>{of('side-fps')}{value(1e-9)}</max></quotient>")
+          for axis, speed in (("y", v), ("z", w))),
+        function("force-scale", product(value(force), rho, of("krpm"), of("krpm"))),
+        *(function(word, table(word, values)) for word, values in zip(COEFFICIENTS, hub.values, strict=True)),
+    ]  # fmt: skip
+    D, s = t.diameter_m * _LBS / _LBSFT, float(t.sense)
+    uy, uz = of("uy"), of("uz")
+    minus = value(-1.0)
+    forces = {
+        "x": of("dCT"),
+        "y": total(product(minus, of("CH"), uy), product(value(s), of("CY"), uz)),
+        "z": total(product(minus, of("CH"), uz), product(value(-s), of("CY"), uy)),
+    }
+    moments = {
+        "x": product(value(-s / (2.0 * np.pi)), of("dCP")),
+        "y": total(product(value(-s), of("CMroll"), uy), product(of("CMpitch"), uz)),
+        "z": total(product(value(-s), of("CMroll"), uz), product(minus, of("CMpitch"), uy)),
+    }
+    parts += [function(f"force-{axis}-lbs", product(of("force-scale"), body)) for axis, body in forces.items()]
+    parts += [
+        function(f"moment-{axis}-lbsft", product(value(D), of("force-scale"), body)) for axis, body in moments.items()
+    ]
+    body = "\n".join(parts)
+    return f' <channel name="Loads of the hub with a wind across the shaft">\n{body}\n </channel>'
+
+
+def _reactions(name: str) -> str:
+    """External reactions of the aircraft file, which read the channel."""
+    out = []
+    for axis, i in _AXES:
+        way = " ".join(f"<{a}> {int(k == i)} </{a}>" for a, k in _AXES)
+        out.append(
+            f'  <force name="{name}-hub-force-{axis}" frame="BODY">\n   <function><property>fcs/{name}-force-{axis}-lbs'
+            "</property></function>\n"
+            '   <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>\n'
+            f"   <direction> {way} </direction>\n  </force>"
+        )
+        out.append(
+            f'  <moment name="{name}-hub-moment-{axis}" frame="BODY">\n   <function><property>'
+            f"fcs/{name}-moment-{axis}-lbsft</property></function>\n   <direction> {way} </direction>\n  </moment>"
+        )
+    return "\n".join(out)
 
 
 def _stand(name: str, sense: int) -> str:
@@ -135,6 +256,9 @@ def _stand(name: str, sense: int) -> str:
   </engine>
  </propulsion>
  <system file="{name}_speed"/>
+ <external_reactions>
+{_reactions(name)}
+ </external_reactions>
  <flight_control name="stand"/>
  <aerodynamics/>
 </fdm_config>

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name, run_module, table_module
+from bemt.exports.parts import header, plain_name, run_hub, run_module, table_module
 
 Array = NDArray[np.float64]
 
 _CALLBACK = '''
 
 class Propeller:
-    """Sets the two actuators of one propeller from its speed; call it before every mj_step.
+    """Sets the six actuators of one propeller from its speed; call it before every mj_step.
 
     The site's z axis points along the thrust. `rpm` is set by whoever models the motor.
     """
@@ -23,42 +23,43 @@ class Propeller:
 
         self._mujoco = mujoco
         self.site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, prefix + "_site")
-        self.thrust = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + "_thrust")
-        self.torque = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, prefix + "_torque")
-        if min(self.site, self.thrust, self.torque) < 0:
-            raise ValueError(f"the model has no site and actuators of {{prefix}}")
+        words = ("force_x", "force_y", "thrust", "moment_x", "moment_y", "torque")
+        self.actuators = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, f"{{prefix}}_{{w}}") for w in words]
+        if min(self.site, *self.actuators) < 0:
+            raise ValueError(f"the model has no site and six actuators of {{prefix}}")
         self.density = (model.opt.density or DENSITY) if density_kg_m3 is None else density_kg_m3
-        self.sense = SENSE
+        self.sense = SENSE  # -1 for the mirror image of a right-handed propeller
         self.rpm = 0.0
 
-    def airspeed(self, model, data):
-        """Axial speed through the air along the thrust [m/s]; model.opt.wind is taken off."""
+    def velocity(self, model, data):
+        """Velocity of the site through the air in its own axes, z along the thrust [m/s]; less model.opt.wind."""
         import numpy
 
         velocity = numpy.zeros(6)
         self._mujoco.mj_objectVelocity(model, data, self._mujoco.mjtObj.mjOBJ_SITE, self.site, velocity, 1)
-        axis = data.site_xmat[self.site].reshape(3, 3)[:, 2]
-        return float(velocity[5] - axis @ model.opt.wind)
+        return velocity[3:] - data.site_xmat[self.site].reshape(3, 3).T @ model.opt.wind
 
     def __call__(self, model, data):
-        """Thrust [N] and torque [N m] now; both are written to data.ctrl."""
-        T, Q = loads(self.rpm, self.airspeed(model, data), self.density)
-        data.ctrl[self.thrust] = T
-        data.ctrl[self.torque] = -self.sense * Q
-        return T, Q
+        """Force [N] and moment [N m] in the axes of the site now; both are written to data.ctrl."""
+        force, moment = wrench(self.rpm, self.velocity(model, data), self.density, self.sense)
+        data.ctrl[self.actuators] = (*force, *moment)
+        return force, moment
 '''
 
 
 class MujocoExport(LoadsExport):
-    """MJCF of one propeller and the Python file that looks its table up."""
+    """MJCF of one propeller and the Python file that looks its tables up."""
 
     id = "mujoco"
     title = "MuJoCo site, actuators and table"
-    holds = "table CT(J, rpm), CP(J, rpm) by a Python call before each step; density of the simulation"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation"})
+    holds = (
+        "tables CT(J, rpm), CP(J, rpm) and of the hub over J along and across the shaft, by a Python call before each "
+        "step; density of the simulation"
+    )
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "rotation", "hub"})
     conventions = (
-        "force along +z of the site, reaction torque -sense Q about it; gear 1, so data.ctrl is in N and N m; a plain "
-        "site motor with a torque gear would hold Q proportional to T only"
+        "thrust along +z of the site, reaction torque -sense Q about it, forces and moments of the hub along its x and "
+        "y; gear 1, so data.ctrl is in N and N m; a plain site motor with a torque gear would hold Q proportional to T"
     )
     source = "MuJoCo documentation, XML reference: actuator/general with site transmission, gear"
 
@@ -66,7 +67,15 @@ class MujocoExport(LoadsExport):
         """MJCF and callback."""
         name = plain_name(job.case.name)
         t = job.performance
-        top_T, top_Q = 2.0 * float(np.abs(t.thrust_N).max()), 2.0 * float(np.abs(t.torque_Nm).max())
+        top_T = 4.0 * float(np.abs(t.thrust_N).max())
+        top_Q = max(4.0 * float(np.abs(t.torque_Nm).max()), 0.5 * t.diameter_m * top_T)
+        axes = np.eye(6, dtype=int)
+        words = ("force_x", "force_y", "thrust", "moment_x", "moment_y", "torque")
+        actuators = "\n".join(
+            f'  <general name="{name}_{word}" site="{name}_site" gear="{" ".join(map(str, axis))}" ctrllimited="true"\n'
+            f'   ctrlrange="{-top:.9g} {top:.9g}"/>'
+            for word, axis, top in zip(words, axes, [top_T] * 3 + [top_Q] * 3, strict=True)
+        )
         comment = "\n".join(f"<!-- {line.replace('--', '-')} -->" for line in header(job, "MuJoCo propeller"))
         mjcf = f"""<mujoco model="{name}">
 {comment}
@@ -80,10 +89,7 @@ class MujocoExport(LoadsExport):
   </body>
  </worldbody>
  <actuator>
-  <general name="{name}_thrust" site="{name}_site" gear="0 0 1 0 0 0" ctrllimited="true"
-   ctrlrange="{-top_T:.9g} {top_T:.9g}"/>
-  <general name="{name}_torque" site="{name}_site" gear="0 0 0 0 0 1" ctrllimited="true"
-   ctrlrange="{-top_Q:.9g} {top_Q:.9g}"/>
+{actuators}
  </actuator>
 </mujoco>
 """
@@ -101,3 +107,7 @@ class MujocoExport(LoadsExport):
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The written Python, run."""
         return run_module(str(next(t for n, t in files.items() if n.endswith("_mujoco.py"))), rpm, airspeed_m_s)
+
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """The written Python, run."""
+        return run_hub(str(next(t for n, t in files.items() if n.endswith("_mujoco.py"))), rpm, airspeed_m_s, side_m_s)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document, hub_loads
 from bemt.exports.performance import Performance, table_loads
 
 if TYPE_CHECKING:
@@ -50,6 +51,22 @@ def static_fit(table: Performance) -> tuple[float, float]:
     W = table.rpm * np.pi / 30.0
     T, Q = table.thrust_N[:, table.at_rest], table.torque_Nm[:, table.at_rest]
     return tuple(float(np.sum(W**2 / y) / np.sum((W**2 / y) ** 2)) for y in (T, Q))  # type: ignore[return-value]
+
+
+def edgewise(job: Job) -> tuple[Array, Array, Array]:
+    """Speed [rev/min], airspeed across the shaft [m/s] and loads (6, P) where models of few numbers are fitted."""
+    t, hub = job.performance, job.hub
+    assert hub is not None  # an open rotor
+    rpm, share = (v.ravel() for v in np.meshgrid(t.rpm[t.rpm >= 0.5 * t.rpm[-1]], np.linspace(0.1, 1.0, 10)))
+    V = share * np.interp(rpm, t.rpm, t.J_zero) * rpm / 60.0 * t.diameter_m
+    loads = hub_loads(hub_document(hub), t.rho, t.diameter_m, rpm, 0.0 * V, V)
+    loads[:2] += t.lookup(rpm, 0.0 * V)
+    return rpm, V, loads
+
+
+def slope(x: Array, y: Array) -> float:
+    """K of y = k x by least squares."""
+    return float(np.sum(x * y) / np.sum(x * x))
 
 
 def table_document(job: Job) -> dict[str, Any]:
@@ -98,9 +115,16 @@ def _cell(axis, x):
 """Python that looks the table up, for files that go to other programs: standard library only."""
 
 
+def still_hub() -> HubTable:
+    """Hub table of a rotor without loads across the shaft."""
+    two = np.array([0.0, 1.0])
+    return HubTable(two, two, two, np.zeros((6, 2, 2, 2)))
+
+
 def table_module(job: Job, title: str) -> str:
-    """Python text of the table and its lookup."""
+    """Python text of the tables, axial and of the hub, and their lookup."""
     doc = table_document(job)
+    hub = hub_document(job.hub or still_hub())
     values = [
         f"{name} = {doc[key]!r}"
         for name, key in (
@@ -116,8 +140,9 @@ def table_module(job: Job, title: str) -> str:
     return (
         f'"""{head}"""\n\nimport bisect\nimport math\n\nSENSE = {job.performance.sense}  # +1 right-handed\n'
         + "\n".join(values)
-        + "\n"
+        + f"\nHUB = {hub!r}\n"
         + TABLE_CODE
+        + WRENCH_CODE
     )
 
 
@@ -127,3 +152,10 @@ def run_module(text: str, rpm: Array, V: Array) -> tuple[Array, Array]:
     exec(compile(text, "<export>", "exec"), space)
     pairs = np.array([space["loads"](float(n), float(v)) for n, v in zip(rpm, V, strict=True)])
     return pairs[:, 0], pairs[:, 1]
+
+
+def run_hub(text: str, rpm: Array, V: Array, side: Array) -> Array:
+    """Loads of the hub by the lookup of such a text, (6, P)."""
+    space: dict[str, Any] = {}
+    exec(compile(text, "<export>", "exec"), space)
+    return np.array([space["hub"](*map(float, at)) for at in zip(rpm, V, side, strict=True)]).T

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.bem.model import HUB_LOADS
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -47,6 +48,13 @@ def solve_points(
     found = (ready or _prepared(case)).solve(rpm.ravel(), V.ravel(), air or case.air())
     _refuse(case, found, found.converged)
     return found
+
+
+def oblique_loads(case: Case, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+    """Thrust, torque, H, Y, roll and pitch moment with a wind along and across the shaft, (6, P) [N], [N m]."""
+    found = _prepared(case).solve(rpm, airspeed_m_s, case.air(), side=side_m_s)
+    _refuse(case, found, found.converged)
+    return np.array([found.thrust_N, found.torque_Nm, *(found[key] for key in HUB_LOADS)])
 
 
 def _refuse(case: Case, found: Dataset, good: NDArray[np.bool_]) -> None:

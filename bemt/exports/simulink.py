@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import plain_name, table_document, table_of_document
+from bemt.exports.hub import hub_document, hub_loads
+from bemt.exports.parts import plain_name, still_hub, table_document, table_of_document
 
 Array = NDArray[np.float64]
 
@@ -19,8 +20,10 @@ class SimulinkExport(LoadsExport):
 
     id = "simulink"
     title = "Simulink lookup tables (.mat)"
-    holds = "tables CT(rpm, J), CP(rpm, J), linear, held at the ends"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
+    holds = (
+        "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    )
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     source = "MATLAB documentation: n-D Lookup Table, interpolation linear, extrapolation clip"
 
     def write(self, job: Job) -> Files:
@@ -37,6 +40,7 @@ class SimulinkExport(LoadsExport):
             "u_thrust_rel": np.array(band.thrust),
             "u_torque_rel": np.array(band.torque),
         }
+        doc["hub"] = {k: np.asarray(v, dtype=float) for k, v in hub_document(job.hub or still_hub()).items()}
         stream = io.BytesIO()
         savemat(stream, {plain_name(job.case.name): doc}, oned_as="row")
         data = stream.getvalue()
@@ -48,10 +52,22 @@ class SimulinkExport(LoadsExport):
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The file read back, bilinear."""
-        from scipy.io import loadmat
+        return table_of_document(_document(files), rpm, airspeed_m_s)
 
-        data = next(iter(files.values()))
-        assert isinstance(data, bytes)
-        found = loadmat(io.BytesIO(data), squeeze_me=True, simplify_cells=True)
-        doc = next(v for k, v in found.items() if not k.startswith("__"))
-        return table_of_document(doc, rpm, airspeed_m_s)
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """The file read back, linear in each axis."""
+        doc = _document(files)
+        rho, D = float(doc["density_kg_m3"]), float(doc["diameter_m"])
+        found = hub_loads(doc["hub"], rho, D, rpm, airspeed_m_s, side_m_s)
+        found[:2] += table_of_document(doc, rpm, airspeed_m_s)
+        return found
+
+
+def _document(files: Files) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    data = next(iter(files.values()))
+    assert isinstance(data, bytes)
+    found = loadmat(io.BytesIO(data), squeeze_me=True, simplify_cells=True)
+    doc: dict[str, Any] = next(v for k, v in found.items() if not k.startswith("__"))
+    return doc

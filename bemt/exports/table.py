@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from bemt.base.tables import csv_text, json_text
 from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name, table_document, table_of_document
+from bemt.exports.hub import COEFFICIENTS, hub_document, hub_loads
+from bemt.exports.parts import header, plain_name, still_hub, table_document, table_of_document
 
 Array = NDArray[np.float64]
 
@@ -39,18 +40,62 @@ static inline void {p}_loads(double rpm, double airspeed, double density, double
 }}
 """
 
+_WRENCH = """
+/* Force [N] and moment [N m] on the vehicle, x y z; velocity of the hub through the air [m/s], z along the thrust.
+   Table of the hub: changes of CT and CP, CH downstream, CY to the advancing side over rho n^2 D^4, moments that lift
+   the advancing and the upstream side over rho n^2 D^5; linear in rpm and in the advance ratios along and across the
+   shaft, held at the ends. */
+static inline void {p}_wrench(double rpm, const double velocity[3], double density, double force[3], double moment[3])
+{{
+    const double n = rpm / 60.0, side = sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1]);
+    const double *axis[3] = {{{p}_hub_rpm, {p}_hub_J, {p}_hub_side}};
+    const int size[3] = {{{P}_HUB_N_RPM, {P}_HUB_N_J, {P}_HUB_N_SIDE}};
+    double at[3], weight[3], v[6], T, Q, scale, x, y;
+    int cell[3], d, i, j, k, m;
+    {p}_loads(rpm, velocity[2], density, &T, &Q);
+    for (m = 0; m < 6; ++m) v[m] = 0.0;
+    at[0] = rpm;
+    at[1] = n > 0.0 ? velocity[2] / (n * {P}_DIAMETER_M) : 0.0;
+    at[2] = n > 0.0 ? side / (n * {P}_DIAMETER_M) : 0.0;
+    for (d = 0; d < 3; ++d) {{
+        cell[d] = 0;
+        while (cell[d] < size[d] - 2 && at[d] >= axis[d][cell[d] + 1]) ++cell[d];
+        weight[d] = (at[d] - axis[d][cell[d]]) / (axis[d][cell[d] + 1] - axis[d][cell[d]]);
+        weight[d] = weight[d] < 0.0 ? 0.0 : (weight[d] > 1.0 ? 1.0 : weight[d]);
+    }}
+    for (i = 0; i < 2; ++i) for (j = 0; j < 2; ++j) for (k = 0; k < 2; ++k) {{
+        const double w = (i ? weight[0] : 1.0 - weight[0]) * (j ? weight[1] : 1.0 - weight[1])
+                       * (k ? weight[2] : 1.0 - weight[2]);
+        for (m = 0; m < 6; ++m) v[m] += w * {p}_hub[m][cell[0] + i][cell[1] + j][cell[2] + k];
+    }}
+    scale = density * n * n * {P}_DIAMETER_M * {P}_DIAMETER_M * {P}_DIAMETER_M * {P}_DIAMETER_M;
+    T += v[0] * scale;
+    Q += v[1] * scale * {P}_DIAMETER_M / 6.283185307179586;
+    x = side > 0.0 ? velocity[0] / side : 0.0;
+    y = side > 0.0 ? velocity[1] / side : 0.0;
+    force[0] = scale * (-v[2] * x + v[3] * {P}_SENSE * y);
+    force[1] = scale * (-v[2] * y - v[3] * {P}_SENSE * x);
+    force[2] = T;
+    moment[0] = scale * {P}_DIAMETER_M * (-v[4] * {P}_SENSE * x + v[5] * y);
+    moment[1] = scale * {P}_DIAMETER_M * (-v[4] * {P}_SENSE * y - v[5] * x);
+    moment[2] = -({P}_SENSE) * Q;
+}}
+"""
+
 
 class TableExport(LoadsExport):
     """The numbers themselves, for any program."""
 
     id = "table"
     title = "tables as CSV, JSON and a C header"
-    holds = "tables CT(rpm, J), CP(rpm, J), linear, held at the ends"
-    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation"})
+    holds = (
+        "tables CT(rpm, J), CP(rpm, J) and of the hub over rpm, J along and across the shaft, linear, held at the ends"
+    )
+    features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "duct", "rotation", "hub"})
     source = "own format"
 
     def write(self, job: Job) -> Files:
-        """Three files with the same numbers."""
+        """Four files, of the same numbers; the table of the hub is a CSV of its own."""
         t, name = job.performance, plain_name(job.case.name)
         rows = [
             {
@@ -66,9 +111,11 @@ class TableExport(LoadsExport):
             for i in range(t.rpm.size)
             for j in range(t.J.size)
         ]
+        hub = _hub_rows(job)
         return {
             f"{name}.csv": csv_text(list(rows[0]), rows),
-            f"{name}.json": json_text(table_document(job)),
+            f"{name}_hub.csv": csv_text(list(hub[0]), hub),
+            f"{name}.json": json_text(table_document(job) | {"hub": hub_document(job.hub or still_hub())}),
             f"{name}.h": _c_header(job, name.lower()),
         }
 
@@ -76,6 +123,24 @@ class TableExport(LoadsExport):
         """The JSON, bilinear."""
         text = str(next(t for n, t in files.items() if n.endswith(".json")))
         return table_of_document(json.loads(text), rpm, airspeed_m_s)
+
+    def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
+        """The JSON, linear in each axis."""
+        doc = json.loads(str(next(t for n, t in files.items() if n.endswith(".json"))))
+        found = hub_loads(doc["hub"], doc["density_kg_m3"], doc["diameter_m"], rpm, airspeed_m_s, side_m_s)
+        found[:2] += table_of_document(doc, rpm, airspeed_m_s)
+        return found
+
+
+def _hub_rows(job: Job) -> list[dict[str, float]]:
+    """The table of the hub, a row per node, with airspeed and angle between wind and shaft."""
+    t, hub = job.performance, job.hub or still_hub()
+    nodes = np.array([v.ravel() for v in np.meshgrid(hub.rpm, hub.J, hub.side, indexing="ij")])
+    speed = np.hypot(nodes[1], nodes[2]) * nodes[0] / 60.0 * t.diameter_m
+    angle = np.degrees(np.arctan2(nodes[2], nodes[1]))
+    columns = [*nodes, speed, angle, *hub.values.reshape(6, -1)]
+    names = ("rpm", "J_axial", "J_side", "airspeed_m_s", "angle_deg", *COEFFICIENTS)
+    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
 
 
 def _c_header(job: Job, p: str) -> str:
@@ -99,4 +164,14 @@ def _c_header(job: Job, p: str) -> str:
     for name, C in (("CT", t.CT), ("CP", t.CP)):
         body = ",\n ".join(row(values) for values in C)
         lines.append(f"static const double {p}_{name}[{t.rpm.size}][{t.J.size}] = {{\n {body}}};")
-    return "\n".join(lines) + _LOOKUP.format(p=p, P=P) + f"#endif /* {P}_TABLE_H */\n"
+    hub = job.hub or still_hub()
+    for name, word, axis in (("rpm", "RPM", hub.rpm), ("J", "J", hub.J), ("side", "SIDE", hub.side)):
+        lines.append(f"#define {P}_HUB_N_{word} {axis.size}")
+        lines.append(f"static const double {p}_hub_{name}[{axis.size}] = {row(axis)};")
+    blocks = ",\n ".join(
+        "{" + ",\n  ".join("{" + ",\n   ".join(map(row, plane)) + "}" for plane in block) + "}" for block in hub.values
+    )
+    sizes = "".join(f"[{n}]" for n in hub.values.shape)
+    lines.append(f"static const double {p}_hub{sizes} = {{\n {blocks}}};")
+    lines.insert(lines.index(f"#define {P}_TABLE_H") + 1, "#include <math.h>")
+    return "\n".join(lines) + (_LOOKUP + _WRENCH).format(p=p, P=P) + f"#endif /* {P}_TABLE_H */\n"

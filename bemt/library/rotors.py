@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
+from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.dataset import Dataset
 from bemt.library.given import numbers, path_text
@@ -31,6 +32,7 @@ CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
+PAIRED = ("lower_rpm", *LOADS, *RATIOS)
 OBLIQUE = ("sideslip_rad", "H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
@@ -165,13 +167,72 @@ class Propeller:
         n, V, angle = self._turned(n, V, angle_deg)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
         found = lattice.solve(self.case, n, V, density, bands, angle)
-        names = [key for key in (*CHANNELS, *(DUCTED if self.case.ducted else OBLIQUE)) if key in found]
+        more = DUCTED if self.case.ducted else (*OBLIQUE, *PAIRED)
+        names = [key for key in (*CHANNELS, *more) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
         notes = ("bands, one standard deviation: declared unknowns (input), real rotors compared with BEMT (model), "
                  "blade elements (numerics)",)  # fmt: skip
         about = {"source": "bemt", "file": self.case.path.as_posix()}
         return Dataset("bemt", self.name, {key: found[key] for key in names}, flags=found.flags, provenance=about,
-                       u_by=by, notes=notes if bands else ())  # fmt: skip
+                       u_by=by, notes=notes if bands else (), units=found.units)  # fmt: skip
+
+    def coaxial(
+        self, z_over_D: float | None = None, *, spacing_mm: float | None = None, second: str | None = None,
+        turns: str = "opposite", rpm_ratio: float | None = None, rpm: float | None = None,
+        torque_balance: bool = False,
+    ) -> Propeller:  # fmt: skip
+        """Put a second rotor on the axis, downstream; both are solved together.
+
+        Parameters
+        ----------
+        z_over_D : float, optional
+            Distance of the two disks over the diameter of this propeller. [-]
+        spacing_mm : float, optional
+            The same in millimetres, instead. [mm]
+        second : str, optional
+            Label or case of another propeller; by default the second one is like this one.
+        turns : str
+            Whether it turns ``"opposite"`` to this one or the ``"same"`` way.
+        rpm_ratio, rpm : float, optional
+            Its speed over that of this one, 1 by default, or a speed of its own. [-], [rev/min]
+        torque_balance : bool
+            Instead, let it turn at the speed at which both torques are equal.
+
+        Returns
+        -------
+        Propeller
+            The pair. In what :meth:`solve` returns, ``rpm`` is the speed of the first rotor; thrust, torque and power
+            are totals, coefficients refer to diameter and speed of the first; ``upper_...`` belongs to the first
+            rotor, ``lower_...`` to the second; ``lower_thrust_ratio`` is its thrust over that alone at its speed.
+
+        Raises
+        ------
+        InputError
+            For values that do not make a pair, such as a rotor in a duct.
+
+        Examples
+        --------
+        >>> pair = propeller("15x5").coaxial(0.3)
+        >>> found = pair.solve(rpm=5000, bands=False)
+        >>> bool(0.6 < found["lower_thrust_ratio"][0] < found["upper_thrust_ratio"][0] < 1.0)
+        True
+        >>> balanced = propeller("15x5").coaxial(0.3, torque_balance=True).solve(rpm=5000, bands=False)
+        >>> bool(abs(balanced["reaction_torque_Nm"][0]) < 1e-6), bool(balanced["lower_rpm"][0] > 5000)
+        (True, True)
+        """
+        import tomlkit
+
+        given = {"z_over_D": z_over_D, "spacing_mm": spacing_mm, "turns": turns, "rpm_ratio": rpm_ratio, "rpm": rpm,
+                 "torque_balance": torque_balance or None}  # fmt: skip
+        if second is not None:
+            text = path_text("second", second)
+            is_case = Path(text).exists() or text.endswith(".toml") or "/" in text
+            given["case" if is_case else "label"] = Path(text).resolve().as_posix() if is_case else text
+        written = dict(self.case.written)
+        unknowns = [item for item in written.pop("assumptions", []) if not item["key"].startswith("second_rotor.")]
+        table = {"second_rotor": {key: value for key, value in given.items() if value is not None}}
+        text = tomlkit.dumps(written | table | ({"assumptions": unknowns} if unknowns else {}))
+        return Propeller(case_of(text, self.case.folder), text)
 
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from bemt import __version__, effects
 from bemt.base import units
+from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.case import Case
-from bemt.case.propagate import BANDED, Moved, Points, propagate, vary
+from bemt.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
 from bemt.dataset import Dataset
 from bemt.drive.drive_result import full_document
 from bemt.readers import references as reference_file
@@ -112,8 +113,6 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
 
 def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str], None] | None = None) -> dict[str, Any]:
     """Solve one case at its operating points and put everything recorded beside it."""
-    from bemt.case.prepare import prepare_case
-
     refs = _references(case)
     points = _points(case, refs)
     at = Points.of(case, *np.array(points).T)
@@ -125,7 +124,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
     if without:
         off = case.replaced({"model.effects_off": (*case.file.model.effects_off, *without)})
         conditions = at.conditions(off)
-        less = at.solve(prepare_case(off, oblique=True).at_speeds(*conditions), off, threads)
+        less = at.solve(prepared(off).at_speeds(*conditions), off, threads)
 
     rows: list[dict[str, Any]] = []
     variants: list[dict[str, Any]] = []
@@ -141,6 +140,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else None,
             duct_share=nominal.duct_share[i] if case.ducted else None, converged=bool(nominal.converged[i]),
             H_force_N=nominal["H_force_N"][i] if "H_force_N" in nominal else None,
+            upper_thrust_N=nominal["upper_thrust_N"][i] if case.paired else None,
+            lower_thrust_N=nominal["lower_thrust_N"][i] if case.paired else None,
             J=nominal.J[i], flags=list(nominal.flags[i]), **state,
         ))  # fmt: skip
         rows.append(_row(
@@ -172,7 +173,8 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
         "drive": full_document(case),
-        "fan": _fan(case, ready, nominal) if case.ducted else None,
+        "fan": None if isinstance(ready, PairModel) or not case.ducted else _fan(case, ready, nominal),
+        "pair": _pair(case, nominal) if case.paired else None,
         "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
         "faults": [],
     }  # fmt: skip
@@ -237,7 +239,7 @@ def _assumption(moved: Moved) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _description(case: Case, ready: Model, stations: int) -> dict[str, Any]:
+def _description(case: Case, ready: Model | PairModel, stations: int) -> dict[str, Any]:
     air = case.air()
     return {
         "rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "angle_deg": case.angle_deg, "density_kg_m3": air.rho,
@@ -248,6 +250,17 @@ def _description(case: Case, ready: Model, stations: int) -> dict[str, Any]:
         "drag_level": case.file.model.drag_level,
         "convention": "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)",
     }  # fmt: skip
+
+
+def _pair(case: Case, nominal: Dataset) -> dict[str, Any]:
+    """What a second rotor adds, at the case's own operating point."""
+    told = case.file.second_rotor
+    assert told is not None  # the caller asks for a pair
+    names = ("lower_rpm", *LOADS, *RATIOS)
+    return {
+        "z_over_D": told.spacing_m(case.diameter_m) / case.diameter_m, "turns": told.turns,
+        "rotor": told.label or told.case or "as the first",
+    } | {key: nominal[key][0] for key in names} | {f"u_{key}": nominal.u[key][0] for key in names[1:]}  # fmt: skip
 
 
 def _fan(case: Case, ready: Model, nominal: Dataset) -> dict[str, Any]:

@@ -14,8 +14,8 @@ WIDTH = 118
 CSV_COLUMNS = (
     "case", "source", "label", "rpm", "airspeed_m_s", "density_kg_m3", "thrust_N", "thrust_kgf", "u", "u_num",
     "u_input", "u_model", "torque_Nm", "power_W", "CT", "CP", "J", "M_tip", "Re", "exhaust_speed_m_s", "duct_share",
-    "angle_deg", "H_force_N", "bemt_error_pct", "bemt_u_val", "k1k2_error_pct", "k1k2_u_val", "converged", "flags",
-    "origin", "remark",
+    "angle_deg", "H_force_N", "upper_thrust_N", "lower_thrust_N", "bemt_error_pct", "bemt_u_val", "k1k2_error_pct",
+    "k1k2_u_val", "converged", "flags", "origin", "remark",
 )  # fmt: skip
 
 
@@ -138,6 +138,22 @@ def _fan_lines(fan: Mapping[str, Any] | None) -> list[str]:
     ]
 
 
+def _pair_lines(pair: Mapping[str, Any] | None) -> list[str]:
+    if pair is None:
+        return []
+    turns = "turns against the first" if pair["turns"] == "opposite" else "turns as the first"
+    sides = ("first", "upper"), ("second", "lower")
+    loads = "; ".join(
+        f"{name} rotor {_n(pair[f'{side}_thrust_N'])} N (u {_n(pair[f'u_{side}_thrust_N'], 2)}), "
+        f"{_n(pair[f'{side}_torque_Nm'])} N m, {_n(100 * pair[f'{side}_thrust_ratio'], 3)} % of its thrust alone "
+        f"(u {_n(100 * pair[f'u_{side}_thrust_ratio'], 2)})"
+        for name, side in sides
+    )
+    head = f"second rotor: {pair['rotor']}, {turns}, {_n(pair['lower_rpm'])} rev/min, z/D {_n(pair['z_over_D'], 3)}"
+    rest = f"torque about the axis {_n(pair['reaction_torque_Nm'])} N m. T, Q, CT and CP above are of both"
+    return ["", _wrap(f"{head}; {loads}; {rest}", "  ")]
+
+
 def _grid_lines(grid: Mapping[str, Any] | None) -> list[str]:
     if grid is None:
         return []
@@ -171,7 +187,13 @@ def case_text(result: Mapping[str, Any]) -> str:
     ]
     if result.get("drive"):
         lines += ["", _wrap(result["drive"]["text"], "  "), ""]
-    lines += [_main_table(result), *_fan_lines(result["fan"]), *_comparison_lines(result), *_audit_lines(result)]
+    lines += [
+        _main_table(result),
+        *_fan_lines(result["fan"]),
+        *_pair_lines(result.get("pair")),
+        *_comparison_lines(result),
+        *_audit_lines(result),
+    ]
     if result["assumptions"]:
         bemt = result["rows"][0]
         low, high = bemt["thrust_N_range"]

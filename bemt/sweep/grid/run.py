@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
+from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import solve_at
+from bemt.case.propagate import prepared, solve_at
 from bemt.sweep.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
@@ -37,12 +37,13 @@ MAX_AIRS = 100_000
 """States of the air that a solver remembers."""
 MAX_GEOMETRIES = 16
 """Geometries per chunk, about, at most: each takes longer than many points."""
-GEOMETRY = ("diameter_in", "pitch_in", "tip_gap_mm")
+GEOMETRY = ("diameter_in", "pitch_in", "tip_gap_mm", "z_over_D")
 AIR = ("altitude_m", "density_kg_m3", "temperature_C")
 FLOW = ("rpm", "airspeed_m_s", "angle_deg")
 
 VALUES = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "J", "eta", "M_tip", "Re75")
 OBLIQUE_VALUES = ("H_force_N",)
+PAIR_VALUES = ("lower_rpm", *LOADS, *RATIOS)
 DUCT_VALUES = ("rotor_thrust_N", "duct_thrust_N", "exhaust_speed_m_s")
 STATISTICS = ("thrust_N", "torque_Nm", "M_tip")
 
@@ -54,7 +55,8 @@ def _turned(case: Case) -> bool:
 
 def _columns(case: Case) -> tuple[str, ...]:
     """What is written of each point."""
-    return (*VALUES, *(DUCT_VALUES if case.ducted else ()), *(OBLIQUE_VALUES if _turned(case) else ()))
+    more = (DUCT_VALUES, case.ducted), (OBLIQUE_VALUES, _turned(case)), (PAIR_VALUES, case.paired)
+    return (*VALUES, *(name for names, there in more if there for name in names))
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class GridSolver:
 
     def _ready(self, geometry: int, overrides: Mapping[str, float]) -> Any:
         if self._last[0] != geometry:
-            self._last = (geometry, prepare_case(self.case, overrides, oblique=True))
+            self._last = (geometry, prepared(self.case.replaced(overrides)))
         return self._last[1]
 
     def _state(self, flat: int) -> Air:

@@ -1,0 +1,458 @@
+"""Two rotors on one axis, solved together: each works in what the other induces.  SI, radians.
+
+The annuli of each rotor are balanced by the axial kernel, unchanged; the other rotor enters as an onset velocity of
+every annulus.  ``w = V + (from the other) + v`` is the axial velocity in a disk, v the mean that its own annulus
+induces (Prandtl's factor times that at the blade).  The wake of either rotor is a bundle of vortex cylinders, one per
+edge of its annuli, of strength ``v_j - v_(j+1)``; A(r, z) is what they induce a distance z ahead of their disk
+(:func:`bemt.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
+of vortex cylinders", not checked).
+
+Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
+
+Lower rotor, inside the wake of the upper one: without air from outside each streamtube would arrive with ``2 v - A``
+more than the wind, and with the area that continuity gives, w / (V + 2 v - A + v_lower).  Measured wakes are wider: in
+hover they end at k R, k = 0.78 (Landgrebe 1972, J. AHS 17(4), not checked) to 0.82 (Leishman and Ananthan 2008, J. AHS
+53(1), not checked), 0.707 by momentum theory.  Such a wake has taken air along: its area is larger by
+``1 + (2 k^2 - 1) s``, s from 0 at the disk to 1 far behind, and its velocity u so much smaller that its momentum,
+(V + u) u times area, stays.  In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its diameters the wake
+is a turbulent jet whose speed falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115, not checked).
+
+Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The swirl of the upper wake, twice that in
+its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
+that turn with it.  A rotor has no swirl ahead of it.
+
+With k = 0.707 and far apart that is the balance of Leishman and Ananthan (2008; equation numbers not checked), whose
+lower rotor sees 2 v on half of its area.  Limits (tested): both rotors are alone at a great distance; at z = 0 both see
+the velocity that both induce, so that equal thrusts cost sqrt(2) times the ideal power of two rotors alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bemt import coefficients as co
+from bemt.air import Air
+from bemt.bem import kernel as K
+from bemt.bem import solver
+from bemt.bem.model import Model
+from bemt.dataset import Dataset
+from bemt.effects import to_text
+from bemt.vortex_cylinder import WAKE_RADIUS, ahead
+
+if TYPE_CHECKING:
+    from bemt.bem.solver import Prepared, Solution
+    from bemt.effects import Effect
+
+__all__ = ["LOADS", "RATIOS", "Pair", "PairModel", "PairSolution", "solve"]
+
+Array = NDArray[np.float64]
+
+JET = 6.2
+"""Length of a jet over its diameter from which its speed falls as 1/z (Albertson et al. 1950, Trans. ASCE 115) [1]."""
+_TOL, _MOST = 1e-8, 200  # of the tip speed; steps
+_MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
+_PASSES = 3  # through the radii of the streamtubes and what the lower rotor adds to their speed there
+_OUTSIDE = np.linspace(1.0, 6.0, 251)  # radii outside of the wake, over its own, where the upwash is tabulated
+_BLOCK = 512  # points that are solved together, which bounds the memory
+_UNSETTLED = "not converged: the exchange between the two rotors did not settle"
+_BACKWARDS = "not solved: in descent the wake of the first rotor does not reach the second"
+_RAD_PER_RPM = math.pi / 30.0
+_REACH = np.array([0.6, 1.0, 1.7])  # speeds of the lower rotor with balanced torques, over that of the upper one
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two prepared open rotors on one axis.
+
+    Attributes
+    ----------
+    upper, lower : Prepared
+        The rotor upstream and the one in its wake.
+    spacing_m : float
+        Distance of their disks [m].
+    opposite : bool
+        Whether they turn against each other.
+    wake_radius : float
+        Radius of the upper rotor's developed wake in hover over its own, 0.707 by momentum theory [1].
+    interference : float
+        Factor on all that the rotors induce at each other; 0: two rotors alone [1].
+    swirl : float
+        Share of the upper rotor's swirl that reaches the lower one [1].
+    """
+
+    upper: Prepared
+    lower: Prepared
+    spacing_m: float
+    opposite: bool = True
+    wake_radius: float = WAKE_RADIUS
+    interference: float = 1.0
+    swirl: float = 1.0
+
+    @cached_property
+    def _influence(self) -> tuple[Array, Array, Array]:
+        """A of the upper rotor at its own stations and outside of its wake, that of the lower at the upper's."""
+        upper, lower, z = _edges(self.upper), _edges(self.lower), self.spacing_m
+        stations = self.upper.stations.r[:, None]
+        outside = self.upper.rotor.R * _OUTSIDE[:, None]
+        return ahead(stations, upper[1:], z), ahead(outside, upper[1:], z), ahead(stations, lower[1:], z)
+
+
+@dataclass(frozen=True, eq=False)
+class PairSolution:
+    """Results of both rotors at P points; NaN and flagged where either, or their exchange, did not converge."""
+
+    upper: Solution
+    lower: Solution
+    onset: tuple[Array, Array]  # Mean axial onset of upper and lower, weighted by the area [m/s]
+    converged: NDArray[np.bool_]
+    steps: int
+
+
+def _edges(prep: Prepared) -> Array:
+    """Edges of the annuli, (N + 1,) [m]."""
+    s = prep.stations
+    return np.concatenate([s.r - 0.5 * s.dr, [s.r[-1] + 0.5 * s.dr[-1]]])
+
+
+def _strengths(v: Array) -> Array:
+    """Strengths of the vortex cylinders at the outer edges of annuli, (P, N), of the velocities in them [m/s]."""
+    return np.asarray(v - np.concatenate([v[:, 1:], np.zeros((v.shape[0], 1))], axis=1))
+
+
+class _Rotor:
+    """One rotor at P points, each with an onset of its own."""
+
+    def __init__(self, prep: Prepared, points: Array) -> None:
+        self.prep, self.points = prep, points
+        self.entry, self.st, self.tab, self.par = prep.kernel
+        n, P = self.st.shape[0], points.shape[0]
+        self.out, self.radial = np.empty((P, K.N_OUT)), np.empty((P, n, K.N_RADIAL))
+        self.axial, self.swirl = np.zeros((P, n)), np.zeros((P, n))
+
+    def solve(self, which: NDArray[np.intp]) -> None:
+        """Balance the annuli of some points with the onset that they have now."""
+        st = self.st.copy()
+        for p in which:
+            st[:, K.S_AXIAL] = self.st[:, K.S_AXIAL] + self.axial[p]
+            st[:, K.S_TANG] = self.st[:, K.S_TANG] + self.swirl[p]
+            self.entry(self.points[p : p + 1], st, self.tab, self.par, self.out[p : p + 1], self.radial[p : p + 1])
+
+    @property
+    def onset(self) -> Array:
+        """Axial onset of each annulus, (P, N) [m/s]."""
+        own = self.points[:, K.P_V, None] * self.st[:, K.S_AXIAL_FACTOR] + self.st[:, K.S_AXIAL]
+        return np.asarray(own + self.axial)
+
+    @property
+    def induced(self) -> Array:
+        """Mean axial velocity that each annulus induces in the disk, (P, N) [m/s]."""
+        return np.asarray(self.radial[:, :, 7] * (self.radial[:, :, 5] - self.onset))
+
+    @property
+    def whirl(self) -> Array:
+        """Angular momentum behind the disk per mass, r times twice the swirl in it, (P, N) [m2/s]."""
+        return np.asarray(2.0 * self.radial[:, :, 7] * self.radial[:, :, 6] * self.prep.stations.r, dtype=float)
+
+    def mean(self) -> Array:
+        """Mean of the axial onset over the disk, (P,) [m/s]."""
+        s = self.prep.stations
+        return np.asarray(self.onset @ (s.r * s.dr) / np.sum(s.r * s.dr))
+
+
+def solve(pair: Pair, rpm: Array, lower_rpm: Array | None, V: Array, rho: Array, mu: Array, a_sound: Array
+          ) -> PairSolution:  # fmt: skip
+    """Solve points, (P,) each [rev/min], [m/s], [kg/m3], [Pa s], [m/s].
+
+    ``lower_rpm`` None balances the torques: the speed of the lower rotor at which its torque is that of the upper one.
+
+    Raises ValueError for a rotor in a duct, and for balanced torques of rotors that turn alike.
+    """
+    if pair.upper.duct is not None or pair.lower.duct is not None:
+        raise ValueError("pair: got a ducted rotor; expected two open rotors")
+    if lower_rpm is None and not pair.opposite:
+        raise ValueError("lower_rpm: got balanced torques of rotors that turn alike; expected opposite senses")
+    balanced = lower_rpm is None
+    n = np.array(rpm, dtype=float)
+    m = n.copy() if lower_rpm is None else np.array(lower_rpm, dtype=float)
+    fields = (V, rho, mu, a_sound)
+    upper, lower = (
+        _Rotor(prep, np.stack([_RAD_PER_RPM * speed, *fields], axis=1))
+        for prep, speed in ((pair.upper, n), (pair.lower, m))
+    )
+    tip = upper.points[:, K.P_OMEGA] * pair.upper.rotor.R
+    along = V >= 0.0  # the wake goes from the upper to the lower rotor
+    settled = ~along
+    mixer = _Anderson()
+    x = np.zeros((n.size, upper.axial.shape[1] + 2 * lower.axial.shape[1] + 1))
+    cut = np.cumsum([upper.axial.shape[1], lower.axial.shape[1], lower.axial.shape[1]])
+    steps = 0
+    while steps < _MOST:
+        busy = np.flatnonzero(~settled)
+        upper.axial, lower.axial, lower.swirl, turned = np.split(x, cut, axis=1)
+        lower.points[:, K.P_OMEGA] = _RAD_PER_RPM * m * np.exp(turned[:, 0] / tip)
+        upper.solve(busy if steps else np.arange(n.size))
+        lower.solve(busy if steps else np.arange(n.size))
+        if not busy.size:
+            break
+        steps += 1
+        faster = np.zeros((n.size, 1))
+        if balanced:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                step = 0.5 * np.log(upper.out[:, K.O_Q] / lower.out[:, K.O_Q])
+            faster[:, 0] = turned[:, 0] + tip * np.clip(np.where(np.isfinite(step), step, 0.0), -0.3, 0.3)
+        new = np.concatenate([*_exchange(pair, upper, lower), faster], axis=1)
+        lost = ~np.isfinite(new).all(axis=1)
+        new[lost] = 0.5 * x[lost]
+        settled = settled | (np.max(np.abs(new - x), axis=1) < _TOL * tip) & ~lost
+        x = np.where(settled[:, None], x, mixer.next(x, new))
+    return _collected(pair, upper, lower, settled & along, steps)
+
+
+class _Anderson:
+    """Fixed-point steps of many points, each sped up by its last ones (Anderson 1965; Walker and Ni 2011, eq. 2.2)."""
+
+    def __init__(self) -> None:
+        self.x: list[Array] = []
+        self.f: list[Array] = []
+
+    def next(self, x: Array, new: Array) -> Array:
+        """Give the next state of each point, (P, S), from this one and what the fixed-point map makes of it."""
+        self.x, self.f = [*self.x, x][-_MEMORY - 1 :], [*self.f, new - x][-_MEMORY - 1 :]
+        if len(self.x) < 2:
+            return new
+        dx, df = (np.diff(np.stack(v, axis=2), axis=2) for v in (self.x, self.f))
+        f = self.f[-1]
+        normal = np.einsum("psi,psj->pij", df, df)
+        size = np.trace(normal, axis1=1, axis2=2)[:, None, None] + 1e-300
+        normal = normal + 1e-10 * size * np.eye(normal.shape[1])
+        weights = np.linalg.solve(normal, np.einsum("psi,ps->pi", df, f)[..., None])[..., 0]
+        # far from linear: the plain step
+        weights[np.max(np.abs(weights), axis=1, initial=0.0) > _WILD] = 0.0
+        return np.asarray(x + f - np.einsum("psi,pi->ps", dx + df, weights))
+
+
+def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, Array]:
+    """Axial onset of the upper rotor's annuli, axial and tangential onset of the lower one's, (P, N) [m/s]."""
+    inside, outside, suction = pair._influence
+    v, V, w = upper.induced, upper.points[:, K.P_V, None], upper.onset + upper.induced
+    own = _strengths(v)
+    up, low, r = _edges(pair.upper), _edges(pair.lower), pair.lower.stations.r
+    drawn = np.zeros_like(v)
+    for _ in range(_PASSES):
+        add, area, kept = _streamtubes(pair, v, V, w, v - own @ inside.T, drawn)
+        area = np.diff(up**2) * area
+        # radii on which streamtubes arrive, from the axis outwards; the hub's area shrinks as that of all
+        hub = up[0] ** 2 * area.sum(axis=1, keepdims=True) / np.sum(np.diff(up**2))
+        squares = np.concatenate([hub, area], axis=1).cumsum(axis=1)
+        arrive = np.sqrt(0.5 * (squares[:, 1:] + squares[:, :-1]))
+        drawn = np.stack([np.interp(at, r, one) for at, one in zip(arrive, lower.induced, strict=True)])
+    flux, spin = (np.concatenate([x[:, :1] * squares[:, :1], x * area], axis=1).cumsum(axis=1)
+                  for x in (add, kept * upper.whirl))  # fmt: skip
+    shares = np.empty((v.shape[0], r.size))
+    axial, whirl = np.empty_like(shares), np.empty_like(shares)
+    upwash = own @ outside.T
+    for p, edge in enumerate(squares):
+        bounds = np.concatenate([[0.0], edge])
+        of = [np.interp(low**2, bounds, np.concatenate([[0.0], total])) for total in (flux[p], spin[p], edge)]
+        axial[p], whirl[p], shares[p] = (np.diff(x) / np.diff(low**2) for x in of)
+        axial[p] -= (1.0 - shares[p]) * np.interp(r / math.sqrt(edge[-1]), _OUTSIDE, upwash[p])
+    sense = 1.0 if pair.opposite else -1.0
+    f = pair.interference
+    return f * (_strengths(lower.induced) @ suction.T), f * axial, f * pair.swirl * sense * whirl / r
+
+
+def _streamtubes(pair: Pair, v: Array, V: Array, w: Array, faster: Array, drawn: Array) -> tuple[Array, Array, Array]:
+    """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area over that in the disk [1].
+
+    The third is what is left of a property per mass that the wake shares with the air that it takes along [1].
+    """
+    if pair.spacing_m <= 0.0:
+        return v, np.ones_like(v), np.ones_like(v)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = np.clip(np.where(v != 0.0, faster / v, 0.0), 0.0, 1.0)
+        slip = np.clip(np.where(w > 0.0, v / w, 0.0), 0.0, 1.0)
+    ideal = v * (1.0 + grown)
+    # area over that without air taken along: of the developed wake, then of a jet
+    jet = max(pair.spacing_m / (JET * 2.0 * pair.wake_radius * pair.upper.rotor.R), 1.0) ** 2
+    more = (1.0 + (2.0 * pair.wake_radius**2 - 1.0) * grown * slip) * (1.0 + (jet - 1.0) * slip)
+    momentum = (V + ideal) * ideal / more
+    add = np.where(ideal > 0.0, np.sqrt(np.maximum(0.25 * V * V + momentum, 0.0)) - 0.5 * V, ideal)
+    area = np.maximum(w, 1e-9) / np.maximum(V + ideal + drawn, 1e-9)
+    # at the ends of the blades, where nothing is induced, the flow of the neighbours would seem to spread it
+    area = np.where(v >= 0.0, np.minimum(area, 1.0), np.minimum(area, 4.0)) * more
+    kept = (V + ideal) / np.maximum((V + add) * more, 1e-9)
+    return add, area, kept
+
+
+def _collected(pair: Pair, upper: _Rotor, lower: _Rotor, settled: NDArray[np.bool_], steps: int) -> PairSolution:
+    """Results of both rotors, NaN where the pair did not converge."""
+    parts = []
+    for rotor in (upper, lower):
+        rpm = rotor.points[:, K.P_OMEGA] / _RAD_PER_RPM
+        out = rotor.out.copy()
+        out[~settled, K.O_STATUS] = np.maximum(out[~settled, K.O_STATUS], K.NOT_CONVERGED)
+        parts.append(solver._collect(rotor.prep, rpm, rotor.points, out, np.empty((rpm.size, 0, K.N_RADIAL))))
+    ok = settled & parts[0].converged & parts[1].converged
+    return PairSolution(parts[0], parts[1], (upper.mean(), lower.mean()), ok, steps)
+
+
+LOADS = ("upper_thrust_N", "upper_torque_Nm", "lower_thrust_N", "lower_torque_Nm", "reaction_torque_Nm")
+"""Channels of a pair beside the usual ones, which are totals."""
+RATIOS = ("upper_thrust_ratio", "lower_thrust_ratio", "thrust_ratio")
+"""Thrust over that of the same rotor alone at the same speeds; of both rotors together."""
+
+
+@dataclass(frozen=True, eq=False)
+class PairModel:
+    """Two models on one axis, solved together as one of them is.
+
+    Attributes
+    ----------
+    upper, lower : Model
+        The rotor upstream and the one in its wake.
+    spacing_m, opposite, wake_radius, interference, swirl
+        As in :class:`Pair`.
+    rpm_ratio : float
+        Speed of the lower rotor over that of the upper one [1].
+    lower_rpm : float or None
+        Its speed, if it does not follow that of the upper one [rev/min].
+    torque_balance : bool
+        Whether the lower rotor turns at the speed of equal torques instead.
+    mount_drag : float
+        Drag of what carries the lower rotor in the wake of the upper one, over the thrust of that one; it takes from
+        the thrust of the lower rotor [1].
+    """
+
+    upper: Model
+    lower: Model
+    spacing_m: float
+    opposite: bool = True
+    wake_radius: float = WAKE_RADIUS
+    interference: float = 1.0
+    rpm_ratio: float = 1.0
+    lower_rpm: float | None = None
+    torque_balance: bool = False
+    swirl: float = 1.0
+    mount_drag: float = 0.0
+
+    @property
+    def rotors(self) -> tuple[Model, Model]:
+        """Upper and lower model."""
+        return self.upper, self.lower
+
+    @property
+    def diameter_m(self) -> float:
+        """Diameter of the upper rotor, to which coefficients refer [m]."""
+        return self.upper.diameter_m
+
+    @property
+    def hub_diameter_m(self) -> float:
+        """Hub diameter of the upper rotor [m]."""
+        return self.upper.hub_diameter_m
+
+    @property
+    def pitch_m(self) -> float:
+        """Geometric pitch of the upper rotor at 0.75 R [m]."""
+        return self.upper.pitch_m
+
+    @property
+    def solidity(self) -> float:
+        """Blade area of the upper rotor over its disk area [1]."""
+        return self.upper.solidity
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Physics of the upper rotor."""
+        return self.upper.effects
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks of the section tables."""
+        return tuple(dict.fromkeys((*self.upper.notes, *self.lower.notes)))
+
+    def at_speeds(self, rpm: ArrayLike, V: ArrayLike, air: Air) -> PairModel:
+        """Model with the tables of the Reynolds and Mach numbers that these points reach."""
+        if self.torque_balance:
+            reach = np.multiply.outer(_REACH, rpm)
+        else:
+            reach = np.asarray(np.multiply(rpm, self.rpm_ratio) if self.lower_rpm is None else self.lower_rpm)
+        return replace(self, upper=self.upper.at_speeds(rpm, V, air), lower=self.lower.at_speeds(reach, V, air))
+
+    def solve(
+        self, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, threads: int = 1, side: ArrayLike = 0.0
+    ) -> Dataset:
+        """Solve operating points; ``rpm`` is that of the upper rotor, thrust, torque and power are totals.
+
+        Coefficients refer to diameter and speed of the upper rotor. ``reaction_torque_Nm`` is what the vehicle gets
+        about the axis, the upper rotor's counted positive. Raises ValueError for a wind that is not along the shaft.
+        """
+        if np.any(np.asarray(side) != 0.0):
+            raise ValueError("side: got in-plane wind on a coaxial pair; expected axial flow")
+        air = Air.from_density() if air is None else air
+        fields = np.broadcast_arrays(*(np.asarray(v, float) for v in (rpm, V, air.rho, air.mu, air.a_sound)))
+        n, speed, rho, mu, a = (np.atleast_1d(v).ravel().astype(float) for v in fields)
+        lower = None if self.torque_balance else n * self.rpm_ratio
+        if self.lower_rpm is not None:
+            lower = np.full(n.shape, self.lower_rpm)
+        pair = Pair(
+            self.upper.prep, self.lower.prep, self.spacing_m, self.opposite, self.wake_radius, self.interference,
+            self.swirl,
+        )  # fmt: skip
+        parts = []
+        for k in range(0, n.size, _BLOCK):
+            at = slice(k, k + _BLOCK)
+            found = solve(pair, n[at], None if lower is None else lower[at], speed[at], rho[at], mu[at], a[at])
+            parts.append(self._channels(found, n[at], speed[at], rho[at], a[at], mu[at]))
+        values = {key: np.concatenate([one[key] for one, _ in parts]) for key in parts[0][0]}
+        flags = tuple(words for _, some in parts for words in some)
+        provenance = {"source": "bemt", "effects": tuple(to_text(e) for e in self.effects),
+                      "stations": self.upper.n_stations}  # fmt: skip
+        return Dataset("bemt", self.upper.rotor.name or "pair", values, flags=flags, provenance=provenance,
+                       notes=self.notes, units={"lower_rpm": "rpm"})  # fmt: skip
+
+    def _channels(
+        self, found: PairSolution, n: Array, V: Array, rho: Array, a: Array, mu: Array
+    ) -> tuple[dict[str, Array], tuple[tuple[str, ...], ...]]:
+        """Channels and flags of solved points."""
+        nan = np.where(found.converged, 1.0, np.nan)
+        parts, m = (found.upper, found.lower), found.lower.rpm * nan
+        T, Q = (np.array([getattr(one, key) * nan for one in parts]) for key in ("T", "Q"))
+        T[1] -= self.mount_drag * np.maximum(T[0], 0.0)
+        power = Q * np.array([n, m]) * _RAD_PER_RPM
+        air = cast("Air", SimpleNamespace(rho=rho, mu=mu, a_sound=a))
+        turning = np.where(found.converged, found.lower.rpm, n)
+        alone = np.array([
+            solver.solve(model.prep, speed, V, air).T for model, speed in zip(self.rotors, (n, turning), strict=True)
+        ])  # fmt: skip
+        D, rev = self.diameter_m, n / 60.0
+        total, mass = T.sum(axis=0), found.lower.mass_flow * nan
+        CT, CP, J = co.CT(total, rho, rev, D), co.CP(power.sum(axis=0), rho, rev, D), V / (rev * D)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio, whole = T / alone, total / alone.sum(axis=0)
+            exhaust = np.where(mass > 0.0, V + total / mass, np.nan)
+        sign = -1.0 if self.opposite else 1.0
+        values = {
+            "rpm": n, "airspeed_m_s": V, "density_kg_m3": rho, "thrust_N": total,
+            "torque_Nm": power.sum(axis=0) / (n * _RAD_PER_RPM), "power_W": power.sum(axis=0), "CT": CT, "CP": CP,
+            "J": J, "eta": co.eta(J, CT, CP), "M_tip": co.M_tip(rev, D, a),
+            "Re75": co.Re75(self.upper.chord75_m, rev, D, V, rho, mu), "exhaust_speed_m_s": exhaust,
+            "duct_share": 0.0 * total, "mass_flow_kg_s": mass, "lower_rpm": m,
+            "upper_thrust_N": T[0], "upper_torque_Nm": Q[0], "lower_thrust_N": T[1], "lower_torque_Nm": Q[1],
+            "reaction_torque_Nm": Q[0] + sign * Q[1], "upper_thrust_ratio": ratio[0], "lower_thrust_ratio": ratio[1],
+            "thrust_ratio": whole, "upper_onset_m_s": found.onset[0] * nan, "lower_onset_m_s": found.onset[1] * nan,
+        }  # fmt: skip
+        words = tuple(
+            (
+                *(f"first rotor: {word}" for word in one), *(f"second rotor: {word}" for word in two),
+                *(() if ok else (_BACKWARDS if behind else _UNSETTLED,)),
+            )
+            for one, two, ok, behind in zip(found.upper.flags, found.lower.flags, found.converged, V < 0.0, strict=True)
+        )  # fmt: skip
+        return values, words

@@ -1,0 +1,64 @@
+"""What the wake of a rotor induces ahead of and behind its disk: the semi-infinite vortex cylinder.
+
+The wake of a uniformly loaded disk is a cylinder of ring vortices from the disk to infinity; v is the axial velocity
+that it induces in the disk.  Ahead of the disk, at radius r and distance z, it induces (Branlard and Gaunaa 2015,
+"Cylindrical vortex wake model: right cylinder", Wind Energy 18(11), eq. 7-8 as numbered in E. Branlard's own code; the
+paper was not checked, the formula is tested against Biot and Savart)::
+
+    u / v = H(R - r) - z k / (2 pi sqrt(r R)) [K(m) + (R - r) / (R + r) Pi(n, m)]
+    m = k^2 = 4 r R / ((R + r)^2 + z^2)        n = 4 r R / (R + r)^2
+
+and as far behind it 2 v H(R - r) less the same.  On the axis that is v (1 -/+ z / sqrt(R^2 + z^2)) (McCormick 1967,
+Aerodynamics of V/STOL Flight; not checked against the book).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["MOUNT_DRAG", "SWIRL", "WAKE_RADIUS", "ahead", "on_axis"]
+
+Array = NDArray[np.float64]
+
+WAKE_RADIUS = 0.78
+"""Radius of the developed wake in hover over that of its rotor: Landgrebe 1972, J. American Helicopter Society 17(4),
+not checked; Leishman and Ananthan 2008, J. AHS 53(1), give 0.82 (not checked); momentum theory 0.707 [1]."""
+SWIRL = 0.5
+"""Share of the swirl behind a rotor that reaches one in its wake: all of it by the balance of angular momentum, none
+where motors and arms between the rotors straighten the flow; the middle, declared [1]."""
+MOUNT_DRAG = 0.03
+"""Drag of what carries a rotor in the wake of another one, over the thrust of that one: motor and arm cover 2 to 6 % of
+the disk, drag coefficient 1, dynamic pressure 0.6 to 1 of the disk loading; declared [1]."""
+
+
+def on_axis(z_over_R: float) -> float:
+    """Gain of the induced velocity on the axis behind a disk, s in v (1 + s); ahead of it v (1 - s) [1].
+
+    >>> on_axis(0.0), round(on_axis(1.0), 3), round(on_axis(1e9), 3)
+    (0.0, 0.707, 1.0)
+    """
+    return float(z_over_R / math.sqrt(1.0 + z_over_R**2))
+
+
+def ahead(r: ArrayLike, R: ArrayLike, z: float) -> Array:
+    """Axial velocity at radius r, a distance z ahead of a disk of radius R [m], over that in the disk [1].
+
+    >>> ahead(0.5, 1.0, 0.0).item(), ahead(1.5, 1.0, 0.0).item(), round(ahead(1e-9, 1.0, 1.0).item(), 6)
+    (1.0, 0.0, 0.292893)
+    """
+    from scipy.special import ellipk, elliprf, elliprj
+
+    r, R = np.broadcast_arrays(np.asarray(r, dtype=float), np.asarray(R, dtype=float))
+    inside: Array = np.heaviside(R - r, 0.5)
+    if z <= 0.0:
+        return inside
+    both = np.maximum(r * R, 1e-30 * R * R)
+    m = 4.0 * both / ((R + r) ** 2 + z * z)
+    n = np.minimum(4.0 * both / (R + r) ** 2, 1.0 - 1e-14)
+    third = elliprf(0.0, 1.0 - m, 1.0) + n / 3.0 * elliprj(0.0, 1.0 - m, 1.0, 1.0 - n)
+    edge = (R - r) / (R + r)
+    third = np.where(edge == 0.0, 0.0, edge * third)
+    return np.asarray(inside - z * np.sqrt(m / both) / (2.0 * math.pi) * (ellipk(m) + third))
