@@ -3,35 +3,50 @@
 A rotor that lost thrust at equal drive is driven harder until the loads balance again; of all commands that the mixer
 can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor e_k itself: one rotor, and so roll,
 pitch, yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw:
-A+ diag(1, 1, 0, 1) A e_k. The readings are logs of each rotor's share of the drive; the scatter is that between healthy
-flights.
+A+ diag(1, 1, 0, 1) A e_k.
+
+Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share the
+trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 is the healthy flights' own, pooled with that of other
+vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6); w is that of
+:mod:`bemt.flight.population` and hardly matters once there is a healthy flight. One s for all readings: on left-out
+healthy flights of three vehicles it predicts as well as one for each or for tilt and yaw apart (docs/flight_logs.md).
+
+The bar is the quantile of the largest statistic over all causes when a healthy flight is drawn from that prediction, so
+many causes are paid for once, by what they have in common (max-T; Westfall and Young, Resampling-Based Multiple
+Testing, 1993).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.diagnose.thresholds import EARNED, GATE, NAMED
 from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
+from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
 
-__all__ = ["FlightEvidence", "FlightVerdict", "features", "judge"]
+__all__ = ["FALSE_ALARM", "FlightEvidence", "FlightVerdict", "axes_of", "features", "judge"]
 
 Array = NDArray[np.float64]
 
-FALSE_ALARM = 0.01
-"""Usual probability that a healthy flight is accused, over all hypotheses together (Bonferroni)."""
-ALIKE = 2.0 * np.log(20.0)
-"""Explanations whose chi squares differ by less cannot be told apart: odds of 20 to 1."""
-_LEAST = 3  # healthy flights from which the scatter is estimated
+FALSE_ALARM = GATE
+"""Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
+ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
+"""Explanations whose chi squares differ by less cannot be told apart: the odds at which the diagnosis gives a name."""
+_LEAST = 3  # healthy flights from which a cause is named
+_DRAWS = 10_000
+_OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
+BUILD = "an uneven build of this vehicle"
 
 
 @dataclass(frozen=True, eq=False)
 class FlightEvidence:
-    """One explanation: its direction in the shares, its size and misfit."""
+    """One explanation: its direction in the readings, its size and misfit."""
 
     cause: str
     size: float  # change of that rotor's drive [1]
@@ -57,7 +72,7 @@ class FlightVerdict:
     readings : (B,) float
         Change of the log of each rotor's share of the drive [1].
     scatter : float
-        Standard deviation of a share between healthy flights [1].
+        Standard deviation of a share between healthy flights, or between vehicles where none is given [1].
     visible : float
         Smallest change of one rotor's drive that would be named here [1].
     accused, healthy : int
@@ -68,6 +83,10 @@ class FlightVerdict:
         Change of the total drive against the healthy mean [1].
     total_half : float
         Its 95 % half width from the healthy scatter [1].
+    rule : str
+        Name of the rule that answered.
+    given : int
+        Healthy flights to compare with.
     """
 
     verdict: str
@@ -82,6 +101,8 @@ class FlightVerdict:
     rate95: tuple[float, float] = (0.0, 1.0)
     total: float = float("nan")
     total_half: float = float("nan")
+    rule: str = ""
+    given: int = 0
 
 
 def features(log: FlightLog) -> Array | None:
@@ -107,6 +128,30 @@ def features(log: FlightLog) -> Array | None:
     return np.log(mean) if np.all(mean > 0.0) else None
 
 
+def axes_of(layout: Array | None, rotors: int) -> Array:
+    """Rows that take roll, pitch and yaw from the logs of the drives.
+
+    Parameters
+    ----------
+    layout : (B, 3) float or None
+        As :func:`bemt.flight.layout.layout_of` gives it; None: any rows without the total.
+    rotors : int
+        Number of rotors.
+
+    Returns
+    -------
+    (k, B) float
+        Orthogonal to the total; the root mean square of a row is 1/B [1].
+    """
+    inner = np.eye(rotors) - 1.0 / rotors
+    if layout is None:
+        return np.linalg.svd(inner)[2][: rotors - 1] / np.sqrt(rotors)
+    rows = effect_matrix(layout)[:3] @ inner
+    q, r = np.linalg.qr(rows.T)
+    found: Array = (q * np.sign(np.diag(r))).T[np.abs(np.diag(r)) > 1e-9] / np.sqrt(rotors)
+    return found
+
+
 def judge(
     flight: Array, healthy: Sequence[Array], layout: Array | None, false_alarm: float = FALSE_ALARM
 ) -> FlightVerdict:
@@ -118,8 +163,8 @@ def judge(
         Features of the flight [1].
     healthy : sequence of (B,) float
         Features of healthy flights of the same vehicle [1].
-    layout : (B, 2) float or None
-        Angles [rad] and turning [1]; None: no weights are tried, and every rotor stands for itself.
+    layout : (B, 3) float or None
+        Angles [rad], turning [1] and arms; None: no weights are tried, and every rotor stands for itself.
     false_alarm : float
         Accepted probability that a healthy flight is accused [1].
 
@@ -130,102 +175,133 @@ def judge(
     """
     from scipy import stats
 
-    said = _decide(flight, np.array(healthy), layout, false_alarm)
+    calm = np.array(healthy).reshape(-1, flight.size)
+    said = _decide(flight, calm, layout, false_alarm)
     if len(healthy) < _LEAST:
         return said
-    rest = [_decide(h, np.delete(np.array(healthy), k, axis=0), layout, false_alarm) for k, h in enumerate(healthy)]
-    tried = [r for r in rest if r.verdict != "insufficient"]
-    if not tried:
-        return said
-    accused = sum(r.verdict != "none" for r in tried)
-    interval = stats.binomtest(accused, len(tried)).proportion_ci(method="exact")
-    return replace(said, accused=accused, healthy=len(tried), rate95=(float(interval.low), float(interval.high)))
+    rest = [_decide(h, np.delete(calm, k, axis=0), layout, false_alarm) for k, h in enumerate(calm)]
+    accused = sum(r.verdict in ("named", "class", "unknown") for r in rest)
+    interval = stats.binomtest(accused, len(rest)).proportion_ci(method="exact")
+    return replace(said, accused=accused, healthy=len(rest), rate95=(float(interval.low), float(interval.high)))
 
 
-def _decide(flight: Array, healthy: Array, layout: Array | None, alarm: float) -> FlightVerdict:
+@dataclass(frozen=True, eq=False)
+class _Prediction:
+    """A healthy flight as the others predict it: mean and standard deviation of the readings, and draws, whitened."""
+
+    mean: Array  # (k,)
+    sd: Array  # (k,)
+    draws: Array  # (draws, k), over sd
+
+
+def _predicted(calm: Array, axes: Array, known: bool) -> _Prediction:
+    n, k = len(calm), len(axes)
+    x = calm @ axes.T
+    own = float(np.sum((x - x.mean(axis=0)) ** 2)) if n else 0.0
+    free = k * max(n - 1, 0) + SCATTER_FREE
+    s2 = (own + SCATTER_FREE * SCATTER**2) / free
+    trim = np.array(TRIM)[:k] if known and k == 3 else np.full(k, max(TRIM))
+    rng = np.random.default_rng(20)
+    drawn = s2 * free / rng.chisquare(free, (_DRAWS, 1))
+    width = trim**2 * TRIM_FREE / rng.chisquare(TRIM_FREE, (_DRAWS, 1))
+
+    def variance(s: Array, w: Array) -> Array:
+        return s + 1.0 / (n / s + 1.0 / w)
+
+    sd = np.sqrt(variance(np.array(s2), trim**2))
+    mean = x.sum(axis=0) / s2 / (n / s2 + 1.0 / trim**2) if n else np.zeros(k)
+    return _Prediction(mean, sd, rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd)
+
+
+def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> FlightVerdict:
+    """The rules in order: the first that holds answers."""
     from scipy import stats
 
-    B, n = flight.size, len(healthy)
-    if n == 0:
-        share = flight - flight.mean()
-        return FlightVerdict("insufficient", (), "no healthy flight to compare with: give --healthy", (), share)
-    middle = healthy.mean(axis=0)
+    B, n = flight.size, len(calm)
+    middle = calm.mean(axis=0) if n else np.full(B, flight.mean())
     change = flight - middle
-    total = float(change.mean())
-    change = change - total
-    if n < _LEAST:
-        why = f"{n} healthy flights do not show how much flights differ: give {_LEAST} or more"
-        return FlightVerdict("insufficient", (), why, (), change, total=total)
-    shares = healthy - healthy.mean(axis=1, keepdims=True)
-    free = (n - 1) * (B - 1)
-    spread = shares - shares.mean(axis=0)
-    scatter = float(np.sqrt(np.sum(spread**2) / free))
-    W, free = _whitening(spread, layout)
-    W /= np.sqrt(1.0 + 1.0 / n)
+    total = float(change.mean()) if n else float("nan")
+    change = change - change.mean()
+    axes = axes_of(layout, B)
     ways = _directions(B, layout)
-    z, found = W @ change, []
-    for cause, way in ways.items():
-        d = W @ way
-        size = float(d @ z / (d @ d))
-        width = 1.0 / float(np.linalg.norm(d))
-        chi2 = float(np.sum((z - size * d) ** 2))
-        found.append(FlightEvidence(cause, size, float(stats.t.ppf(0.975, free)) * width, size / width, chi2))
+    p = _predicted(calm, axes, layout is not None)
+    z = (flight @ axes.T - p.mean) / p.sd
+    D = np.stack([axes @ way for way in ways.values()]) / p.sd
+    length = np.linalg.norm(D, axis=1)
+    T, null = D / length[:, None] @ z, p.draws @ (D / length[:, None]).T
+    bar = float(np.quantile(null.max(axis=1), 1.0 - (1.0 - _OTHER) * alarm))
+    half = np.quantile(np.abs(null), 0.95, axis=0) / length
+    found = [
+        FlightEvidence(cause, float(t / w), float(h), float(t), float(z @ z - t * t))
+        for cause, t, w, h in zip(ways, T, length, half, strict=True)
+    ]
     found.sort(key=lambda e: (e.t <= 0.0, e.chi2))
-    bar = float(stats.t.ppf(1.0 - alarm / len(ways), free))
-    totals = healthy.mean(axis=1)
-    total_half = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
-    visible = bar * max(1.0 / float(np.linalg.norm(W @ d)) for cause, d in ways.items() if "blade" in cause)
-    said = FlightVerdict("none", (), "", tuple(found), change, scatter, visible, total=total, total_half=total_half)
-    gate = float(stats.f.ppf(1.0 - alarm, z.size, free))
-    off = float(z @ z) / z.size
-    rest = z.size - 1
-    most = rest * float(stats.f.ppf(1.0 - alarm, max(rest, 1), free))
+    blades = [w for cause, w in zip(ways, length, strict=True) if cause.startswith("damaged")]
+    square = np.sum(p.draws**2, axis=1)
+    gate = float(np.quantile(square, 1.0 - _OTHER * alarm))
+    most = float(np.quantile(square - np.max(null, axis=1).clip(0.0) ** 2, 1.0 - GATE))
+    totals = calm.mean(axis=1) if n else np.zeros(0)
+    spread = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)) if n > 1 else float("nan")
+    scatter = float(np.sqrt(np.sum((axes.T**2 * p.sd**2).sum(axis=1)) * B))
+    said = FlightVerdict("none", (), "", tuple(found), change, scatter, bar / min(blades), total=total,
+                         total_half=spread, given=n)  # fmt: skip
     best = found[0]
-    if best.t < bar:
-        if off > gate and best.chi2 > most:
-            return replace(
-                said, verdict="unknown", why="the balance moved, but not as one rotor or one weight moves it"
-            )
-        return replace(said, why="no more than healthy flights differ")
-    if rest > 0 and best.chi2 > most and best.chi2 > 0.25 * best.t**2:
-        return replace(said, verdict="unknown", why="no listed cause leaves a rest as small as healthy flights have")
     alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - best.chi2 < ALIKE)
-    if len(alike) == 1:
-        return replace(said, verdict="named", effects=alike, why="one cause explains the balance, the others do not")
-    return replace(said, verdict="class", effects=alike, why="these explain the balance equally well")
+    if best.t < bar and (float(z @ z) < gate or best.chi2 < most):
+        if n < _LEAST:
+            why = (f"{n or 'no'} healthy flight{'s' if n > 1 else ''} to compare with, and no more than healthy "
+                   "vehicles differ: give three or more with --healthy")  # fmt: skip
+            return replace(said, verdict="insufficient", why=why, rule="too few healthy flights")
+        return replace(said, why="no more than healthy flights differ", rule="within the healthy scatter")
+    if n == 0:
+        why = "the drives differ by more than in healthy vehicles; give healthy flights of this one to know"
+        return replace(said, verdict="class", effects=(*alike, BUILD), why=why, rule="alone, beyond healthy vehicles")
+    if best.t >= bar and (best.chi2 < most or best.chi2 < 0.25 * best.t**2):
+        if len(alike) == 1:
+            why = "one cause explains the balance, the others do not"
+            return replace(said, verdict="named", effects=alike, why=why, rule="one cause")
+        return replace(said, verdict="class", effects=alike, why="these explain the balance equally well",
+                       rule="causes that look alike")  # fmt: skip
+    pairs = _pairs(D, z, list(ways), half * length)
+    good = [e for e in pairs if e.chi2 < most and e.chi2 < best.chi2 - 2.0 * EARNED]
+    if good:
+        effects = tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)
+        why = "no single cause explains the balance; two damaged rotors do"
+        return replace(said, verdict="named" if len(effects) == 1 else "class", effects=effects, why=why,
+                       explanations=(*good, *found), rule="two rotors")  # fmt: skip
+    why = "the balance moved, but not as one or two rotors or one weight move it"
+    return replace(said, verdict="unknown", why=why, rule="no listed cause")
 
 
-def _whitening(spread: Array, layout: Array | None) -> tuple[Array, int]:
-    """Whitening of the shares, (k, B), and its degrees of freedom.
-
-    Where the layout is known the axes are those of the body: a battery put in elsewhere moves roll and pitch, not yaw.
-    The variance of each axis is shrunk to the common one with the weight of as many flights as there are axes.
-    """
-    n, B = spread.shape
-    inner = np.eye(B) - 1.0 / B
-    if layout is None:
-        axes = np.linalg.svd(inner)[2][: B - 1]
-    else:
-        q, r = np.linalg.qr((effect_matrix(layout)[:3] @ inner).T)
-        axes = q[:, np.abs(np.diag(r)) > 1e-9].T
-    k = len(axes)
-    own = np.sum((spread @ axes.T) ** 2, axis=0)
-    common = max(float(own.sum()) / ((n - 1) * k), 1e-12)
-    if layout is None:
-        return axes / np.sqrt(common), (n - 1) * k
-    variance = (own + k * common) / (n - 1 + k)
-    return axes / np.sqrt(variance)[:, None], n - 1 + k
+def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvidence]:
+    """Two damaged rotors, both with a loss, best first; the size is that of the smaller one."""
+    out = []
+    blades = [i for i, name in enumerate(names) if name.startswith("damaged")]
+    for i, j in combinations(blades, 2):
+        pair = D[[i, j]].T
+        size, *_ = np.linalg.lstsq(pair, z, rcond=None)
+        if np.linalg.matrix_rank(pair) < 2 or size.min() <= 0.0:
+            continue
+        u = np.sqrt(np.diag(np.linalg.inv(pair.T @ pair)))
+        k = int(np.argmin(size))
+        a, b = (name.rsplit(" ", 1)[1] for name in (names[i], names[j]))
+        misfit = float(np.sum((z - pair @ size) ** 2))
+        out.append(FlightEvidence(f"damaged blades, motors {a} and {b}", float(size[k]), float(half[i] * u[k]),
+                                  float(size[k] / u[k]), misfit))  # fmt: skip
+    return sorted(out, key=lambda e: e.chi2)
 
 
 def _directions(B: int, layout: Array | None) -> dict[str, Array]:
     """Change of the log shares of each cause, for unit change of that rotor's drive."""
-    eye = np.eye(B)
-    P, Q = eye, None
+    out = {f"damaged blade, motor {k + 1}": np.eye(B)[k] for k in range(B)}
     if layout is not None:
         A = effect_matrix(layout)
         back = np.linalg.pinv(A)
-        P, Q = back @ A, back @ np.diag([1.0, 1.0, 0.0, 1.0]) @ A
-    out = {f"damaged blade, motor {k + 1}": P[:, k] for k in range(B)}
-    if Q is not None:
-        out |= {f"weight near motor {k + 1}": Q[:, k] for k in range(B)}
+        out = {name: back @ A @ d for name, d in out.items()}
+        places: dict[tuple[float, ...], list[int]] = {}
+        for k in range(B):
+            places.setdefault(tuple(np.round(A[:2, k], 6)), []).append(k + 1)
+        for motors in places.values():
+            where = f"motor {motors[0]}" if len(motors) == 1 else f"motors {' and '.join(map(str, motors))}"
+            out[f"weight near {where}"] = back @ np.diag([1.0, 1.0, 0.0, 1.0]) @ A[:, motors[0] - 1]
     return {cause: d - d.mean() for cause, d in out.items()}
