@@ -73,4 +73,4 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "position": many(*(f"stateEstimate.{a}" for a in "xyz")),
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
     }
-    return joined(name, kind, sources, "command", layout="crazyflie", ends=ends)
+    return joined(name, kind, sources, "command", raw=sources["acceleration"], layout="crazyflie", ends=ends)

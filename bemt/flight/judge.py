@@ -30,7 +30,7 @@ from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
 from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
 
-__all__ = ["FALSE_ALARM", "FlightEvidence", "FlightVerdict", "axes_of", "features", "judge"]
+__all__ = ["ALIKE", "FALSE_ALARM", "FlightEvidence", "FlightVerdict", "axes_of", "directions", "features", "judge"]
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 _LEAST = 3  # healthy flights from which a cause is named
 _DRAWS = 10_000
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
-BUILD = "an uneven build of this vehicle"
+_BUILD, _WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +223,7 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
     total = float(change.mean()) if n else float("nan")
     change = change - change.mean()
     axes = axes_of(layout, B)
-    ways = _directions(B, layout)
+    ways = directions(B, layout)
     p = _predicted(calm, axes, layout is not None)
     z = (flight @ axes.T - p.mean) / p.sd
     D = np.stack([axes @ way for way in ways.values()]) / p.sd
@@ -253,9 +253,12 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
                    "vehicles differ: give three or more with --healthy")  # fmt: skip
             return replace(said, verdict="insufficient", why=why, rule="too few healthy flights")
         return replace(said, why="no more than healthy flights differ", rule="within the healthy scatter")
-    if n == 0:
-        why = "the drives differ by more than in healthy vehicles; give healthy flights of this one to know"
-        return replace(said, verdict="class", effects=(*alike, BUILD), why=why, rule="alone, beyond healthy vehicles")
+    if n < _LEAST and best.t >= bar:
+        why = (
+            "this is more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
+        )
+        rest = _WIDE if n else _BUILD
+        return replace(said, verdict="class", effects=(*alike, rest), why=why, rule="beyond other healthy vehicles")
     if best.t >= bar and (best.chi2 < most or best.chi2 < 0.25 * best.t**2):
         if len(alike) == 1:
             why = "one cause explains the balance, the others do not"
@@ -291,8 +294,8 @@ def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvid
     return sorted(out, key=lambda e: e.chi2)
 
 
-def _directions(B: int, layout: Array | None) -> dict[str, Array]:
-    """Change of the log shares of each cause, for unit change of that rotor's drive."""
+def directions(B: int, layout: Array | None) -> dict[str, Array]:
+    """Change of the log shares of each cause, (B,), for unit change of that rotor's drive."""
     out = {f"damaged blade, motor {k + 1}": np.eye(B)[k] for k in range(B)}
     if layout is not None:
         A = effect_matrix(layout)

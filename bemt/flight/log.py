@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Source = tuple[Array, Array]
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
+_MOST = 400_000  # samples on the common time base; longer logs are thinned (an hour at 100 Hz is 360,000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +47,11 @@ class FlightLog:
         Residual force that the log holds, in its own unit.
     voltage, battery_current : (N,) float or None
         Battery [V, A].
+    raw : (times, values) or None
+        Accelerometer at its own rate, with gaps where it was sampled in bursts: (M,) [s], (M, 3) [m/s2]; where there is
+        none, the gyro [rad/s], as `raw_unit` says.
     command_unit, layout : str
-        Unit of the commands; usual layout of the format, may be empty.
+        Unit of the commands; layout that the log states or the format usually has, may be empty.
     join_s : dict of str to float
         Half the sample interval of each quantity's source: how far a value may lie from its time [s].
     ends : str
@@ -68,6 +72,8 @@ class FlightLog:
     force: Array | None = None
     voltage: Array | None = None
     battery_current: Array | None = None
+    raw: Source | None = None
+    raw_unit: str = "m/s2"
     command_unit: str = "1"
     layout: str = ""
     join_s: dict[str, float] = field(default_factory=dict)
@@ -121,7 +127,9 @@ def upright_share(q: Array) -> Array:
     return out
 
 
-def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str, **more: str) -> FlightLog:
+def joined(
+    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
+) -> FlightLog:
     """Put sources with clocks of their own on one time base, linearly.
 
     Parameters
@@ -131,7 +139,9 @@ def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str
     sources : mapping of str to (times, values) or None
         Times (M,) [s]; values (M,) or (M, k) in units of :class:`FlightLog`.
     main : str
-        Source whose times are kept.
+        Source whose times are kept; of more than 400,000 every second, third, ... one.
+    raw : (times, values) or None
+        Accelerometer or gyro that keeps its own times.
     **more : str
         Further attributes of the log.
 
@@ -145,22 +155,32 @@ def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str
         if source is None:
             continue
         t, v = np.asarray(source[0], dtype=float), np.asarray(source[1], dtype=float)
-        good = np.isfinite(t) & np.isfinite(v.reshape(t.size, -1)).all(axis=1)
-        # A damaged clock jumps: times that fall back, and gaps of hours, end the usable part.
-        t, v = t[good], v[good]
-        jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
-        if jump.size:
-            t, v = t[: jump[0] + 1], v[: jump[0] + 1]
-        t, order = np.unique(t, return_index=True)
-        if t.size > 1:
-            clean[key] = (t, v[order])
+        whole = _whole(t, v)
+        if whole[0].size > 1:
+            clean[key] = whole
     if main not in clean or clean[main][0].size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
     t = clean[main][0]
+    t = t[:: -(-t.size // _MOST)]
     columns, halves = {}, {}
     for key, (at, v) in clean.items():
         flat = v.reshape(at.size, -1)
         put = np.stack([np.interp(t, at, c) for c in flat.T], axis=1)
         columns[key] = put[:, 0] if v.ndim == 1 else put
         halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
-    return FlightLog(file, kind, t - t[0], join_s=halves, **columns, **more)  # type: ignore[arg-type]
+    fast = None
+    if raw is not None and raw[0].size > 1:
+        at, v = _whole(raw[0], raw[1])
+        fast = (at - t[0], v)
+    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)  # type: ignore[arg-type]
+
+
+def _whole(t: Array, v: Array) -> Source:
+    """Finite samples in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
+    good = np.isfinite(t) & np.isfinite(v.reshape(t.size, -1)).all(axis=1)
+    t, v = t[good], v[good]
+    jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
+    if jump.size:
+        t, v = t[: jump[0] + 1], v[: jump[0] + 1]
+    t, order = np.unique(t, return_index=True)
+    return t, v[order]

@@ -1,4 +1,9 @@
-"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes."""
+"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes.
+
+Only the topics that are used are kept, so memory does not follow the size of the file. The layout is that of the
+parameters CA_ROTORn_PX, PY (ahead, to the right) and KM (above zero: turns to the left, seen from above). Pulse widths
+are shares of PWM_MIN to PWM_MAX. Raw bursts of the accelerometer are sensor_accel_fifo.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
+from bemt.flight.layout import layout_text
 from bemt.flight.log import FlightLog, Source, joined, upright_share
 
 Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
-           "vehicle_local_position", "battery_status"]  # fmt: skip
+           "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
 
@@ -54,17 +60,23 @@ def _made(name: str, found: Any) -> FlightLog:
             [np.asarray(data[k], dtype=float) for k in keys], axis=1
         )
 
+    params = {k: float(v) for k, v in found.initial_parameters.items()}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
     if command is None:
         command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
+        low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
+        if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
+            command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
     B = command[1].shape[1] if command else 0
-    count = min(B or 8, 8)
-    speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in range(count)])
+    escs = _escs(tables.get("esc_status", {}), B)
+    speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in escs])
     if speeds is not None and not np.any(speeds[1]):
         speeds = None
-    if B == 0 and speeds is not None:
+    if speeds is not None:
+        speeds = (speeds[0], np.abs(speeds[1]))  # the sign is the turning in a simulator
+    if B == 0:
         speeds = _active(speeds)
-    currents = take("esc_status", [f"esc[{i}].esc_current" for i in range(count)])
+    currents = take("esc_status", [f"esc[{i}].esc_current" for i in escs])
     q = take("vehicle_attitude", [f"q[{i}]" for i in range(4)])
     xyz, vel = take("vehicle_local_position", list("xyz")), take("vehicle_local_position", ["vx", "vy", "vz"])
     acc = take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)])
@@ -84,9 +96,46 @@ def _made(name: str, found: Any) -> FlightLog:
     }
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
-    layout = "px4-x" if (B or 4) == 4 else ""
+    layout = _layout(params, B) or ("px4-x" if (B or 4) == 4 else "")
     main = "command" if command else "rpm" if speeds else "acceleration"
-    return joined(name, KIND, sources, main, command_unit=unit, layout=layout, ends=ends)
+    raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
+    return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends)
+
+
+def _escs(data: dict[str, Array], B: int) -> list[int]:
+    """Speed controllers in the order of the motors: by the function of each where it is logged (101 is motor 1)."""
+    count = min(B or 8, 8)
+    known = {}
+    for i in range(8):
+        function = data.get(f"esc[{i}].actuator_function", np.zeros(0))
+        if function.size and 101 <= function[-1] <= 112:
+            known[int(function[-1]) - 101] = i
+    return [known[k] for k in range(count)] if set(range(count)) <= set(known) else list(range(count))
+
+
+def _layout(params: dict[str, float], B: int) -> str:
+    """Layout by the parameters of the control allocation; empty where they are not set."""
+    if B < 2 or params.get("CA_ROTOR_COUNT") != B:
+        return ""
+    x, y, turn = ([params.get(f"CA_ROTOR{i}_{k}", 0.0) for i in range(B)] for k in ("PX", "PY", "KM"))
+    if not (np.all(np.isfinite([x, y, turn])) and np.all(turn) and np.all(np.hypot(x, y) > 1e-3)):
+        return ""
+    return layout_text(x, -np.array(y), turn)
+
+
+def _bursts(data: dict[str, Array]) -> Source | None:
+    """Raw accelerations, in order of time; z up."""
+    if any(k not in data for k in ("timestamp_sample", "dt", "scale", "samples", "x[0]", "y[31]", "z[31]")):
+        return None
+    count = np.clip(np.asarray(data["samples"], dtype=int), 0, 32)
+    step = np.asarray(data["dt"], dtype=float)
+    k = np.arange(32)
+    # The stamp is that of the last sample.
+    t = 1e-6 * (np.asarray(data["timestamp_sample"], dtype=float)[:, None] - step[:, None] * (count[:, None] - 1 - k))
+    used = k < count[:, None]
+    scale = np.asarray(data["scale"], dtype=float)[:, None]
+    xyz = [np.stack([np.asarray(data[f"{a}[{i}]"], dtype=float) for i in k], axis=1) * scale for a in "xyz"]
+    return t[used], np.stack([a[used] for a in xyz], axis=1) * _FLIP
 
 
 def _moves(data: dict[str, Array]) -> int:
