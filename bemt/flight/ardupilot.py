@@ -32,7 +32,7 @@ _WANTED: dict[str, tuple[str, ...]] = {
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "ESC": ("Instance", "RPM", "Curr"),
     "IMU": ("I", *_IMU),
-    "ATT": ("Roll", "Pitch"),
+    "ATT": ("Roll", "Pitch", "Yaw"),
     "BAT": ("Instance", "Inst", "Volt", "Curr"),
     "XKF1": ("C", "VN", "VE", "VD", "PN", "PE", "PD"),
     "NKF1": ("C", "VN", "VE", "VD", "PN", "PE", "PD"),
@@ -193,7 +193,8 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
             )
     if speeds is not None and not np.any(speeds[1]):
         speeds = None
-    att, battery = take("ATT", ("Roll", "Pitch")), take("BAT", ("Volt", "Curr"))
+    att, battery = take("ATT", ("Roll", "Pitch", "Yaw")), take("BAT", ("Volt", "Curr"))
+    axis = (att[0], _thrust_axis(np.radians(att[1]))) if att else None
     state = "XKF1" if "XKF1" in found else "NKF1"
     acceleration = flipped(take("IMU", _IMU[3:]))
     sources = {
@@ -202,7 +203,8 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
         "current": currents,
         "acceleration": acceleration,
         "rates": flipped(take("IMU", _IMU[:3])),
-        "upright": (att[0], np.prod(np.cos(np.radians(att[1])), axis=1)) if att else None,
+        "upright": (axis[0], axis[1][:, 2]) if axis else None,
+        "axis": axis,
         "velocity": flipped(take(state, ("VN", "VE", "VD"))),
         "position": flipped(take(state, ("PN", "PE", "PD"))),
         "voltage": (battery[0], battery[1][:, 0]) if battery else None,
@@ -214,6 +216,12 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     main = "command" if command else "rpm" if speeds else "acceleration"
     raw = _bursts(found) or acceleration
     return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends)
+
+
+def _thrust_axis(angles: Array) -> Array:
+    """Thrust in north-west-up, from roll, pitch and yaw of front-right-down in NED [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles).T, np.cos(angles).T
+    return np.stack([-(cr * sp * cy + sr * sy), cr * sp * sy - sr * cy, cr * cp], axis=1)
 
 
 def _moving(outputs: Mapping[str, NDArray[Any]]) -> list[int]:

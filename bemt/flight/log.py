@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["FlightLog", "joined", "upright_share"]
+__all__ = ["FlightLog", "joined", "thrust_axis"]
 
 Array = NDArray[np.float64]
 Source = tuple[Array, Array]
@@ -41,6 +41,8 @@ class FlightLog:
         Angular velocity in body axes, z up [rad/s].
     upright : (N,) float or None
         Cosine of the tilt [1].
+    axis : (N, 3) float or None
+        Unit vector of the thrust, in axes of the world, z up [1].
     velocity, position : (N, 3) float or None
         In axes of the world, z up [m/s, m].
     force : (N, 3) float or None
@@ -67,6 +69,7 @@ class FlightLog:
     acceleration: Array | None = None
     rates: Array | None = None
     upright: Array | None = None
+    axis: Array | None = None
     velocity: Array | None = None
     position: Array | None = None
     force: Array | None = None
@@ -105,26 +108,26 @@ class FlightLog:
         return np.asarray(on & late, dtype=bool)
 
 
-def upright_share(q: Array) -> Array:
-    """Cosine of the tilt of unit quaternions.
+def thrust_axis(q: Array) -> Array:
+    """The body's z axis in axes of the world.
 
     Parameters
     ----------
     q : (N, 4) float
-        Scalar first [1].
+        Unit quaternions from body to world, scalar first [1].
 
     Returns
     -------
-    (N,) float
-        Share of the body's z axis along the world's [1].
+    (N, 3) float
+        Unit vectors [1].
 
     Examples
     --------
-    >>> upright_share(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))
+    >>> thrust_axis(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))[:, 2]
     array([ 1., -1.])
     """
-    out: Array = 1.0 - 2.0 * (q[:, 1] ** 2 + q[:, 2] ** 2)
-    return out
+    w, x, y, z = q.T
+    return np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x**2 + y**2)], axis=1)
 
 
 def joined(

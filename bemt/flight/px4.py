@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
 from bemt.flight.layout import layout_text
-from bemt.flight.log import FlightLog, Source, joined, upright_share
+from bemt.flight.log import FlightLog, Source, joined, thrust_axis
 
 Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
+_AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
 
@@ -78,6 +79,7 @@ def _made(name: str, found: Any) -> FlightLog:
         speeds = _active(speeds)
     currents = take("esc_status", [f"esc[{i}].esc_current" for i in escs])
     q = take("vehicle_attitude", [f"q[{i}]" for i in range(4)])
+    axis = (q[0], thrust_axis(q[1]) * _AXIS) if q else None
     xyz, vel = take("vehicle_local_position", list("xyz")), take("vehicle_local_position", ["vx", "vy", "vz"])
     acc = take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)])
     gyro = take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)])
@@ -88,7 +90,8 @@ def _made(name: str, found: Any) -> FlightLog:
         "current": currents,
         "acceleration": (acc[0], acc[1] * _FLIP) if acc else None,
         "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None,
-        "upright": (q[0], upright_share(q[1])) if q else None,
+        "upright": (axis[0], axis[1][:, 2]) if axis else None,
+        "axis": axis,
         "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
         "position": (xyz[0], xyz[1] * _FLIP) if xyz else None,
         "voltage": (volt[0], volt[1][:, 0]) if volt else None,

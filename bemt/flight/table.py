@@ -144,6 +144,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
         "command": got["pwm"],
         "rates": got.get("w"),
         "upright": (time, got["R"][1][:, 2, 2]),
+        "axis": (time, got["R"][1][:, :, 2]),
         "velocity": got["v"],
         "position": got.get("p"),
         "force": got.get("fa"),
