@@ -7,21 +7,46 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
-from bemt.flight.judge import FALSE_ALARM, FlightVerdict, features, judge
+from bemt.flight.inflow import Inflow, inflow
+from bemt.flight.judge import FALSE_ALARM, FlightVerdict, axes_of, features, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.repeat import flight_scatter
 from bemt.flight.simulator import simulator_constants
+from bemt.flight.vibration import Vibration, shaken, vibration
 from bemt.flight.wind import Wind, wind
 
-__all__ = ["FlightAnswer", "answer_on"]
+__all__ = ["FlightAnswer", "Predicted", "answer_on"]
+
+_FULL, _OFTEN = 0.98, 0.005  # share of full drive that is a limit; share of the time that is worth a word [1]
 
 SPEED_POWER = 0.1
 """Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
 8,000 or 15,000 rev/min on three benches of a Crazyflie (IMRCLab/crazyflie-data-collection @ 4d777a5a) [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What the model of a case says of the rotor in this flight.
+
+    Attributes
+    ----------
+    constant, u : float
+        Thrust constant at the mean speed, hovering, and its standard uncertainty [N/rpm^2].
+    axial, inplane : (2, n) float
+        Velocity along the axis (above zero in a climb) and in the plane [m/s], and the relative change of the thrust
+        constant that it makes [1].
+    """
+
+    constant: float
+    u: float
+    axial: NDArray[np.float64]
+    inplane: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +63,23 @@ class FlightAnswer:
         The decision, with the evidence and the error rate.
     wind : Wind
         Speed [m/s].
+    balance : tuple of float
+        By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
+        that turn to the left than those that turn to the right; empty without a layout [1].
+    limited : tuple of float
+        Share of the time at full command, of each motor [1].
+    change : FlightChange or None
+        A change within the flight.
+    vibration : Vibration
+        At the frequencies of the rotors.
+    shaken : tuple of (int, float, bool)
+        As :func:`bemt.flight.vibration.shaken` gives it.
+    inflow : Inflow or None
+        Thrust over the flow.
     mass : Constant or None
         Mass from healthy flights of known mass [kg].
-    predicted : tuple of float or None
-        Thrust constant of the case at the mean speed, and its standard uncertainty [N/rpm^2].
+    predicted : Predicted or None
+        The case in this flight.
     simulator : dict of str to Constant
         Constants in the units of simulators; the band of the thrust constant holds what flights differ by.
     """
@@ -50,40 +88,67 @@ class FlightAnswer:
     found: Identified
     judged: FlightVerdict
     wind: Wind
+    balance: tuple[float, ...] = ()
+    limited: tuple[float, ...] = ()
+    change: FlightChange | None = None
+    vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
+    shaken: tuple[tuple[int, float, bool], ...] = ()
+    inflow: Inflow | None = None
     mass: Constant | None = None
-    predicted: tuple[float, float] | None = None
+    predicted: Predicted | None = None
     simulator: dict[str, Constant] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1."""
-        log, f = self.log, self.found
+        log, f, j, flow, said = self.log, self.found, self.judged, self.inflow, self.predicted
         return {
             "schema": "bemt.flight/1",
             "readings": {
                 "file": log.file, "format": log.format, "rotors": log.rotors, "samples": int(log.t.size),
                 "flying_s": float(log.flying.mean() * np.ptp(log.t)), "command_unit": log.command_unit,
-                "join_s": log.join_s, "ends": log.ends,
+                "layout": log.layout, "join_s": log.join_s, "ends": log.ends,
             },
             "constants": {k: asdict(c) for k, c in f.constants.items()},
             "simulator": {k: asdict(c) for k, c in self.simulator.items()},
             "rotors": {k: list(v) for k, v in f.rotors.items()},
+            "balance": dict(zip(("left_right", "front_rear", "left_turning_right_turning"), self.balance,
+                                strict=False)),
+            "at_full_command": list(self.limited),
             "mass_kg": None if self.mass is None else asdict(self.mass),
-            "baseline": None if self.predicted is None else
-                {"thrust_constant": self.predicted[0], "u": self.predicted[1], "unit": "N/rpm^2"},
-            "decision": {"verdict": self.judged.verdict, "effects": list(self.judged.effects), "why": self.judged.why},
-            "explanations": [asdict(e) for e in self.judged.explanations],
-            "error_rate": {"accused": self.judged.accused, "healthy": self.judged.healthy,
-                           "interval95": list(self.judged.rate95)},
-            "visible": self.judged.visible,
-            "share_change": self.judged.readings.tolist(),
-            "total_change": self.judged.total,
+            "baseline": None if said is None else
+                {"thrust_constant": said.constant, "u": said.u, "unit": "N/rpm^2"},
+            "decision": {"verdict": j.verdict, "effects": list(j.effects), "why": j.why, "rule": j.rule},
+            "explanations": [asdict(e) for e in j.explanations],
+            "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95)},
+            "visible": j.visible,
+            "share_change": j.readings.tolist(),
+            "total_change": j.total,
+            "change_in_flight": None if self.change is None else asdict(self.change),
+            "vibration": asdict(self.vibration),
+            "shaken": [{"motor": k + 1, "ratio": r, "against_healthy": h} for k, r, h in self.shaken],
+            "inflow": None if flow is None else {"axial": flow.axial, "axial_m_s": flow.axial_m_s,
+                                                 "inplane": flow.inplane, "inplane_m_s": flow.inplane_m_s},
             "wind": asdict(self.wind),
-            "unseen": list(f.unseen),
+            "unseen": list(self.unseen),
         }  # fmt: skip
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """What the log cannot show, with the manoeuvre or channel that would."""
+        out, flow, shake = list(self.found.unseen), self.inflow, self.vibration
+        if shake.missing and self.log.rotors:
+            more = "; log it at more than twice the shaft frequency" if "which rotor" not in shake.missing else ""
+            out.append(f"vibration, tape and imbalance: {shake.missing}{more}")
+        if flow is None:
+            out.append("thrust in forward flight, climb and descent: log speed of the rotors, accelerometer, velocity "
+                       "and attitude")  # fmt: skip
+        elif flow.axial is None or abs(flow.axial[0]) < flow.axial[1]:
+            out.append("thrust in climb and descent: fly both at three steady rates, up to a third of the hover's wash")
+        return tuple(out)
 
     def text(self) -> str:
         """One screen."""
-        log, j, f = self.log, self.judged, self.found
+        log, j = self.log, self.judged
         seconds = log.flying.mean() * np.ptp(log.t)
         lines = [f"{log.file}: {log.format}, {log.rotors} rotors, {seconds:.1f} s in the air"]
         if log.ends:
@@ -96,7 +161,8 @@ class FlightAnswer:
                 f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)."
             )
         if np.isfinite(j.visible):
-            lines.append(f"  A rotor shows here from a change of its drive by {100 * j.visible:.0f} %.")
+            against = "against these healthy flights" if j.given else "without healthy flights of this vehicle"
+            lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
         if j.verdict == "none" and j.healthy:
             lines.append(
                 "  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data."
@@ -104,26 +170,84 @@ class FlightAnswer:
         if j.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
             lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
                          f"±{100 * j.total_half:.1f} %): weight at the centre, battery or air.")  # fmt: skip
+        lines += self._seen()
+        lines += ["", "Identified (± 95 %)"] if self.found.constants else []
+        lines += [f"  {name:<34} {_number(c)}" for name, c in self.found.constants.items()]
+        lines += [f"  {name:<34} {', '.join(f'{v:.4g}' for v in values)}" for name, values in self.found.rotors.items()]
+        if self.mass is not None:
+            lines.append(f"  {'mass, from the healthy flights':<34} {_number(self.mass)}")
+        if self.predicted is not None:
+            k, u = self.predicted.constant, self.predicted.u
+            lines.append(
+                f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)"
+            )
+        lines += self._flow()
+        if self.simulator:
+            lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
+            lines += [f"  {name:<34} {_number(c)}" for name, c in self.simulator.items()]
+        lines += ["", "Not visible here"] if self.unseen else []
+        lines += [f"  {u}" for u in self.unseen]
+        return "\n".join(lines)
+
+    def _seen(self) -> list[str]:
+        """Lines on what this flight alone shows."""
+        lines, shares = [], self.found.rotors.get("mean command", self.found.rotors.get("share of rpm^2", ()))
+        if shares:
+            mean = sum(shares) / len(shares)
+            each = ", ".join(f"{i + 1}: {100 * (v / mean - 1.0):+.0f} %" for i, v in enumerate(shares))
+            lines.append(f"  Drive of each motor against their mean: {each}.")
+        if len(self.balance) == 3:
+            pairs = (("left", "right"), ("front", "rear"), ("left-turning", "right-turning"))
+            parts = [f"{a if b > 0 else c} over {c if b > 0 else a} {100 * abs(b):.0f} %"
+                     for (a, c), b in zip(pairs, self.balance, strict=True)]  # fmt: skip
+            lines.append(f"  Driven harder: {', '.join(parts)} (centre of mass; tilted motors or trim in yaw).")
+        full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(self.limited) if v > _OFTEN]
+        if full:
+            lines.append(f"  At full command: {', '.join(full)} of the time.")
+        c, shake = self.change, self.vibration
+        if c is not None:
+            when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
+            lines.append(f"  {when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
+                         f"{', '.join(c.causes)}.")  # fmt: skip
+        for k, ratio, known in self.shaken:
+            against = "in healthy flights" if known else "the other rotors"
+            lines.append(f"  Motor {k + 1} shakes {ratio:.1f} times as much as {against} at its shaft frequency: "
+                         "imbalance, tape or a damaged blade.")  # fmt: skip
+        heard = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.amplitude) if np.isfinite(v)]
+        if heard:
+            lines.append(f"  Vibration once a turn ({shake.shaft_hz:.0f} Hz): {', '.join(heard)} {shake.unit}.")
+        elif np.isfinite(shake.line):
+            lines.append(f"  Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz.")
         if np.isfinite(self.wind.speed):
             w = self.wind
             seen = "Wind" if w.speed > w.half else "No wind seen:"
             lines.append(f"  {seen} {w.speed:.1f} ± {w.half:.1f} m/s towards {w.heading_deg:.0f} deg from x.")
-        lines += ["", "Identified (± 95 %)"]
-        lines += [f"  {name:<34} {_number(c)}" for name, c in f.constants.items()]
-        lines += [f"  {name:<34} {', '.join(f'{v:.4g}' for v in values)}" for name, values in f.rotors.items()]
-        if self.mass is not None:
-            lines.append(f"  {'mass, from the healthy flights':<34} {_number(self.mass)}")
-        if self.predicted is not None:
-            k, u = self.predicted
-            lines.append(
-                f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)"
-            )
-        if self.simulator:
-            lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
-            lines += [f"  {name:<34} {_number(c)}" for name, c in self.simulator.items()]
-        lines += ["", "Not visible here"] if f.unseen else []
-        lines += [f"  {u}" for u in f.unseen]
-        return "\n".join(lines)
+        return lines
+
+    def _flow(self) -> list[str]:
+        """Lines on thrust in moving air, with the model's own where there is a case."""
+        flow, said, lines = self.inflow, self.predicted, []
+        if flow is None:
+            return []
+        for name, got, at, model in (
+            (
+                "thrust at {:+.1f} m/s along the axis",
+                flow.axial,
+                flow.axial_m_s[1],
+                None if said is None else said.axial,
+            ),
+            (
+                "thrust at {:.1f} m/s in the plane",
+                flow.inplane,
+                flow.inplane_m_s,
+                None if said is None else said.inplane,
+            ),
+        ):
+            if got is not None:
+                more = "" if model is None else f"; model {100 * np.interp(at, *model):+.1f} %"
+                what = f"{100 * got[0]:+.1f} ± {100 * got[1]:.1f} % at equal speed of the rotors{more}"
+                lines.append(f"  {name.format(at):<34} {what}")
+        return lines
 
 
 def _number(c: Constant) -> str:
@@ -197,7 +321,17 @@ def answer_on(
         known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
         if known:
             mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
-    return FlightAnswer(log, found, judged, wind(log, healthy), mass, simulator=simulator_constants(log, found))
+    shake = vibration(log)
+    balance: tuple[float, ...] = ()
+    limited: tuple[float, ...] = ()
+    if mine is not None and placed is not None:
+        balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ mine)
+    if log.command is not None and log.command_unit == "1" and log.flying.any():
+        limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
+    return FlightAnswer(
+        log, found, judged, wind(log, healthy), balance, limited, change_in(log, placed), shake,
+        shaken(shake, [vibration(h) for h in healthy]), inflow(log), mass, simulator=simulator_constants(log, found),
+    )  # fmt: skip
 
 
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:

@@ -5,8 +5,8 @@ can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor 
 pitch, yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw:
 A+ diag(1, 1, 0, 1) A e_k.
 
-Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share the
-trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 is the healthy flights' own, pooled with that of other
+Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share
+the trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 is the healthy flights' own, pooled with that of other
 vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6); w is that of
 :mod:`bemt.flight.population` and hardly matters once there is a healthy flight. One s for all readings: on left-out
 healthy flights of three vehicles it predicts as well as one for each or for tilt and yaw apart (docs/flight_logs.md).
@@ -145,7 +145,8 @@ def axes_of(layout: Array | None, rotors: int) -> Array:
     """
     inner = np.eye(rotors) - 1.0 / rotors
     if layout is None:
-        return np.linalg.svd(inner)[2][: rotors - 1] / np.sqrt(rotors)
+        free: Array = np.linalg.svd(inner)[2][: rotors - 1] / np.sqrt(rotors)
+        return free
     rows = effect_matrix(layout)[:3] @ inner
     q, r = np.linalg.qr(rows.T)
     found: Array = (q * np.sign(np.diag(r))).T[np.abs(np.diag(r)) > 1e-9] / np.sqrt(rotors)
@@ -249,8 +250,8 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
     alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - best.chi2 < ALIKE)
     if best.t < bar and (float(z @ z) < gate or best.chi2 < most):
         if n < _LEAST:
-            why = (f"{n or 'no'} healthy flight{'s' if n > 1 else ''} to compare with, and no more than healthy "
-                   "vehicles differ: give three or more with --healthy")  # fmt: skip
+            why = ("no motor stands out by more than in healthy vehicles; give three or more healthy flights of this "
+                   "one with --healthy")  # fmt: skip
             return replace(said, verdict="insufficient", why=why, rule="too few healthy flights")
         return replace(said, why="no more than healthy flights differ", rule="within the healthy scatter")
     if n < _LEAST and best.t >= bar:

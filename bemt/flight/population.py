@@ -1,7 +1,7 @@
 """What recorded healthy vehicles show: how their trim differs from flight to flight, and from vehicle to vehicle.
 
-Readings are the roll, pitch and yaw parts of the logs of the motors' drives (:func:`bemt.flight.judge.axes_of`): each is
-a quarter of a blade's change of drive on a quadrotor.
+Readings are the roll, pitch and yaw parts of the logs of the motors' drives (:func:`bemt.flight.judge.axes_of`): each
+is a quarter of a blade's change of drive on a quadrotor.
 
 Flight to flight: six flights of two Crazyflies 2.1, brushed (4) and brushless (2), IMRCLab/crazyflie-data-collection
 @ 4d777a5a: standard deviations of roll, pitch, yaw 0.30, 1.27, 0.63 % and 0.05, 0.57, 0.12 %, pooled 0.75 %. One

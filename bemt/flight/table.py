@@ -1,8 +1,8 @@
 """Flights as CSV, plain or gzipped: Betaflight blackbox, variables of a Crazyflie, arrays in cells (t, v, R, pwm, fa).
 
 Betaflight (blackbox_decode): time in us, motor[i] 1000 to 2000 or DShot, eRPM[i] in hundreds of electrical rev/min,
-accSmooth counts, vbatLatest in V. Mechanical speed needs the pole count and acceleration the counts of 1 g: eRPM is used
-only with a row motor_poles before the headings, accSmooth with acc_1G.
+accSmooth counts, vbatLatest in V. Mechanical speed needs the pole count and acceleration the counts of 1 g: eRPM is
+used only with a row motor_poles before the headings, accSmooth with acc_1G.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def sniff(head: bytes) -> bool:
 
 
 _CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time")
-_USED = re.compile(r"t|t_s|time|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate)\..+|vbat(Latest)?|amperage(Latest)?"
+_USED = re.compile(r"t|t_s|time|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
 _HEAD_BYTES = 1 << 18  # within which the headings stand
 _ROWS = 200_000  # of a piece

@@ -85,7 +85,7 @@ def vibration(log: FlightLog) -> Vibration:
     nyquist = 0.5 * rate
     if np.isfinite(shaft) and shaft > 0.97 * nyquist:
         why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
-               f"{rate:.0f} samples a second, which show up to {nyquist:.0f} Hz")  # fmt: skip
+               f"{rate:.0f} samples a second, which show up to {0.97 * nyquist:.0f} Hz")  # fmt: skip
         return Vibration(rate, shaft, unit=log.raw_unit, missing=why)
     windows = _windows(log, t, step)
     if len(windows) < _LEAST or nyquist < 2.0 * _LOW_HZ:
@@ -109,9 +109,9 @@ def vibration(log: FlightLog) -> Vibration:
                          missing="which rotor shakes: log the speed of each")  # fmt: skip
     n = np.array([[np.interp(t[w], log.t, s).mean() for s in speeds.T] for w in windows])
     bins = n * size * step
-    shares = [_of_rotors(power, order * bins) for order in (1, 2)]
-    if np.any(np.isfinite(shares[0])):
-        return Vibration(rate, shaft, *shares, unit=log.raw_unit)
+    once, twice = _of_rotors(power, bins), _of_rotors(power, 2.0 * bins)
+    if np.any(np.isfinite(once)):
+        return Vibration(rate, shaft, once, twice, unit=log.raw_unit)
     got = float(np.sqrt(np.mean([_line(p, int(round(b)), f.size) ** 2 for p, b in zip(power, bins.mean(axis=1),
                                                                                       strict=True)])))  # fmt: skip
     return Vibration(rate, shaft, line_hz=shaft, line=got, unit=log.raw_unit,

@@ -4,6 +4,9 @@ Along the wind the force on the body is F = c w + b w |w|, w the wind less the b
 force (c, linear: rotor drag as in Faessler, Franchi and Scaramuzza, IEEE RA-L 3, 2018; not checked here) and the drag
 of the body (b). The slope over the body's own velocity is -(c + 2 b |w|), so the mean force and the slopes with and
 without wind give it: w = 2 F / (c + slope). The unit of the force cancels.
+
+The zero of the force is the mean of the calm flights. Whether it stays, one calm flight cannot show: half of it is
+taken as its standard uncertainty (an assumption); of several, their scatter.
 """
 
 from __future__ import annotations
@@ -74,8 +77,11 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     u_force = float(blocks.std(ddof=1)) / np.sqrt(_BLOCKS)
     u_still = float(np.mean([np.std([b.mean() for b in np.array_split(k.force[:, :2] @ axis, _BLOCKS)])
                              for k in still if k.force is not None])) / np.sqrt(_BLOCKS)  # fmt: skip
+    zeros = np.array([k.force[:, :2].mean(axis=0) @ axis for k in still if k.force is not None])
+    u_zero = 0.5 * abs(float(zeros[0])) if zeros.size == 1 else float(zeros.std(ddof=1) / np.sqrt(zeros.size))
     speed = 2.0 * size / total
-    relative = np.hypot(np.hypot(u_force, u_still) / max(size, 1e-9), np.hypot(u_slope, u_c) / total)
+    u_size = np.sqrt(u_force**2 + u_still**2 + u_zero**2)
+    relative = np.hypot(u_size / max(size, 1e-9), np.hypot(u_slope, u_c) / total)
     return Wind(speed, float(stats.t.ppf(0.975, _BLOCKS - 1)) * speed * float(relative), heading)
 
 
