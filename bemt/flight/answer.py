@@ -16,6 +16,7 @@ from bemt.flight.inflow import Inflow, inflow
 from bemt.flight.judge import FALSE_ALARM, FlightVerdict, axes_of, features, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
 from bemt.flight.simulator import simulator_constants
 from bemt.flight.vibration import Vibration, shaken, vibration
@@ -74,6 +75,8 @@ class FlightAnswer:
         At the frequencies of the rotors.
     shaken : tuple of (int, float, bool)
         As :func:`bemt.flight.vibration.shaken` gives it.
+    speeds : tuple of (int, float)
+        As :func:`bemt.flight.motor_speed.speed_changes` gives it.
     inflow : Inflow or None
         Thrust over the flow.
     mass : Constant or None
@@ -93,6 +96,7 @@ class FlightAnswer:
     change: FlightChange | None = None
     vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
     shaken: tuple[tuple[int, float, bool], ...] = ()
+    speeds: tuple[tuple[int, float], ...] = ()
     inflow: Inflow | None = None
     mass: Constant | None = None
     predicted: Predicted | None = None
@@ -126,6 +130,7 @@ class FlightAnswer:
             "change_in_flight": None if self.change is None else asdict(self.change),
             "vibration": asdict(self.vibration),
             "shaken": [{"motor": k + 1, "ratio": r, "against_healthy": h} for k, r, h in self.shaken],
+            "speed_at_drive": [{"motor": k + 1, "change": c} for k, c in self.speeds],
             "inflow": None if flow is None else {"axial": flow.axial, "axial_m_s": flow.axial_m_s,
                                                  "inplane": flow.inplane, "inplane_m_s": flow.inplane_m_s},
             "wind": asdict(self.wind),
@@ -209,6 +214,9 @@ class FlightAnswer:
             when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
             lines.append(f"  {when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
                          f"{', '.join(c.causes)}.")  # fmt: skip
+        for k, part in self.speeds:
+            what = "a lighter load: a damaged blade" if part > 0.0 else "a weak motor, bearing or controller"
+            lines.append(f"  Motor {k + 1} turns {100 * part:+.0f} % against its drive in healthy flights: {what}.")
         for k, ratio, known in self.shaken:
             against = "in healthy flights" if known else "the other rotors"
             lines.append(f"  Motor {k + 1} shakes {ratio:.1f} times as much as {against} at its shaft frequency: "
@@ -255,7 +263,7 @@ def _number(c: Constant) -> str:
 
 
 def _verdict(j: FlightVerdict) -> str:
-    leading = next((e for e in j.explanations if e.cause in j.effects), None)
+    leading = next((e for e in j.explanations if e.cause in j.effects and j.rule != "vibration"), None)
     size = "" if leading is None else f" ({100 * leading.size:+.0f} ± {100 * leading.half:.0f} % drive)"
     words = {
         "none": "No cause found: ",
@@ -321,7 +329,9 @@ def answer_on(
         known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
         if known:
             mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
-    shake = vibration(log)
+    shake, calm = vibration(log), [vibration(h) for h in healthy]
+    moved = shaken(shake, calm)
+    judged = _with_vibration(judged, moved, calm)
     balance: tuple[float, ...] = ()
     limited: tuple[float, ...] = ()
     if mine is not None and placed is not None:
@@ -329,9 +339,28 @@ def answer_on(
     if log.command is not None and log.command_unit == "1" and log.flying.any():
         limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
-        log, found, judged, wind(log, healthy), balance, limited, change_in(log, placed), shake,
-        shaken(shake, [vibration(h) for h in healthy]), inflow(log), mass, simulator=simulator_constants(log, found),
+        log, found, judged, wind(log, healthy), balance, limited, change_in(log, placed), shake, moved,
+        speed_changes(log, healthy), inflow(log), mass, simulator=simulator_constants(log, found),
     )  # fmt: skip
+
+
+def _with_vibration(
+    judged: FlightVerdict, moved: tuple[tuple[int, float, bool], ...], calm: Sequence[Vibration]
+) -> FlightVerdict:
+    """The verdict where the balance shows nothing and one rotor shakes more than in healthy flights."""
+    known = [(k, ratio) for k, ratio, by_healthy in moved if by_healthy]
+    if judged.verdict != "none" or len(known) != 1:
+        return judged
+    from scipy import stats
+
+    k, ratio = known[0]
+    accused = sum(bool(shaken(c, [*calm[:i], *calm[i + 1 :]])) for i, c in enumerate(calm))
+    accused = min(accused + judged.accused, judged.healthy)
+    interval = stats.binomtest(accused, judged.healthy).proportion_ci(method="exact")
+    why = f"it shakes {ratio:.1f} times as much as in healthy flights at its shaft frequency; the balance did not move"
+    return replace(judged, verdict="class", effects=(f"imbalance or tape, motor {k + 1}", f"damaged blade, motor {k + 1}"),
+                   why=why, rule="vibration", accused=accused,
+                   rate95=(float(interval.low), float(interval.high)))  # fmt: skip
 
 
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:

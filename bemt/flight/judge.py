@@ -260,13 +260,16 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
         )
         rest = _WIDE if n else _BUILD
         return replace(said, verdict="class", effects=(*alike, rest), why=why, rule="beyond other healthy vehicles")
+    pairs = _pairs(D, z, list(ways), half * length)
     if best.t >= bar and (best.chi2 < most or best.chi2 < 0.25 * best.t**2):
+        # With many rotors two damaged ones that turn against each other lift as a weight presses.
+        if best.cause.startswith("weight") and B > 4:
+            alike += tuple(e.cause for e in pairs if e.chi2 <= best.chi2 and e.t > 2.0)
         if len(alike) == 1:
             why = "one cause explains the balance, the others do not"
             return replace(said, verdict="named", effects=alike, why=why, rule="one cause")
         return replace(said, verdict="class", effects=alike, why="these explain the balance equally well",
                        rule="causes that look alike")  # fmt: skip
-    pairs = _pairs(D, z, list(ways), half * length)
     good = [e for e in pairs if e.chi2 < most and e.chi2 < best.chi2 - 2.0 * EARNED]
     if good:
         effects = tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)

@@ -1,10 +1,10 @@
 """Vibration at the shaft and blade frequencies of each rotor: imbalance, a damaged or taped blade.
 
 An unbalanced rotor shakes the body once a turn, unequal blades too; B equal blades in uneven air B times a turn. The
-spectrum of the accelerometer is taken in windows of a second (Hann; Welch 1967), and each rotor is given the power in
-the band of its own speed in that window, less the floor beside it. Where two rotors turn at the same speed within the
-resolution, their share cannot be told apart, and the window is left out for both; with rotors that always turn alike
-only the sum is known.
+logged speeds give the angle of each rotor but for its start, so in windows of one to four seconds the accelerometer is
+regressed on sine and cosine of all rotors' angles at once (order tracking; Vold and Leuridan, SAE 931288, 1993; not
+checked there). Rotors whose angles stay together over a window cannot be told apart, and a window in which the speeds
+were not good enough to follow the phase holds less than the spectrum's line: both are left out.
 
 Without speeds the strongest line between 20 Hz and the Nyquist frequency is told; which rotor it is, is not known.
 """
@@ -23,7 +23,8 @@ from bemt.flight.log import FlightLog
 __all__ = ["Vibration", "shaken", "vibration"]
 
 Array = NDArray[np.float64]
-_WINDOW_S, _MOST_S, _LOW_HZ, _LEAST = 1.0, 300.0, 20.0, 3  # window; longest used; lowest line; windows a rotor needs
+_WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # lengths tried; longest used; least windows
+_APART, _FOLLOWED = 5.0, 0.5  # largest condition number of the angles; least share of the line's power [1]
 _SIDE = 3  # half width of a band in bins: the lobe of the window and a speed that is off by one bin
 _SPREAD, _FREE = 0.35, 4
 """Scatter of the log of an amplitude between healthy flights, and the degrees of freedom it counts as: an assumption,
@@ -87,44 +88,79 @@ def vibration(log: FlightLog) -> Vibration:
         why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
                f"{rate:.0f} samples a second, which show up to {0.97 * nyquist:.0f} Hz")  # fmt: skip
         return Vibration(rate, shaft, unit=log.raw_unit, missing=why)
-    windows = _windows(log, t, step)
+    windows = _windows(log, t, step, _WINDOWS_S[0])
     if len(windows) < _LEAST or nyquist < 2.0 * _LOW_HZ:
         why = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else "under 3 s of samples"
         return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{why} are too few")
-    size = windows[0].stop - windows[0].start
-    shape = np.hanning(size)
-    f = np.fft.rfftfreq(size, step)
-    # Sum over the lobe of a line of amplitude A is A^2 n sum(w^2) / 4.
-    scale = 4.0 / (size * np.sum(shape**2))
-    power = np.array([
-        scale * np.sum(np.abs(np.fft.rfft(shape[:, None] * (v[w] - v[w].mean(axis=0)), axis=0)) ** 2, axis=1)
-        for w in windows
-    ])  # fmt: skip
+    f, power = _spectrum(v, windows, step)
     if speeds is None or not np.isfinite(shaft):
         mean = power.mean(axis=0)
-        above = np.flatnonzero((f > _LOW_HZ) & (f < nyquist - 2.0 * _SIDE / (size * step)))
+        above = np.flatnonzero((f > _LOW_HZ) & (f < nyquist - 2.0 * _SIDE * f[1]))
         peak = int(above[np.argmax(mean[above])])
-        got = _line(mean, peak, mean.size)
-        return Vibration(rate, shaft, line_hz=float(f[peak]), line=got, unit=log.raw_unit,
-                         missing="which rotor shakes: log the speed of each")  # fmt: skip
-    n = np.array([[np.interp(t[w], log.t, s).mean() for s in speeds.T] for w in windows])
-    bins = n * size * step
-    once, twice = _of_rotors(power, bins), _of_rotors(power, 2.0 * bins)
-    if np.any(np.isfinite(once)):
-        return Vibration(rate, shaft, once, twice, unit=log.raw_unit)
-    got = float(np.sqrt(np.mean([_line(p, int(round(b)), f.size) ** 2 for p, b in zip(power, bins.mean(axis=1),
-                                                                                      strict=True)])))  # fmt: skip
-    return Vibration(rate, shaft, line_hz=shaft, line=got, unit=log.raw_unit,
-                     missing="which rotor shakes: all turn at the same speed")  # fmt: skip
+        return Vibration(rate, shaft, line_hz=float(f[peak]), line=_line(mean, peak - _SIDE, peak + _SIDE),
+                         unit=log.raw_unit, missing="which rotor shakes: log the speed of each")  # fmt: skip
+    turns = np.stack([np.interp(t, log.t, s) for s in speeds.T], axis=1)
+    span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
+    total = float(np.mean([_line(p, int(low) - _SIDE, int(high) + 1 + _SIDE) ** 2
+                           for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
+    angle = 2.0 * np.pi * np.concatenate([np.zeros((1, turns.shape[1])), np.cumsum(
+        0.5 * (turns[1:] + turns[:-1]) * np.diff(t)[:, None], axis=0)])  # fmt: skip
+    best: tuple[float, float] | None = None
+    for length in _WINDOWS_S:
+        found = _tracked(v, angle, _windows(log, t, step, length), max(int(2.0 / (shaft * step)), 2))
+        held = float(np.sum(found**2)) if found is not None else -1.0
+        if best is None or held > best[0]:
+            best = held, length
+    assert best is not None
+    if best[0] < _FOLLOWED * total or best[0] <= 0.0:
+        why = "all turn at the same speed" if best[0] < 0.0 else "the speeds are too coarse to follow the phase"
+        return Vibration(rate, shaft, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
+                         missing=f"which rotor shakes: {why}")  # fmt: skip
+    use = _windows(log, t, step, best[1])
+    once = _tracked(v, angle, use, max(int(2.0 / (shaft * step)), 2))
+    twice = None if 2.0 * shaft > 0.97 * nyquist else _tracked(v, 2.0 * angle, use, max(int(1.0 / (shaft * step)), 2))
+    unknown = (float("nan"),) * turns.shape[1]
+    return Vibration(rate, shaft, unknown if once is None else tuple(map(float, once)),
+                     unknown if twice is None else tuple(map(float, twice)), line_hz=shaft, line=float(np.sqrt(total)),
+                     unit=log.raw_unit)  # fmt: skip
 
 
-def _windows(log: FlightLog, t: Array, step: float) -> list[slice]:
+def _spectrum(v: Array, windows: list[slice], step: float) -> tuple[Array, Array]:
+    """Frequencies, and the power of all axes in each window; a line of amplitude A sums to A^2."""
+    size = windows[0].stop - windows[0].start
+    shape = np.hanning(size)
+    # Over its lobe a line of amplitude A sums to A^2 n sum(w^2) / 4.
+    scale = 4.0 / (size * np.sum(shape**2))
+    power = [scale * np.sum(np.abs(np.fft.rfft(shape[:, None] * (v[w] - v[w].mean(axis=0)), axis=0)) ** 2, axis=1)
+             for w in windows]  # fmt: skip
+    return np.fft.rfftfreq(size, step), np.array(power)
+
+
+def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array | None:
+    """Amplitude of each rotor, (B,), less what noise gives; None where the angles stay together."""
+    squares = []
+    for w in windows:
+        X = np.concatenate([np.cos(angle[w]), np.sin(angle[w])], axis=1)
+        if np.linalg.cond(X) > _APART:
+            continue
+        y = v[w] - np.stack([np.convolve(c, np.ones(smooth) / smooth, "same") for c in v[w].T], axis=1)
+        y, X = y[smooth:-smooth], X[smooth:-smooth]
+        gram = np.linalg.inv(X.T @ X)
+        b = gram @ X.T @ y
+        noise = np.sum((y - X @ b) ** 2) / max(y.shape[0] - X.shape[1], 1) * np.diag(gram)
+        B = angle.shape[1]
+        parts = np.sum(b**2, axis=1) - noise
+        squares.append(parts[:B] + parts[B:])
+    return np.sqrt(np.clip(np.mean(squares, axis=0), 0.0, None)) if len(squares) >= _LEAST else None
+
+
+def _windows(log: FlightLog, t: Array, step: float, length: float) -> list[slice]:
     """Gapless windows in the air; shorter ones where the sensor was sampled in bursts."""
     breaks = np.flatnonzero(np.diff(t) > 1.5 * step) + 1
     runs = [r for r in np.split(np.arange(t.size), breaks) if r.size >= 128]
     if not runs:
         return []
-    size = min(int(_WINDOW_S / step), int(np.median([r.size for r in runs])))
+    size = min(int(length / step), int(np.median([r.size for r in runs])))
     air = np.interp(t, log.t, log.flying.astype(float)) > 0.5
     out = []
     for run in runs:
@@ -135,24 +171,12 @@ def _windows(log: FlightLog, t: Array, step: float) -> list[slice]:
     return out[: max(int(_MOST_S / (size * step)), 1)]
 
 
-def _line(power: Array, centre: int, bins: int) -> float:
-    """Amplitude of a line within a band, less the floor on both sides of it."""
-    low, high = max(centre - _SIDE, 1), min(centre + _SIDE + 1, bins)
+def _line(power: Array, low: int, high: int) -> float:
+    """Amplitude within a band of bins, less the floor on both sides of it."""
+    low, high = max(low, 1), min(high + 1, power.size)
     beside = np.concatenate([power[max(low - 12, 1) : low], power[high : high + 12]])
     floor = float(np.median(beside)) if beside.size else 0.0
     return float(np.sqrt(max(float(np.sum(power[low:high])) - floor * (high - low), 0.0)))
-
-
-def _of_rotors(power: Array, centre: Array) -> tuple[float, ...]:
-    """Amplitude of each rotor over the windows in which it stands alone; NaN where there are too few."""
-    W, B = centre.shape
-    bins, out = power.shape[1], []
-    for k in range(B):
-        others = np.delete(centre, k, axis=1)
-        alone = np.all(np.abs(others - centre[:, [k]]) > 2.0 * _SIDE, axis=1) & (centre[:, k] < bins - 1 - _SIDE)
-        found = [_line(power[w], int(round(centre[w, k])), bins) ** 2 for w in np.flatnonzero(alone)]
-        out.append(float(np.sqrt(np.mean(found))) if len(found) >= _LEAST else float("nan"))
-    return tuple(out)
 
 
 def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, float, bool], ...]:
