@@ -100,8 +100,8 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
     fmt(136, "ISBH", "QHBBHHQf", "TimeUS,N,type,instance,mul,smp_cnt,SampleUS,smp_rate")
     fmt(137, "ISBD", "QHHaaa", "TimeUS,N,seqno,x,y,z")
     B = flight.rotors
-    for name, value in (("FRAME_CLASS", frame[0]), ("FRAME_TYPE", frame[1]), ("MOT_PWM_MIN", 1000.0),
-                        ("MOT_PWM_MAX", 2000.0), *((f"SERVO{i + 1}_FUNCTION", 33.0 + i) for i in range(B))):  # fmt: skip
+    params = {"FRAME_CLASS": frame[0], "FRAME_TYPE": frame[1], "MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}
+    for name, value in (params | {f"SERVO{i + 1}_FUNCTION": 33 + i for i in range(B)}).items():
         put("PARM", 1000, name.encode(), float(value))
     t = np.arange(0.0, flight.seconds, 0.02)
     command, rpm = flight.drives(t)

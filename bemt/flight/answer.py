@@ -358,8 +358,8 @@ def _with_vibration(
     accused = min(accused + judged.accused, judged.healthy)
     interval = stats.binomtest(accused, judged.healthy).proportion_ci(method="exact")
     why = f"it shakes {ratio:.1f} times as much as in healthy flights at its shaft frequency; the balance did not move"
-    return replace(judged, verdict="class", effects=(f"imbalance or tape, motor {k + 1}", f"damaged blade, motor {k + 1}"),
-                   why=why, rule="vibration", accused=accused,
+    effects = f"imbalance or tape, motor {k + 1}", f"damaged blade, motor {k + 1}"
+    return replace(judged, verdict="class", effects=effects, why=why, rule="vibration", accused=accused,
                    rate95=(float(interval.low), float(interval.high)))  # fmt: skip
 
 

@@ -1,9 +1,9 @@
 """Speed of each motor at its drive, against healthy flights: what the balance of the body cannot tell apart.
 
 A blade that lost area loads its motor less, so the motor turns faster at the same command; a worn motor, bearing or
-controller turns slower. A weight changes neither. The reading is log(rpm) - 1/2 log(command) of each motor less the mean
-of all (the battery's voltage drops out); the exponent is that of thrust in proportion to the command and is good to
-0.2, which counts with the change of the command.
+controller turns slower. A weight changes neither. The reading is log(rpm) - 1/2 log(command) of each motor less the
+mean of all (the battery's voltage drops out); the exponent is that of thrust in proportion to the command and is good
+to 0.2, which counts with the change of the command.
 """
 
 from __future__ import annotations

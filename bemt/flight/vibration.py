@@ -133,7 +133,7 @@ def _spectrum(v: Array, windows: list[slice], step: float) -> tuple[Array, Array
     scale = 4.0 / (size * np.sum(shape**2))
     power = [scale * np.sum(np.abs(np.fft.rfft(shape[:, None] * (v[w] - v[w].mean(axis=0)), axis=0)) ** 2, axis=1)
              for w in windows]  # fmt: skip
-    return np.fft.rfftfreq(size, step), np.array(power)
+    return np.asarray(np.fft.rfftfreq(size, step), dtype=float), np.array(power, dtype=float)
 
 
 def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array | None:
