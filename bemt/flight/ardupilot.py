@@ -22,7 +22,7 @@ from numpy.lib.recfunctions import repack_fields
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.log import FlightLog, Source, joined
+from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 Array = NDArray[np.float64]
 KIND = "ArduPilot DataFlash"
@@ -63,7 +63,7 @@ class _Table:
     row: np.dtype[Any]
     scale: dict[str, float]
     raw: bytearray = field(default_factory=bytearray)
-    parts: list[NDArray[Any]] = field(default_factory=list)
+    kept: Stretches[NDArray[Any]] = field(default_factory=lambda: Stretches(lambda rows: rows[::SPARSE].copy()))
 
     def unpack(self) -> None:
         """Keep the used columns of what was gathered."""
@@ -73,15 +73,16 @@ class _Table:
             if key in (self.row.names or ()):
                 rows = rows[rows[key] == 0]
         keep = [n for n in self.row.names or () if n in ("TimeUS", *_WANTED[self.name])]
-        self.parts.append(repack_fields(rows[keep]))  # a copy without the other columns
+        self.kept.add(repack_fields(rows[keep]))  # a copy without the other columns
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Column by name, in the unit of the log."""
         if self.raw:
             self.unpack()
-        if not self.parts:
+        if not self.kept.parts:
             return {}
-        whole = np.concatenate(self.parts)
+        whole = np.concatenate(self.kept.parts)
+        self.kept.parts.clear()
         return {n: whole[n] * self.scale[n] if n in self.scale else whole[n] for n in whole.dtype.names or ()}
 
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["FlightLog", "joined", "thrust_axis"]
+__all__ = ["DENSE", "SPARSE", "FlightLog", "Stretches", "joined", "thrust_axis"]
 
 Array = NDArray[np.float64]
 Source = tuple[Array, Array]
+T = TypeVar("T", bound=Sized)
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
-_MOST = 400_000  # samples on the common time base; longer logs are thinned (an hour at 100 Hz is 360,000)
+_MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
+DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +133,26 @@ def thrust_axis(q: Array) -> Array:
     return np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x**2 + y**2)], axis=1)
 
 
+class Stretches(Generic[T]):
+    """A fast sensor in memory that does not follow the length of the log.
+
+    Stretches are kept whole up to :data:`DENSE` samples; beyond, of every second whole one every 20th sample stays. So
+    the slow motion is there throughout, and the fast one in stretches that spread over the log.
+    """
+
+    def __init__(self, thin: Callable[[T], T]) -> None:
+        """Begin empty; `thin` takes every 20th sample of a stretch."""
+        self._thin, self.parts, self._whole = thin, cast(list[T], []), cast(list[bool], [])
+
+    def add(self, part: T) -> None:
+        """Keep a stretch."""
+        self.parts.append(part)
+        self._whole.append(True)
+        while sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
+            for i in [k for k, whole in enumerate(self._whole) if whole][1::2]:
+                self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
+
+
 def joined(
     file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
 ) -> FlightLog:
@@ -142,7 +165,7 @@ def joined(
     sources : mapping of str to (times, values) or None
         Times (M,) [s]; values (M,) or (M, k) in units of :class:`FlightLog`.
     main : str
-        Source whose times are kept; of more than 400,000 every second, third, ... one.
+        Source whose times are kept; of more than 200,000 as many, evenly spread.
     raw : (times, values) or None
         Accelerometer or gyro that keeps its own times.
     **more : str
@@ -164,7 +187,8 @@ def joined(
     if main not in clean or clean[main][0].size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
     t = clean[main][0]
-    t = t[:: -(-t.size // _MOST)]
+    if t.size > _MOST:
+        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], _MOST)))]
     columns, halves = {}, {}
     for key, (at, v) in clean.items():
         flat = v.reshape(at.size, -1)

@@ -10,20 +10,22 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
 from bemt.flight.layout import layout_text
-from bemt.flight.log import FlightLog, Source, joined, thrust_axis
+from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
+_LONG, _STRETCH = 1 << 26, 4096  # size from which a log is reduced first [bytes]; samples of a stretch
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
@@ -39,11 +41,46 @@ def read(path: Path) -> FlightLog:
     ulog = needs("pyulog", "flight").ULog
     try:
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            found = ulog(file, _TOPICS, disable_str_exceptions=True)
+            long = path.stat().st_size > _LONG
+            found = ulog(_reduced(file) if long else file, _TOPICS, disable_str_exceptions=True)
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
         got = f"a damaged log ({type(error).__name__}: {error})"
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
     return _made(name, found)
+
+
+def _reduced(file: BinaryIO) -> io.BytesIO:
+    """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
+    head, data = bytearray(file.read(16)), dict[int, Stretches[list[bytes]]]()
+    begun, each = dict[int, list[bytes]](), dict[int, int]()
+    while len(start := file.read(3)) == 3:
+        size, kind = struct.unpack("<Hc", start)
+        body = file.read(size)
+        if len(body) < size or kind not in b"BFIMPQADLSOCR":
+            break
+        if kind == b"A":
+            name = body[3:].decode("latin-1")
+            if name in _TOPICS:
+                number = struct.unpack_from("<H", body, 1)[0]
+                each[number] = 32 if name == "sensor_accel_fifo" else 1
+                # Single bursts are too short for a spectrum; of the others every 20th message stays.
+                step = SPARSE if each[number] == 1 else _STRETCH
+                data[number], begun[number] = Stretches(lambda part, step=step: part[::step]), []  # type: ignore[misc]
+                head += start + body
+        elif kind == b"D" and size > 2:
+            number = struct.unpack_from("<H", body)[0]
+            if number in begun:
+                # A message of a burst holds 32 samples, so it weighs as 32.
+                begun[number] += [start + body, *[b""] * (each[number] - 1)]
+                if len(begun[number]) >= _STRETCH:
+                    data[number].add(begun[number])
+                    begun[number] = []
+        elif kind == b"B":
+            head += start + bytes(size)  # without the places of appended data, which are other ones now
+        elif kind in b"FPQ":
+            head += start + body
+    parts = [m for number, kept in data.items() for p in (*kept.parts, begun[number]) for m in p]
+    return io.BytesIO(bytes(head) + b"".join(parts))
 
 
 def _made(name: str, found: Any) -> FlightLog:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.flight import crazyflie
-from bemt.flight.log import FlightLog, joined
+from bemt.flight.log import SPARSE, FlightLog, Stretches, joined
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,7 +39,7 @@ _CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time")
 _USED = re.compile(r"t|t_s|time|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
 _HEAD_BYTES = 1 << 18  # within which the headings stand
-_ROWS = 200_000  # of a piece
+_ROWS = 20_000  # of a piece
 
 
 def read(path: Path) -> FlightLog:
@@ -91,7 +91,7 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
     """The columns that are used. Numbers are kept in single precision, times in double."""
     import pandas as pd
 
-    parts = []
+    kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
     pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
                          usecols=lambda c: bool(_USED.fullmatch(_label(str(c)))))  # fmt: skip
     for piece in pieces:
@@ -100,8 +100,8 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
             if c not in _CELLS:
                 numbers = pd.to_numeric(piece[c], errors="coerce")
                 piece[c] = numbers if c in _TIMES else numbers.astype(np.float32)
-        parts.append(piece)
-    return pd.concat(parts, ignore_index=True)
+        kept.add(piece)
+    return pd.concat(kept.parts, ignore_index=True)
 
 
 def _partly(raw: bytes) -> bytes:
