@@ -219,7 +219,8 @@ class FlightAnswer:
             lines.append(f"  Motor {k + 1} turns {100 * part:+.0f} % against its drive in healthy flights: {what}.")
         for k, ratio, known in self.shaken:
             against = "in healthy flights" if known else "the other rotors"
-            lines.append(f"  Motor {k + 1} shakes {ratio:.1f} times as much as {against} at its shaft frequency: "
+            who = f"Motor {k + 1} shakes" if k >= 0 else "The rotors together shake"
+            lines.append(f"  {who} {ratio:.1f} times as much as {against} at the shaft frequency: "
                          "imbalance, tape or a damaged blade.")  # fmt: skip
         heard = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.amplitude) if np.isfinite(v)]
         if heard:
@@ -358,7 +359,8 @@ def _with_vibration(
     accused = min(accused + judged.accused, judged.healthy)
     interval = stats.binomtest(accused, judged.healthy).proportion_ci(method="exact")
     why = f"it shakes {ratio:.1f} times as much as in healthy flights at its shaft frequency; the balance did not move"
-    effects = f"imbalance or tape, motor {k + 1}", f"damaged blade, motor {k + 1}"
+    which = f"motor {k + 1}" if k >= 0 else "a rotor"
+    effects = f"imbalance or tape, {which}", f"damaged blade, {which}"
     return replace(judged, verdict="class", effects=effects, why=why, rule="vibration", accused=accused,
                    rate95=(float(interval.low), float(interval.high)))  # fmt: skip
 

@@ -6,10 +6,10 @@ pitch, yaw and total at once). A weight under an arm needs roll, pitch and total
 A+ diag(1, 1, 0, 1) A e_k.
 
 Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share
-the trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 is the healthy flights' own, pooled with that of other
-vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6); w is that of
-:mod:`bemt.flight.population` and hardly matters once there is a healthy flight. One s for all readings: on left-out
-healthy flights of three vehicles it predicts as well as one for each or for tilt and yaw apart (docs/flight_logs.md).
+the trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 of a reading is the healthy flights' own, pooled with
+that of all readings and of other vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed.,
+section 2.6); w is that of :mod:`bemt.flight.population` and hardly matters once there is a healthy flight. How much the
+readings share was chosen by the log score of left-out healthy flights of three vehicles (docs/flight_logs.md).
 
 The bar is the quantile of the largest statistic over all causes when a healthy flight is drawn from that prediction, so
 many causes are paid for once, by what they have in common (max-T; Westfall and Young, Resampling-Based Multiple
@@ -39,6 +39,7 @@ FALSE_ALARM = GATE
 ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 """Explanations whose chi squares differ by less cannot be told apart: the odds at which the diagnosis gives a name."""
 _LEAST = 3  # healthy flights from which a cause is named
+_COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
 _DRAWS = 10_000
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
 _BUILD, _WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
@@ -198,18 +199,19 @@ class _Prediction:
 def _predicted(calm: Array, axes: Array, known: bool) -> _Prediction:
     n, k = len(calm), len(axes)
     x = calm @ axes.T
-    own = float(np.sum((x - x.mean(axis=0)) ** 2)) if n else 0.0
-    free = k * max(n - 1, 0) + SCATTER_FREE
-    s2 = (own + SCATTER_FREE * SCATTER**2) / free
+    own = np.sum((x - x.mean(axis=0)) ** 2, axis=0) if n else np.zeros(k)
+    common = (float(own.sum()) + SCATTER_FREE * SCATTER**2) / (k * max(n - 1, 0) + SCATTER_FREE)
+    free = max(n - 1, 0) + _COMMON
+    s2 = (own + _COMMON * common) / free
     trim = np.array(TRIM)[:k] if known and k == 3 else np.full(k, max(TRIM))
     rng = np.random.default_rng(20)
-    drawn = s2 * free / rng.chisquare(free, (_DRAWS, 1))
+    drawn = s2 * free / rng.chisquare(free, (_DRAWS, k))
     width = trim**2 * TRIM_FREE / rng.chisquare(TRIM_FREE, (_DRAWS, 1))
 
     def variance(s: Array, w: Array) -> Array:
         return s + 1.0 / (n / s + 1.0 / w)
 
-    sd = np.sqrt(variance(np.array(s2), trim**2))
+    sd = np.sqrt(variance(s2, trim**2))
     mean = x.sum(axis=0) / s2 / (n / s2 + 1.0 / trim**2) if n else np.zeros(k)
     return _Prediction(mean, sd, rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd)
 

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
-_LONG, _STRETCH = 1 << 26, 4096  # size from which a log is reduced first [bytes]; samples of a stretch
+_LONG, _STRETCH = 1 << 26, 16_384  # size from which a log is reduced first [bytes]; samples of a stretch
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 

@@ -29,6 +29,8 @@ _SIDE = 3  # half width of a band in bins: the lobe of the window and a speed th
 _SPREAD, _FREE = 0.35, 4
 """Scatter of the log of an amplitude between healthy flights, and the degrees of freedom it counts as: an assumption,
 not checked (a factor of 1.4; no recording here holds vibration at the shaft frequency)."""
+_FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
+"""Amplitude below which no rotor is unbalanced in any way that matters (an assumption)."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,10 @@ def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array
     squares = []
     for w in windows:
         X = np.concatenate([np.cos(angle[w]), np.sin(angle[w])], axis=1)
-        if np.linalg.cond(X) > _APART:
-            continue
         y = v[w] - np.stack([np.convolve(c, np.ones(smooth) / smooth, "same") for c in v[w].T], axis=1)
         y, X = y[smooth:-smooth], X[smooth:-smooth]
+        if y.shape[0] < 2 * X.shape[1] or np.linalg.cond(X) > _APART:
+            continue
         gram = np.linalg.inv(X.T @ X)
         b = gram @ X.T @ y
         noise = np.sum((y - X @ b) ** 2) / max(y.shape[0] - X.shape[1], 1) * np.diag(gram)
@@ -192,29 +194,30 @@ def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, fl
     Returns
     -------
     tuple of (int, float, bool)
-        Rotor (0 is the first), ratio of its amplitude at the shaft frequency [1], whether healthy flights say so.
+        Rotor (0 is the first; -1: all together, where they cannot be told apart), ratio of its amplitude at the shaft
+        frequency [1], whether healthy flights say so.
     """
     from scipy import stats
 
-    own = np.array(mine.amplitude, dtype=float)
-    if not np.any(own > 0.0):
-        return ()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logs = np.log(own)
-        calm = np.array([np.log(h.amplitude) for h in healthy if len(h.amplitude) == own.size])
+    def read(v: Vibration) -> Array:
+        return np.log(np.maximum(np.array([*v.amplitude, v.line]), _FLOOR[v.unit]))
+
+    logs = read(mine)
+    calm = [r for h in healthy if h.unit == mine.unit and (r := read(h)).size == logs.size]
+    alone = [read(h)[-1] for h in healthy if h.unit == mine.unit]
     out = []
-    for k in range(own.size):
-        past = calm[:, k][np.isfinite(calm[:, k])] if calm.size else np.zeros(0)
-        rest = np.delete(logs, k)
-        rest = rest[np.isfinite(rest)]
-        if not np.isfinite(logs[k]) or (not past.size and rest.size < 2):
+    for k in range(logs.size):
+        total = k == logs.size - 1
+        past = np.array(alone if total else [c[k] for c in calm])
+        past = past[np.isfinite(past)]
+        rest = np.delete(logs[:-1], k) if not total and not healthy else np.zeros(0)
+        before = past if past.size else rest[np.isfinite(rest)]
+        if not np.isfinite(logs[k]) or before.size < (1 if past.size else 2) or (total and out):
             continue
-        before = past if past.size else rest
         n = before.size
-        square = float(np.sum((before - before.mean()) ** 2))
         free = _FREE + n - 1
-        sd = np.sqrt((_FREE * _SPREAD**2 + square) / free * (1.0 + 1.0 / n))
-        bar = float(stats.t.ppf(1.0 - GATE / own.size, free))
-        if logs[k] - before.mean() > bar * sd:
-            out.append((k, float(np.exp(logs[k] - before.mean())), bool(past.size)))
+        square = (_FREE * _SPREAD**2 + float(np.sum((before - before.mean()) ** 2))) / free * (1.0 + 1.0 / n)
+        change = float(logs[k] - before.mean())
+        if change > float(stats.t.ppf(1.0 - GATE / logs.size, free)) * np.sqrt(square):
+            out.append((-1 if total else k, float(np.exp(change)), bool(past.size)))
     return tuple(out)
