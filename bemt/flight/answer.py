@@ -24,6 +24,7 @@ from bemt.flight.wind import Wind, wind
 
 __all__ = ["FlightAnswer", "Predicted", "answer_on"]
 
+_BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL, _OFTEN = 0.98, 0.005  # share of full drive that is a limit; share of the time that is worth a word [1]
 
 SPEED_POWER = 0.1
@@ -318,12 +319,13 @@ def answer_on(
     if layout:
         log = replace(log, layout=layout)
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
-    found = identify(log, mass_kg)
+    found, air = identify(log, mass_kg), wind(log, healthy)
     mine = features(log)
     if mine is None:
         judged = FlightVerdict("insufficient", (), "the log shows no flight with all motors running", (), np.zeros(0))
     else:
-        judged = judge(mine, [x for h in healthy if (x := features(h)) is not None], placed, false_alarm)
+        calm_ones = [x for h in healthy if (x := features(h)) is not None]
+        judged = judge(mine, calm_ones, placed, false_alarm, _windy(log, healthy, air))
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
         same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
@@ -340,9 +342,22 @@ def answer_on(
     if log.command is not None and log.command_unit == "1" and log.flying.any():
         limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
-        log, found, judged, wind(log, healthy), balance, limited, change_in(log, placed), shake, moved,
+        log, found, judged, air, balance, limited, change_in(log, placed), shake, moved,
         speed_changes(log, healthy), inflow(log), mass, simulator=simulator_constants(log, found),
     )  # fmt: skip
+
+
+def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
+    """Whether the rotors met more wind than in the healthy flights: from the force, or by their own way over ground."""
+
+    def speed(one: FlightLog) -> float:
+        if one.velocity is None or not one.flying.any():
+            return 0.0
+        return float(np.mean(np.linalg.norm(one.velocity[one.flying, :2], axis=1)))
+
+    if air.speed > max(air.half, _BREEZE):
+        return True
+    return speed(log) > _BREEZE + max([speed(h) for h in healthy], default=0.0)
 
 
 def _with_vibration(

@@ -30,7 +30,17 @@ from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
 from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
 
-__all__ = ["ALIKE", "FALSE_ALARM", "FlightEvidence", "FlightVerdict", "axes_of", "directions", "features", "judge"]
+__all__ = [
+    "ALIKE",
+    "WIND",
+    "FALSE_ALARM",
+    "FlightEvidence",
+    "FlightVerdict",
+    "axes_of",
+    "directions",
+    "features",
+    "judge",
+]
 
 Array = NDArray[np.float64]
 
@@ -40,7 +50,9 @@ ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 """Explanations whose chi squares differ by less cannot be told apart: the odds at which the diagnosis gives a name."""
 _LEAST = 3  # healthy flights from which a cause is named
 _COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
+WIND = "wind or forward flight"
 _DRAWS = 10_000
+_ALONG = 100.0  # condition number from which two rotors load the body along one line
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
 _BUILD, _WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 
@@ -155,7 +167,11 @@ def axes_of(layout: Array | None, rotors: int) -> Array:
 
 
 def judge(
-    flight: Array, healthy: Sequence[Array], layout: Array | None, false_alarm: float = FALSE_ALARM
+    flight: Array,
+    healthy: Sequence[Array],
+    layout: Array | None,
+    false_alarm: float = FALSE_ALARM,
+    windy: bool = False,
 ) -> FlightVerdict:
     """Judge a flight by healthy ones.
 
@@ -169,6 +185,9 @@ def judge(
         Angles [rad], turning [1] and arms; None: no weights are tried, and every rotor stands for itself.
     false_alarm : float
         Accepted probability that a healthy flight is accused [1].
+    windy : bool
+        Whether the rotors met wind that they do not meet in the healthy flights: it tilts the body, so roll and pitch
+        may change in any way, and yaw does not.
 
     Returns
     -------
@@ -178,7 +197,7 @@ def judge(
     from scipy import stats
 
     calm = np.array(healthy).reshape(-1, flight.size)
-    said = _decide(flight, calm, layout, false_alarm)
+    said = _decide(flight, calm, layout, false_alarm, windy)
     if len(healthy) < _LEAST:
         return said
     rest = [_decide(h, np.delete(calm, k, axis=0), layout, false_alarm) for k, h in enumerate(calm)]
@@ -216,7 +235,7 @@ def _predicted(calm: Array, axes: Array, known: bool) -> _Prediction:
     return _Prediction(mean, sd, rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd)
 
 
-def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> FlightVerdict:
+def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False) -> FlightVerdict:
     """The rules in order: the first that holds answers."""
     from scipy import stats
 
@@ -250,6 +269,10 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
                          total_half=spread, given=n)  # fmt: skip
     best = found[0]
     alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - best.chi2 < ALIKE)
+    # What wind leaves: yaw, where the layout says which part that is.
+    blown = (float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0) if windy else float("inf")
+    if blown - best.chi2 < ALIKE:
+        alike = (*alike, WIND)
     if best.t < bar and (float(z @ z) < gate or best.chi2 < most):
         if n < _LEAST:
             why = ("no motor stands out by more than in healthy vehicles; give three or more healthy flights of this "
@@ -272,6 +295,9 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float) -> F
             return replace(said, verdict="named", effects=alike, why=why, rule="one cause")
         return replace(said, verdict="class", effects=alike, why="these explain the balance equally well",
                        rule="causes that look alike")  # fmt: skip
+    if blown < most:
+        why = "roll and pitch changed as wind changes them"
+        return replace(said, verdict="named", effects=(WIND,), why=why, rule="wind")
     good = [e for e in pairs if e.chi2 < most and e.chi2 < best.chi2 - 2.0 * EARNED]
     if good:
         effects = tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)
@@ -288,8 +314,10 @@ def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvid
     blades = [i for i, name in enumerate(names) if name.startswith("damaged")]
     for i, j in combinations(blades, 2):
         pair = D[[i, j]].T
+        if np.linalg.cond(pair) > _ALONG:
+            continue
         size, *_ = np.linalg.lstsq(pair, z, rcond=None)
-        if np.linalg.matrix_rank(pair) < 2 or size.min() <= 0.0:
+        if size.min() <= 0.0:
             continue
         u = np.sqrt(np.diag(np.linalg.inv(pair.T @ pair)))
         k = int(np.argmin(size))

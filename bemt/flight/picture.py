@@ -95,6 +95,7 @@ def _drives(ax: Any, answer: FlightAnswer) -> None:
                 ls="-" if i < len(_LINES) else "--")  # fmt: skip
     if answer.change is not None and np.isfinite(answer.change.at_s):
         ax.axvline(answer.change.at_s, color="0.2", ls=":", lw=1.5)
+    ax.margins(y=0.2)
     ax.set_xlabel("time [s]")
     ax.set_ylabel("drive, against the mean [%]")
     ax.legend(frameon=False, ncols=min(share.shape[1], 6), title="motor", title_fontsize=9, handlelength=1.2,
@@ -145,6 +146,7 @@ def _balance(ax: Any, answer: FlightAnswer) -> None:
         ax.axhspan(-200 * j.scatter, 200 * j.scatter, color="0.5", alpha=0.2, lw=0,
                    label="healthy flights (2 sd)" if j.given else "healthy vehicles (2 sd)")  # fmt: skip
         ax.legend(frameon=False)
+    ax.margins(y=0.2)
     ax.axhline(0.0, color="0.3", lw=0.8)
     ax.set_xticks(np.arange(1, j.readings.size + 1))
     ax.set_xlabel("motor")

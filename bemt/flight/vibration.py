@@ -200,12 +200,13 @@ def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, fl
     from scipy import stats
 
     def read(v: Vibration) -> Array:
-        return np.log(np.maximum(np.array([*v.amplitude, v.line]), _FLOOR[v.unit]))
+        logs: Array = np.log(np.maximum(np.array([*v.amplitude, v.line]), _FLOOR[v.unit]))
+        return logs
 
     logs = read(mine)
     calm = [r for h in healthy if h.unit == mine.unit and (r := read(h)).size == logs.size]
     alone = [read(h)[-1] for h in healthy if h.unit == mine.unit]
-    out = []
+    out: list[tuple[int, float, bool]] = []
     for k in range(logs.size):
         total = k == logs.size - 1
         past = np.array(alone if total else [c[k] for c in calm])
