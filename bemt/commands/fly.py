@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--false-alarm", type=_share, default=0.01, metavar="P", help=alarm)
     learnt = "write the case of --case with the rotor as these flights show it to this folder; needs --mass"
     parser.add_argument("--out-case", metavar="DIR", help=learnt)
-    parser.add_argument("--out", metavar="PNG", help="write a picture of the first log to this file")
+    parser.add_argument("--out", dest="picture", metavar="PNG", help="write a picture of the first log to this file")
     _options.add_json(parser, "bemt.flight/1")
     _options.add_quiet(parser, "no answer")
 
@@ -83,10 +83,10 @@ def run(args: argparse.Namespace) -> int:
         answer = answer_on(found[path], others, args.mass, args.layout, args.healthy_mass, args.false_alarm)
         answers.append(_with_model(answer, args.case) if args.case else answer)
     learnt, code = _learn(args, answers) if args.out_case else ("", EXIT_OK)
-    if args.out:
+    if args.picture:
         from bemt.flight.picture import flight_picture
 
-        Path(args.out).write_bytes(flight_picture(answers[0], args.mass))
+        Path(args.picture).write_bytes(flight_picture(answers[0], args.mass))
     if args.json:
         documents = [a.document() for a in answers]
         print(

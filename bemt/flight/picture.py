@@ -41,6 +41,7 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
         FigureCanvasAgg(figure)
         axes = figure.subplots(2, 2)
         for ax in axes.flat:
+            ax.locator_params(axis="x", nbins=5)
             ax.grid(True, alpha=0.3)
             ax.spines[["top", "right"]].set_visible(False)
         _thrust(axes[0, 0], answer, mass_kg)
