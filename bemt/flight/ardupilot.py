@@ -109,13 +109,16 @@ def _tables(data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type
     sizes: dict[int, int] = {_FORMATS: _FORMAT_SIZE}
     kinds: dict[int, _Table] = {}
     tables: dict[str, _Table] = {}
-    at, end, skipped = 0, len(data), 0
+    at, end, skipped, cut = 0, len(data), 0, 0
     while at + 3 <= end:
         size = sizes.get(data[at + 2]) if data[at : at + 2] == _HEAD else None
         if size is None or at + size > end:
             nearest = data.find(_HEAD, at + 1)
             stop = end if nearest < 0 else nearest
-            skipped += stop - at if any(data[at : min(stop, at + 4096)]) else 0  # zeros fill up a file
+            if size is not None and nearest < 0:
+                cut = stop - at
+            elif any(data[at : min(stop, at + 4096)]):  # zeros fill up a file
+                skipped += stop - at
             at = stop
             continue
         kind = data[at + 2]
@@ -132,7 +135,9 @@ def _tables(data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type
             if len(wanted.raw) > _CHUNK:
                 wanted.unpack()
         at += size
-    return tables, f"damaged; {skipped} bytes that cannot be read were skipped" if skipped else ""
+    if skipped:
+        return tables, f"damaged; {skipped} bytes that cannot be read were skipped"
+    return tables, f"ends within a message, {cut} bytes before its end" if cut else ""
 
 
 def _format(body: bytes, letters: Mapping[str, tuple[str, float | None, type]]) -> tuple[int, int, _Table | None]:

@@ -73,8 +73,13 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
     rotors: dict[str, tuple[float, ...]] = {}
     unseen: list[str] = []
     drive = log.rpm if log.rpm is not None else log.command
-    if drive is None or on.sum() < 50:
-        return Identified(out, rotors, ("no flight with motors running: log motor commands and fly 10 s",), None)
+    if drive is None:
+        text = (
+            "motors: the log holds neither commands nor speeds (RCOU of ArduPilot, actuator_motors of PX4, motor, pwm)"
+        )
+        return Identified(out, rotors, (text,), None)
+    if on.sum() < 50:
+        return Identified(out, rotors, ("rotors: no flight with the motors running; fly 10 s or more",), None)
     t, x = log.t[on], drive[on]
     upright = np.ones(t.size) if log.upright is None else log.upright[on]
     speeds = log.rpm is not None

@@ -19,6 +19,7 @@ T = TypeVar("T", bound=Sized)
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
 _MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
+_LARGEST = 1e9  # value above which a number is damage: no unit here comes near
 DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
 
 
@@ -203,8 +204,8 @@ def joined(
 
 
 def _whole(t: Array, v: Array) -> Source:
-    """Finite samples in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
-    good = np.isfinite(t) & np.isfinite(v.reshape(t.size, -1)).all(axis=1)
+    """Samples that can be, in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
+    good = np.isfinite(t) & (np.abs(v.reshape(t.size, -1)) < _LARGEST).all(axis=1)  # not so of NaN
     t, v = t[good], v[good]
     jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
     if jump.size:

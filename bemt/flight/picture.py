@@ -130,7 +130,13 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
         ax.plot(grid, k * grid**2, color=_ORANGE, label="model")
         ax.fill_between(grid, (k - 2 * u) * grid**2, (k + 2 * u) * grid**2, color=_ORANGE, alpha=0.2, lw=0)
     ax.plot([x.mean()], [m * G0 / B], "D", color=_GREEN, label="weight over rotors")
-    ax.set_xlabel("speed [rev/min]" if speeds else "command, share of full" if log.command_unit == "1" else f"command [{log.command_unit}]")
+    ax.set_xlabel(
+        "speed [rev/min]"
+        if speeds
+        else "command, share of full"
+        if log.command_unit == "1"
+        else f"command [{log.command_unit}]"
+    )
     ax.set_ylabel(f"thrust per rotor [{unit}]")
     ax.legend(frameon=False)
 

@@ -80,7 +80,9 @@ def vibration(log: FlightLog) -> Vibration:
     on = log.flying
     speeds = None if log.rpm is None else log.rpm / 60.0
     shaft = float(np.median(speeds[on])) if speeds is not None and on.any() else float("nan")
-    if log.raw is None:
+    if not shaft > 1.0:
+        speeds, shaft = None, float("nan")
+    if log.raw is None or log.raw[0].size < 2:
         return Vibration(float("nan"), shaft, missing="no accelerometer in the log")
     t, v = log.raw
     step = float(np.median(np.diff(t)))
