@@ -94,7 +94,9 @@ def run(args: argparse.Namespace) -> int:
             end="",
         )
     elif not args.quiet:
-        print("\n\n".join([*(a.text() for a in answers), *([learnt] if learnt else [])]))
+        from bemt.flight.text import text
+
+        print("\n\n".join([*(text(a) for a in answers), *([learnt] if learnt else [])]))
     return code
 
 

@@ -152,12 +152,6 @@ class FlightAnswer:
             out.append("thrust in climb and descent: fly both at three steady rates, up to a third of the hover's wash")
         return tuple(out)
 
-    def text(self) -> str:
-        """One screen."""
-        from bemt.flight.text import text
-
-        return text(self)
-
 
 def answer_on(
     log: FlightLog,

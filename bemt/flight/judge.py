@@ -287,8 +287,8 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float, wind
         return replace(said, verdict="class", effects=(*alike, rest), why=why, rule="beyond other healthy vehicles")
     pairs = _pairs(D, z, list(ways), half * length)
     if best.t >= bar and (best.chi2 < most or best.chi2 < 0.25 * best.t**2):
-        # With many rotors two damaged ones that turn against each other lift as a weight presses.
-        if best.cause.startswith("weight") and B > 4:
+        # Two damaged rotors side by side that turn against each other load the body as a weight between them.
+        if best.cause.startswith("weight"):
             alike += tuple(e.cause for e in pairs if e.chi2 <= best.chi2 and e.t > 2.0)
         if len(alike) == 1:
             why = "one cause explains the balance, the others do not"
@@ -328,6 +328,13 @@ def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvid
     return sorted(out, key=lambda e: e.chi2)
 
 
+def _neighbours(motors: list[int], angle: Array) -> list[tuple[int, int]]:
+    """Motors side by side with more than 50 degrees between them."""
+    order = sorted(motors, key=lambda k: float(angle[k]) % (2.0 * np.pi))
+    pairs = list(zip(order, [*order[1:], order[0]], strict=True))
+    return [(i, j) for i, j in pairs if np.radians(50.0) < (angle[j] - angle[i]) % (2.0 * np.pi) < np.radians(170.0)]
+
+
 def directions(B: int, layout: Array | None) -> dict[str, Array]:
     """Change of the log shares of each cause, (B,), for unit change of that rotor's drive."""
     out = {f"damaged blade, motor {k + 1}": np.eye(B)[k] for k in range(B)}
@@ -338,7 +345,11 @@ def directions(B: int, layout: Array | None) -> dict[str, Array]:
         places: dict[tuple[float, ...], list[int]] = {}
         for k in range(B):
             places.setdefault(tuple(np.round(A[:2, k], 6)), []).append(k + 1)
+        level = back @ np.diag([1.0, 1.0, 0.0, 1.0])
         for motors in places.values():
             where = f"motor {motors[0]}" if len(motors) == 1 else f"motors {' and '.join(map(str, motors))}"
-            out[f"weight near {where}"] = back @ np.diag([1.0, 1.0, 0.0, 1.0]) @ A[:, motors[0] - 1]
+            out[f"weight near {where}"] = level @ A[:, motors[0] - 1]
+        for i, j in _neighbours([motors[0] - 1 for motors in places.values()], layout[:, 0]):
+            a, b = sorted((i + 1, j + 1))
+            out[f"weight between motors {a} and {b}"] = level @ (A[:, i] + A[:, j]) / 2.0
     return {cause: d - d.mean() for cause, d in out.items()}

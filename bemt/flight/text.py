@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
 from bemt.flight.judge import FlightVerdict
-
-if TYPE_CHECKING:
-    from bemt.flight.answer import FlightAnswer
 
 __all__ = ["text"]
 
