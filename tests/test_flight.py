@@ -390,6 +390,16 @@ def test_recorded_wind(shared_data: Path, name: str, speed: float) -> None:
     assert abs(got.speed - speed) < 2.0
 
 
+def test_recorded_calm_is_calm(shared_data: Path) -> None:
+    """One half of a flight without wind, judged by the other."""
+    log = read_log(shared_data / "flight_logs" / "neural_fly" / "baseline_nowind.csv.gz")
+    n = log.t.size // 2
+    halves = [FlightLog("f", "made", log.t[s], velocity=log.velocity[s], force=log.force[s])
+              for s in (slice(0, n), slice(n, None)) if log.velocity is not None and log.force is not None]  # fmt: skip
+    got = wind(halves[0], halves[1:])
+    assert got.speed < min(got.half, 1.0)
+
+
 def test_picture_of_a_log_without_motors() -> None:
     """It says so instead of failing."""
     t = np.arange(0.0, 5.0, 0.01)

@@ -235,17 +235,106 @@ def _predicted(calm: Array, axes: Array, known: bool) -> _Prediction:
     return _Prediction(mean, sd, rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd)
 
 
+@dataclass(frozen=True, eq=False)
+class _Query:
+    """What the rules ask of a flight."""
+
+    said: FlightVerdict  # the answer without a verdict
+    best: FlightEvidence
+    alike: tuple[str, ...]  # causes that explain it as well as the best
+    pairs: list[FlightEvidence]
+    blown: float  # misfit of wind; infinite where none is known of
+    square: float  # of the whitened readings
+    bar: float  # of the best cause's statistic
+    gate: float  # of the square
+    most: float  # misfit that a cause may leave
+    few: bool
+
+    @property
+    def accused(self) -> bool:
+        """Whether a single cause stands out."""
+        return self.best.t >= self.bar
+
+    @property
+    def fits(self) -> bool:
+        """Whether the best single cause leaves little."""
+        return self.best.chi2 < self.most or self.best.chi2 < 0.25 * self.best.t**2
+
+    @property
+    def two(self) -> tuple[str, ...]:
+        """Pairs of rotors that explain what no single cause does."""
+        good = [e for e in self.pairs if e.chi2 < self.most and e.chi2 < self.best.chi2 - 2.0 * EARNED]
+        return tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)
+
+    def answer(self, verdict: str, effects: tuple[str, ...], why: str, rule: str) -> FlightVerdict:
+        """The answer with a verdict."""
+        return replace(self.said, verdict=verdict, effects=effects, why=why, rule=rule)
+
+
+def _within(q: _Query) -> FlightVerdict | None:
+    if q.accused or (q.square >= q.gate and q.best.chi2 >= q.most):
+        return None
+    if not q.few:
+        return q.answer("none", (), "no more than healthy flights differ", "within the healthy scatter")
+    why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
+    return q.answer("insufficient", (), why, "too few healthy flights")
+
+
+def _few(q: _Query) -> FlightVerdict | None:
+    if not q.few:
+        return None
+    causes = (*(q.alike if q.accused else ()), *(() if q.fits else q.two))
+    why = "more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
+    rest = _WIDE if q.said.given else _BUILD
+    return q.answer("class", (*causes, rest), why, "beyond other healthy vehicles")
+
+
+def _single(q: _Query) -> FlightVerdict | None:
+    if not (q.accused and q.fits):
+        return None
+    causes = q.alike
+    # Two damaged rotors side by side that turn against each other load the body as a weight between them.
+    if q.best.cause.startswith("weight"):
+        causes += tuple(e.cause for e in q.pairs if e.chi2 <= q.best.chi2 and e.t > 2.0)
+    if len(causes) == 1:
+        return q.answer("named", causes, "one cause explains the balance, the others do not", "one cause")
+    return q.answer("class", causes, "these explain the balance equally well", "causes that look alike")
+
+
+def _wind(q: _Query) -> FlightVerdict | None:
+    return (
+        q.answer("named", (WIND,), "roll and pitch changed as wind changes them", "wind") if q.blown < q.most else None
+    )
+
+
+def _two(q: _Query) -> FlightVerdict | None:
+    if not q.two:
+        return None
+    why = "no single cause explains the balance; two damaged rotors do"
+    said = q.answer("named" if len(q.two) == 1 else "class", q.two, why, "two rotors")
+    return replace(said, explanations=(*(e for e in q.pairs if e.cause in q.two), *said.explanations))
+
+
+def _unlisted(q: _Query) -> FlightVerdict | None:
+    why = "the balance moved, but not as one or two rotors or one weight move it"
+    return q.answer("unknown", (), why, "no listed cause")
+
+
+_RULES = (_within, _few, _single, _wind, _two, _unlisted)
+"""In order: the first that holds answers."""
+
+
 def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False) -> FlightVerdict:
-    """The rules in order: the first that holds answers."""
+    query = _weighed(flight, calm, layout, alarm, windy)
+    return next(said for rule in _RULES if (said := rule(query)) is not None)
+
+
+def _weighed(flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool) -> _Query:
     from scipy import stats
 
     B, n = flight.size, len(calm)
-    middle = calm.mean(axis=0) if n else np.full(B, flight.mean())
-    change = flight - middle
-    total = float(change.mean()) if n else float("nan")
-    change = change - change.mean()
-    axes = axes_of(layout, B)
-    ways = directions(B, layout)
+    change = flight - (calm.mean(axis=0) if n else flight.mean())
+    axes, ways = axes_of(layout, B), directions(B, layout)
     p = _predicted(calm, axes, layout is not None)
     z = (flight @ axes.T - p.mean) / p.sd
     D = np.stack([axes @ way for way in ways.values()]) / p.sd
@@ -258,54 +347,22 @@ def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float, wind
         for cause, t, w, h in zip(ways, T, length, half, strict=True)
     ]
     found.sort(key=lambda e: (e.t <= 0.0, e.chi2))
-    blades = [w for cause, w in zip(ways, length, strict=True) if cause.startswith("damaged")]
     square = np.sum(p.draws**2, axis=1)
-    gate = float(np.quantile(square, 1.0 - _OTHER * alarm))
-    most = float(np.quantile(square - np.max(null, axis=1).clip(0.0) ** 2, 1.0 - GATE))
-    totals = calm.mean(axis=1) if n else np.zeros(0)
+    rest = square - np.max(null, axis=1).clip(0.0) ** 2
+    totals = calm.mean(axis=1)
     spread = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)) if n > 1 else float("nan")
-    scatter = float(np.sqrt(np.sum((axes.T**2 * p.sd**2).sum(axis=1)) * B))
-    said = FlightVerdict("none", (), "", tuple(found), change, scatter, bar / min(blades), total=total,
-                         total_half=spread, given=n)  # fmt: skip
-    best = found[0]
-    alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - best.chi2 < ALIKE)
-    # What wind leaves: yaw, where the layout says which part that is.
+    weakest = min(w for cause, w in zip(ways, length, strict=True) if cause.startswith("damaged"))
+    said = FlightVerdict("none", (), "", tuple(found), change - change.mean(), float(np.sqrt(np.sum(p.sd**2))),
+                         bar / float(weakest), total=float(change.mean()) if n else float("nan"), total_half=spread,
+                         given=n)  # fmt: skip
+    alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - found[0].chi2 < ALIKE)
+    # What wind leaves: yaw, where the layout says which reading that is.
     blown = (float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0) if windy else float("inf")
-    if blown - best.chi2 < ALIKE:
+    if blown - found[0].chi2 < ALIKE:
         alike = (*alike, WIND)
-    if best.t < bar and (float(z @ z) < gate or best.chi2 < most):
-        if n < _LEAST:
-            why = ("no motor stands out by more than in healthy vehicles; give three or more healthy flights of this "
-                   "one with --healthy")  # fmt: skip
-            return replace(said, verdict="insufficient", why=why, rule="too few healthy flights")
-        return replace(said, why="no more than healthy flights differ", rule="within the healthy scatter")
-    if n < _LEAST and best.t >= bar:
-        why = (
-            "this is more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
-        )
-        rest = _WIDE if n else _BUILD
-        return replace(said, verdict="class", effects=(*alike, rest), why=why, rule="beyond other healthy vehicles")
-    pairs = _pairs(D, z, list(ways), half * length)
-    if best.t >= bar and (best.chi2 < most or best.chi2 < 0.25 * best.t**2):
-        # Two damaged rotors side by side that turn against each other load the body as a weight between them.
-        if best.cause.startswith("weight"):
-            alike += tuple(e.cause for e in pairs if e.chi2 <= best.chi2 and e.t > 2.0)
-        if len(alike) == 1:
-            why = "one cause explains the balance, the others do not"
-            return replace(said, verdict="named", effects=alike, why=why, rule="one cause")
-        return replace(said, verdict="class", effects=alike, why="these explain the balance equally well",
-                       rule="causes that look alike")  # fmt: skip
-    if blown < most:
-        why = "roll and pitch changed as wind changes them"
-        return replace(said, verdict="named", effects=(WIND,), why=why, rule="wind")
-    good = [e for e in pairs if e.chi2 < most and e.chi2 < best.chi2 - 2.0 * EARNED]
-    if good:
-        effects = tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)
-        why = "no single cause explains the balance; two damaged rotors do"
-        return replace(said, verdict="named" if len(effects) == 1 else "class", effects=effects, why=why,
-                       explanations=(*good, *found), rule="two rotors")  # fmt: skip
-    why = "the balance moved, but not as one or two rotors or one weight move it"
-    return replace(said, verdict="unknown", why=why, rule="no listed cause")
+    return _Query(said, found[0], alike, _pairs(D, z, list(ways), half * length), blown, float(z @ z), bar,
+                  float(np.quantile(square, 1.0 - _OTHER * alarm)), float(np.quantile(rest, 1.0 - GATE)),
+                  n < _LEAST)  # fmt: skip
 
 
 def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvidence]:

@@ -46,7 +46,12 @@ def read(path: Path) -> FlightLog:
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
         got = f"a damaged log ({type(error).__name__}: {error})"
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
-    return _made(name, found)
+    try:
+        return _made(name, found)
+    except (TypeError, ValueError, KeyError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole ULog messages")) from error
 
 
 def _reduced(file: BinaryIO) -> io.BytesIO:
@@ -98,7 +103,7 @@ def _made(name: str, found: Any) -> FlightLog:
             [np.asarray(data[k], dtype=float) for k in keys], axis=1
         )
 
-    params = {k: float(v) for k, v in found.initial_parameters.items()}
+    params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
     if command is None:
         command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
