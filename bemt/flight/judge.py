@@ -359,7 +359,7 @@ def _weighed(flight: Array, calm: Array, layout: Array | None, alarm: float, win
     # What wind leaves: yaw, where the layout says which reading that is.
     blown = (float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0) if windy else float("inf")
     if blown - found[0].chi2 < ALIKE:
-        alike = (*alike, WIND)
+        alike = (WIND, *alike)  # it is known to be there
     return _Query(said, found[0], alike, _pairs(D, z, list(ways), half * length), blown, float(z @ z), bar,
                   float(np.quantile(square, 1.0 - _OTHER * alarm)), float(np.quantile(rest, 1.0 - GATE)),
                   n < _LEAST)  # fmt: skip

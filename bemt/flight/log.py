@@ -105,8 +105,8 @@ class FlightLog:
         on = (total > _ON * high) & (high > 0.0)
         if self.position is not None and np.ptp(self.position[:, 2]) > 2.0 * _LOW_M:
             z = self.position[:, 2]
-            above = z - np.percentile(z, 1.0) > _LOW_M if z[0] > _LOW_M else z > _LOW_M
-            on &= above
+            # A log that does not begin near zero began in the air, or its zero is elsewhere: the lowest place counts.
+            on &= z - (np.percentile(z, 1.0) if abs(z[0]) > _LOW_M else 0.0) > _LOW_M
         starts = self.t[np.flatnonzero(on)[:1]]
         late = self.t >= starts[0] + _TRIM_S if starts.size else on
         return np.asarray(on & late, dtype=bool)

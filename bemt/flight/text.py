@@ -38,7 +38,7 @@ def text(a: FlightAnswer) -> str:
     lines += _seen(a)
     lines += ["", "Identified (± 95 %)"] if a.found.constants else []
     lines += [f"  {name:<34} {_number(c)}" for name, c in a.found.constants.items()]
-    lines += [f"  {name:<34} {', '.join(f'{v:.4g}' for v in values)}" for name, values in a.found.rotors.items()]
+    lines += [f"  {name:<34} {', '.join(_figures(v, 4) for v in values)}" for name, values in a.found.rotors.items()]
     if a.mass is not None:
         lines.append(f"  {'mass, from the healthy flights':<34} {_number(a.mass)}")
     if a.predicted is not None:
@@ -121,11 +121,18 @@ def _flow(a: FlightAnswer) -> list[str]:
 
 
 def _number(c: Constant) -> str:
-    return f"{c.value:.4g} ± {c.half:.2g} {'' if c.unit == '1' else c.unit}".rstrip()
+    return f"{_figures(c.value, 4)} ± {_figures(c.half, 2)} {'' if c.unit == '1' else c.unit}".rstrip()
+
+
+def _figures(value: float, count: int) -> str:
+    """A number with so many significant figures, without an exponent where it is short enough."""
+    rounded = float(f"{value:.{count}g}")
+    plain = 1e-3 <= abs(rounded) < 1e6
+    return np.format_float_positional(rounded, trim="-") if plain else f"{value:.{count}g}"
 
 
 def _verdict(j: FlightVerdict) -> str:
-    leading = next((e for e in j.explanations if e.cause in j.effects and j.rule != "vibration"), None)
+    leading = next((e for e in j.explanations if e.cause == j.effects[0]), None) if j.effects else None
     size = "" if leading is None else f" ({100 * leading.size:+.0f} ± {100 * leading.half:.0f} % drive)"
     words = {
         "none": "No cause found: ",
