@@ -7,11 +7,16 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.errors import InputError
+from bemt.flight.answer import answer_on
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.flight.read import read_log
+from bemt.flight.text import text
 
 Array = NDArray[np.float64]
 G = 9.80665
@@ -194,3 +199,33 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False) -> bytes:
             block, us = raw[begin : begin + 32], round(1e6 * at[begin + 31]) + 1_000_000
             put("sensor_accel_fifo", "QQffB96h", us + 50, us, 500.0, 0.005, 32, *block.T.reshape(-1).tolist())
     return bytes(out)
+
+
+def damaged(data: bytes, rng: np.random.Generator) -> bytes:
+    """A copy cut short, with bytes turned, a piece lost, or a piece overwritten."""
+    out = bytearray(data)
+    at = int(rng.integers(0, len(out)))
+    match int(rng.integers(0, 4)):
+        case 0:
+            del out[at:]
+        case 1:
+            for k in rng.integers(0, len(out), 20):
+                out[k] ^= int(rng.integers(1, 256))
+        case 2:
+            del out[at : at + int(rng.integers(1, 5000))]
+        case _:
+            out[at : at + 64] = rng.integers(0, 256, 64, dtype=np.uint8).tobytes()
+    return bytes(out)
+
+
+def broken_copies(samples: list[bytes], count: int, file: Path) -> int:
+    """Read damaged copies and answer; how many were refused."""
+    rng, refused = np.random.default_rng(3), 0
+    for k in range(count):
+        file.write_bytes(damaged(samples[k % len(samples)], rng))
+        try:
+            with np.errstate(all="ignore"):
+                text(answer_on(read_log(file)))
+        except InputError:
+            refused += 1
+    return refused

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flight_files import broken_copies
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
@@ -24,7 +25,6 @@ from bemt.flight.log import FlightLog
 from bemt.flight.picture import flight_picture
 from bemt.flight.read import read_log
 from bemt.flight.simulator import motor_lag, simulator_constants
-from bemt.flight.text import text
 from bemt.flight.wind import wind
 from bemt.library.rotors import rotor_of
 
@@ -185,36 +185,6 @@ def test_other_rotors_are_refused(flights: Path) -> None:
     eight = replace(log, command=np.ones((log.t.size, 8)), rpm=None)
     with pytest.raises(InputError):
         answer_on(log, [eight])
-
-
-def damaged(data: bytes, rng: np.random.Generator) -> bytes:
-    """A copy cut short, with bytes turned, a piece lost, or a piece overwritten."""
-    out = bytearray(data)
-    at = int(rng.integers(0, len(out)))
-    match int(rng.integers(0, 4)):
-        case 0:
-            del out[at:]
-        case 1:
-            for k in rng.integers(0, len(out), 20):
-                out[k] ^= int(rng.integers(1, 256))
-        case 2:
-            del out[at : at + int(rng.integers(1, 5000))]
-        case _:
-            out[at : at + 64] = rng.integers(0, 256, 64, dtype=np.uint8).tobytes()
-    return bytes(out)
-
-
-def broken_copies(samples: list[bytes], count: int, file: Path) -> int:
-    """Read damaged copies and answer; how many were refused."""
-    rng, refused = np.random.default_rng(3), 0
-    for k in range(count):
-        file.write_bytes(damaged(samples[k % len(samples)], rng))
-        try:
-            with np.errstate(all="ignore"):
-                text(answer_on(read_log(file)))
-        except InputError:
-            refused += 1
-    return refused
 
 
 def betaflight(rotors: int = 4) -> str:

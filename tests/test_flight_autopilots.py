@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight_files import Hover, dataflash, ulog
+from flight_files import Hover, broken_copies, dataflash, ulog
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
@@ -182,3 +182,11 @@ def test_cut_copies_are_read_as_far_as_they_go(tmp_path: Path) -> None:
     (tmp_path / "log").write_bytes(broken)
     log = read_log(tmp_path / "log")
     assert "skipped" in log.ends and log.t[-1] > 11.0
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(600, marks=pytest.mark.slow)])
+def test_damaged_copies_never_raise_anything_else(count: int, tmp_path: Path) -> None:
+    """Logs with motors, speeds and raw bursts: refused with a fault, or read as far as they go."""
+    flight = Hover(seconds=6.0)
+    samples = [dataflash(flight, bursts=True), ulog(flight, imu_hz=50.0, fifo=True)]
+    broken_copies(samples, count, tmp_path / "log")
