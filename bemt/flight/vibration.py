@@ -107,26 +107,28 @@ def vibration(log: FlightLog) -> Vibration:
     span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
     total = float(np.mean([_line(p, int(low) - _SIDE, int(high) + 1 + _SIDE) ** 2
                            for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
-    angle = 2.0 * np.pi * np.concatenate([np.zeros((1, turns.shape[1])), np.cumsum(
-        0.5 * (turns[1:] + turns[:-1]) * np.diff(t)[:, None], axis=0)])  # fmt: skip
-    best: tuple[float, float] | None = None
-    for length in _WINDOWS_S:
-        found = _tracked(v, angle, _windows(log, t, step, length), max(int(2.0 / (shaft * step)), 2))
-        held = float(np.sum(found**2)) if found is not None else -1.0
-        if best is None or held > best[0]:
-            best = held, length
-    assert best is not None
-    if best[0] < _FOLLOWED * total or best[0] <= 0.0:
-        why = "all turn at the same speed" if best[0] < 0.0 else "the speeds are too coarse to follow the phase"
-        return Vibration(rate, shaft, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
-                         missing=f"which rotor shakes: {why}")  # fmt: skip
-    use = _windows(log, t, step, best[1])
-    once = _tracked(v, angle, use, max(int(2.0 / (shaft * step)), 2))
-    twice = None if 2.0 * shaft > 0.97 * nyquist else _tracked(v, 2.0 * angle, use, max(int(1.0 / (shaft * step)), 2))
+    once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total)
+    return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
+                     missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+
+
+def _by_rotor(
+    v: Array, t: Array, turns: Array, windows: list[list[slice]], total: float
+) -> tuple[tuple[float, ...], tuple[float, ...], str]:
+    """Amplitudes once and twice a turn in windows of the length that holds most; or why not."""
+    step, shaft = float(np.median(np.diff(t))), float(np.median(turns))
+    steps = 0.5 * (turns[1:] + turns[:-1]) * np.diff(t)[:, None]
+    angle = 2.0 * np.pi * np.concatenate([np.zeros((1, turns.shape[1])), np.cumsum(steps, axis=0)])
+    smooth = max(int(2.0 / (shaft * step)), 2)
+    tried = [(found, use) for use in windows if (found := _tracked(v, angle, use, smooth)) is not None]
+    if not tried:
+        return (), (), "all turn at the same speed"
+    once, use = max(tried, key=lambda one: float(np.sum(one[0] ** 2)))
+    if float(np.sum(once**2)) < max(_FOLLOWED * total, 1e-12):
+        return (), (), "the speeds are too coarse to follow the phase"
+    twice = _tracked(v, 2.0 * angle, use, max(smooth // 2, 2)) if 2.0 * shaft * step < 0.97 / 2.0 else None
     unknown = (float("nan"),) * turns.shape[1]
-    return Vibration(rate, shaft, unknown if once is None else tuple(map(float, once)),
-                     unknown if twice is None else tuple(map(float, twice)), line_hz=shaft, line=float(np.sqrt(total)),
-                     unit=log.raw_unit)  # fmt: skip
+    return tuple(map(float, once)), unknown if twice is None else tuple(map(float, twice)), ""
 
 
 def _spectrum(v: Array, windows: list[slice], step: float) -> tuple[Array, Array]:
@@ -165,6 +167,8 @@ def _windows(log: FlightLog, t: Array, step: float, length: float) -> list[slice
     if not runs:
         return []
     size = min(int(length / step), int(np.median([r.size for r in runs])))
+    if size < 16:
+        return []
     air = np.interp(t, log.t, log.flying.astype(float)) > 0.5
     out = []
     for run in runs:
