@@ -107,26 +107,25 @@ def vibration(log: FlightLog) -> Vibration:
     span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
     total = float(np.mean([_line(p, int(low) - _SIDE, int(high) + 1 + _SIDE) ** 2
                            for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
-    once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total)
+    once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total, rate / shaft)
     return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
                      missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
 
 
 def _by_rotor(
-    v: Array, t: Array, turns: Array, windows: list[list[slice]], total: float
+    v: Array, t: Array, turns: Array, windows: list[list[slice]], total: float, per_turn: float
 ) -> tuple[tuple[float, ...], tuple[float, ...], str]:
-    """Amplitudes once and twice a turn in windows of the length that holds most; or why not."""
-    step, shaft = float(np.median(np.diff(t))), float(np.median(turns))
+    """Amplitudes once and twice a turn in windows of the length that holds most; or why not. Samples `per_turn`."""
     steps = 0.5 * (turns[1:] + turns[:-1]) * np.diff(t)[:, None]
     angle = 2.0 * np.pi * np.concatenate([np.zeros((1, turns.shape[1])), np.cumsum(steps, axis=0)])
-    smooth = max(int(2.0 / (shaft * step)), 2)
+    smooth = max(int(2.0 * per_turn), 2)
     tried = [(found, use) for use in windows if (found := _tracked(v, angle, use, smooth)) is not None]
     if not tried:
         return (), (), "all turn at the same speed"
     once, use = max(tried, key=lambda one: float(np.sum(one[0] ** 2)))
     if float(np.sum(once**2)) < max(_FOLLOWED * total, 1e-12):
         return (), (), "the speeds are too coarse to follow the phase"
-    twice = _tracked(v, 2.0 * angle, use, max(smooth // 2, 2)) if 2.0 * shaft * step < 0.97 / 2.0 else None
+    twice = _tracked(v, 2.0 * angle, use, max(smooth // 2, 2)) if per_turn > 4.0 / 0.97 else None
     unknown = (float("nan"),) * turns.shape[1]
     return tuple(map(float, once)), unknown if twice is None else tuple(map(float, twice)), ""
 
