@@ -6,18 +6,20 @@ import gzip
 import json
 import runpy
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from flight_files import broken_copies
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.flight.answer import FlightAnswer, answer_on
+from bemt.flight.change import change_in
 from bemt.flight.identify import identify
-from bemt.flight.judge import _decide, features, judge
+from bemt.flight.inflow import inflow
+from bemt.flight.judge import _decide, axes_of, features, judge
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.picture import flight_picture
@@ -114,8 +116,15 @@ def test_cut_blade_is_found_whatever_the_name(flights: Path, tmp_path: Path) -> 
 
 
 def test_without_healthy_flights_nothing_is_named(flights: Path) -> None:
-    """One flight alone is no evidence."""
-    assert answer_on(read_log(flights / "after.usdlog")).judged.verdict == "insufficient"
+    """One flight alone: what healthy vehicles show is the scale, and an uneven build is among the causes."""
+    alone = answer_on(read_log(flights / "before_1.usdlog")).judged
+    assert alone.verdict == "insufficient" and 0.1 < alone.visible < 0.4
+    calm = read_log(flights / "before_1.usdlog")
+    assert calm.command is not None
+    got = answer_on(replace(calm, command=calm.command * [1.0, 1.0, 1.4, 1.0])).judged
+    assert got.verdict == "class" and {"damaged blade, motor 3", "an uneven build of this vehicle"} <= set(got.effects)
+    few = answer_on(read_log(flights / "after.usdlog"), healthy(flights)[:2]).judged
+    assert few.verdict == "class" and "damaged blade, motor 3" in few.effects
 
 
 @pytest.mark.parametrize("name", sorted(LAYOUTS))
@@ -135,35 +144,37 @@ def test_every_layout_balances_and_every_motor_is_found(name: str) -> None:
 
 @pytest.mark.parametrize("rotors", [4, 8])
 def test_healthy_flights_are_accused_as_rarely_as_stated(rotors: int) -> None:
-    """Over 1,000 vehicles; the bound allows for chance."""
+    """Over 200 vehicles, whose roll, pitch and yaw scatter as unlike as recorded ones; the bound allows for chance."""
     rng = np.random.default_rng(7)
     layout = layout_of("px4-x" if rotors == 4 else "octo-x", rotors)
-    hits = 0
-    for _ in range(1000):
-        spread = 0.02 * rng.normal(size=(7, rotors))
-        if layout is not None and rotors > 4:
-            A = effect_matrix(layout)
-            spread = spread @ (np.linalg.pinv(A) @ A)
-        hits += _decide(spread[0], spread[1:], layout, 0.01).verdict in ("named", "class")
-    assert hits <= 20
+    hits, unlike = 0, np.array([0.4, 1.7, 0.8])
+    for _ in range(200):
+        spread = 0.01 * (rng.normal(size=(7, 3)) * unlike) @ np.linalg.pinv(axes_of(layout, rotors)).T
+        hits += _decide(spread[0], spread[1:], layout, 0.01).verdict != "none"
+    assert hits <= 8
 
 
-def test_wind_from_slope_and_mean() -> None:
-    """The law gives its own wind back."""
+@pytest.mark.parametrize("by", ["force", "axis"])
+def test_wind_from_slope_and_mean(by: str) -> None:
+    """The law gives its own wind back: from a residual force, and from the tilt that balances it."""
     t = np.arange(0.0, 60.0, 0.02)
     v = np.stack([np.sin(t), 0.0 * t, 0.0 * t], axis=1)
 
     def blown(w: float) -> FlightLog:
         relative = w - v[:, 0]
         force = np.zeros_like(v)
-        force[:, 0] = 0.5 * relative + 0.05 * relative * np.abs(relative)
-        return FlightLog("f", "made", t, velocity=v, force=force)
+        force[:, 0] = 0.3 * relative + 0.02 * relative * np.abs(relative)
+        if by == "force":
+            return FlightLog("f", "made", t, velocity=v, force=force)
+        up = np.stack([(np.cos(t) - force[:, 0]) / 9.80665, 0.0 * t, 1.0 + 0.0 * t], axis=1)
+        return FlightLog("f", "made", t, velocity=v, axis=up / np.linalg.norm(up, axis=1, keepdims=True))
 
     for w in (4.0, 8.0, -12.0):
         found = wind(blown(w), [blown(0.0)])
-        assert found.speed == pytest.approx(abs(w), abs=0.5) and abs(found.heading_deg) == (0.0 if w > 0 else 180.0)
+        assert found.speed == pytest.approx(abs(w), abs=0.5)
+        assert abs(found.heading_deg) == pytest.approx(0.0 if w > 0 else 180.0, abs=0.1)
     assert wind(blown(0.0), [blown(0.0)]).speed == pytest.approx(0.0, abs=0.1)
-    assert np.isnan(wind(replace(blown(3.0), force=None), [blown(0.0)]).speed)
+    assert np.isnan(wind(replace(blown(3.0), force=None, axis=None), [blown(0.0)]).speed)
 
 
 def test_other_rotors_are_refused(flights: Path) -> None:
@@ -174,36 +185,6 @@ def test_other_rotors_are_refused(flights: Path) -> None:
     eight = replace(log, command=np.ones((log.t.size, 8)), rpm=None)
     with pytest.raises(InputError):
         answer_on(log, [eight])
-
-
-def damaged(data: bytes, rng: np.random.Generator) -> bytes:
-    """A copy cut short, with bytes turned, a piece lost, or a piece overwritten."""
-    out = bytearray(data)
-    at = int(rng.integers(0, len(out)))
-    match int(rng.integers(0, 4)):
-        case 0:
-            del out[at:]
-        case 1:
-            for k in rng.integers(0, len(out), 20):
-                out[k] ^= int(rng.integers(1, 256))
-        case 2:
-            del out[at : at + int(rng.integers(1, 5000))]
-        case _:
-            out[at : at + 64] = rng.integers(0, 256, 64, dtype=np.uint8).tobytes()
-    return bytes(out)
-
-
-def broken_copies(samples: list[bytes], count: int, file: Path) -> int:
-    """Read damaged copies and answer; how many were refused."""
-    rng, refused = np.random.default_rng(3), 0
-    for k in range(count):
-        file.write_bytes(damaged(samples[k % len(samples)], rng))
-        try:
-            with np.errstate(all="ignore"):
-                answer_on(read_log(file)).text()
-        except InputError:
-            refused += 1
-    return refused
 
 
 def betaflight(rotors: int = 4) -> str:
@@ -222,7 +203,7 @@ def cells() -> bytes:
     return gzip.compress("\n".join(rows).encode(), mtime=0)
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(1500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [60, pytest.param(1500, marks=pytest.mark.slow)])
 def test_damaged_copies_never_raise_anything_else(count: int, flights: Path, tmp_path: Path) -> None:
     """Refused with a fault, or read as far as they go."""
     samples = [(flights / "after.usdlog").read_bytes(), betaflight().encode(), cells()]
@@ -239,22 +220,6 @@ def test_damaged_recordings_never_raise_anything_else(count: int, shared_data: P
     broken_copies(samples, count, tmp_path / "log")
 
 
-def test_a_file_that_cannot_be_indexed_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The library leaves it open: on some systems it could not be deleted."""
-    library = pytest.importorskip("pymavlink.DFReader")
-
-    def fails(self: Any, progress_callback: object = None) -> None:
-        opened.append(self.filehandle)
-        raise IndexError
-
-    opened: list[Any] = []
-    monkeypatch.setattr(library.DFReader_binary, "init_arrays", fails)
-    (tmp_path / "log").write_bytes(b"\xa3\x95\x80\x80" + bytes(200))
-    with pytest.raises(InputError):
-        read_log(tmp_path / "log")
-    assert opened and opened[0].closed
-
-
 def test_a_cut_log_says_where_it_ends(flights: Path, tmp_path: Path) -> None:
     """With the place."""
     data = (flights / "after.usdlog").read_bytes()
@@ -268,8 +233,8 @@ def test_betaflight_tables_keep_each_rotor(rotors: int, tmp_path: Path) -> None:
     """Any number of rotors."""
     (tmp_path / "log.csv").write_text(betaflight(rotors))
     log = read_log(tmp_path / "log.csv")
-    assert log.rotors == rotors and log.command_unit == "us" and log.voltage is not None
-    assert log.t[1] == pytest.approx(0.004)
+    assert log.rotors == rotors and log.command_unit == "1" and log.voltage is not None and log.command is not None
+    assert log.t[1] == pytest.approx(0.004) and log.command[0, 0] == pytest.approx(0.4)
 
 
 def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -318,41 +283,101 @@ def test_recorded_thrust_constants_repeat(shared_data: Path) -> None:
     assert 2.1e-8 < grams < 2.3e-8
 
 
+THREE_MM = ("cut_propeller_M3_3mm", "cut_propeller_M3_1.5mm_", "cut_propeller_M3_2mm_", "cut_propeller_M3_4mm_")
+
+
 def test_recorded_quadrotor_with_cut_blades(shared_data: Path) -> None:
-    """No healthy or taped flight accused; from 3 mm in all motor 3 in half or more, never another one."""
+    """No healthy or taped flight accused; from 3 mm in all motor 3 in 8 of 10 or more, never another motor's blade."""
     folder = shared_data / "flight_logs" / "crazypad_E8"
     calm = [features(read_log(p)) for p in sorted(folder.glob("normal*"))]
-    layout, read = layout_of("crazyflie", 4), [c for c in calm if c is not None]
-    three_mm = ("cut_propeller_M3_3mm", "cut_propeller_M3_1.5mm_", "cut_propeller_M3_2mm_", "cut_propeller_M3_4mm_")
-    found = {0.01: 0, 0.05: 0}
-    for file, alarm in product(sorted(folder.glob("*")), found):
+    layout, read, found = layout_of("crazyflie", 4), [c for c in calm if c is not None], 0
+    for file in sorted(folder.glob("*")):
         mine = features(read_log(file))
         assert mine is not None
-        got = judge(mine, read, layout, alarm)
-        assert got.accused == 0 or alarm > 0.01
+        got = judge(mine, read, layout)
+        assert got.accused == 0
         if not file.name.startswith("cut"):
             assert got.verdict == "none", file
-        assert got.effects in ((), ("damaged blade, motor 3",)), file
-        found[alarm] += file.name.startswith(three_mm) and bool(got.effects)
-    assert found[0.01] >= 5 and found[0.05] >= 8  # of ten
+        assert not got.effects or got.effects[0] == "damaged blade, motor 3", file
+        found += file.name.startswith(THREE_MM) and bool(got.effects)
+    assert found >= 8  # of ten
+
+
+def test_recorded_flights_alone(shared_data: Path) -> None:
+    """No healthy flight is accused without others, no change is seen in a flight without one, cut blades are seen."""
+    folder, seen = shared_data / "flight_logs", 0
+    for file in (*sorted(folder.glob("cf21*.usdlog")), *sorted((folder / "crazypad_E8").glob("*"))):
+        log = read_log(file)
+        layout, mine = layout_of(log.layout, 4), features(log)
+        assert mine is not None and change_in(log, layout) is None, file
+        got = judge(mine, [], layout)
+        assert got.verdict == "insufficient" or "damaged blade, motor 3" in got.effects, file
+        assert got.verdict == "insufficient" or file.name.startswith("cut"), file
+        seen += got.verdict == "class"
+    assert seen >= 3
+
+
+def spliced(a: FlightLog, b: FlightLog) -> FlightLog:
+    """The first half of a flight and the second half of another."""
+    i, j = np.flatnonzero(a.flying), np.flatnonzero(b.flying)
+    first, last = slice(i[0], i[i.size // 2]), slice(j[j.size // 2], j[-1])
+    t = np.concatenate([a.t[first], a.t[first][-1] + 0.01 + b.t[last] - b.t[last][0]])
+    both = {}
+    for key in ("command", "velocity", "position", "voltage"):
+        x, y = getattr(a, key), getattr(b, key)
+        both[key] = np.concatenate([x[first], y[last]])
+    return FlightLog("f", "made", t, **both, layout=a.layout)
+
+
+@pytest.mark.parametrize("cut", ["2mm_2mm_43mm__log03", "3mm_3mm_41mm__log00", "4mm_3.5mm_39.5mm__log01"])
+def test_recorded_blade_lost_in_flight(shared_data: Path, cut: str) -> None:
+    """A healthy flight that goes on as one with a cut blade: the time within a second, and the motor."""
+    folder = shared_data / "flight_logs" / "crazypad_E8"
+    log = spliced(read_log(folder / "normal_flight__log03.usdlog"), read_log(folder / f"cut_propeller_M3_{cut}.usdlog"))
+    got = change_in(log, layout_of(log.layout, 4))
+    assert got is not None and got.kind == "step" and got.causes[0] == "damaged blade, motor 3"
+    flying = np.flatnonzero(read_log(folder / "normal_flight__log03.usdlog").flying)
+    assert abs(got.at_s - read_log(folder / "normal_flight__log03.usdlog").t[flying[flying.size // 2]]) < 1.0
+    assert got.size > 0.1
+
+
+def test_recorded_thrust_in_moving_air(shared_data: Path) -> None:
+    """A brushless Crazyflie that climbs and descends: less thrust in a climb, as the model has it."""
+    flow = inflow(read_log(shared_data / "flight_logs" / "cf21_brushless_37g_eckart12.usdlog"))
+    assert flow is not None and flow.axial is not None
+    top = rotor_of("1.8x1.2").solve(rpm=60.0 * flow.turns, airspeed_m_s=[0.0, flow.axial_m_s[1]]).thrust_N
+    assert abs(flow.axial[0] - (top[1] / top[0] - 1.0)) < flow.axial[1] < 0.01
 
 
 @pytest.mark.parametrize(
     ("name", "speed"),
     [
+        ("35wind", 4.2),
         ("70wind", 8.5),
         ("100wind", 12.1),
-        pytest.param(
-            "35wind", 4.2, marks=pytest.mark.xfail(strict=True, reason="2.3 m/s too high, and not in its band")
-        ),
-        pytest.param("70p20sint", 8.5, marks=pytest.mark.xfail(strict=True, reason="gusts: 3.2 m/s too low")),
+        pytest.param("70p20sint", 8.5, marks=pytest.mark.xfail(strict=True, reason="gusts: 3.1 m/s too low")),
     ],
 )
 def test_recorded_wind(shared_data: Path, name: str, speed: float) -> None:
-    """Within 2 m/s in two of four flights."""
+    """Within 2 m/s in steady wind; the band holds it in gusts, too."""
     folder = shared_data / "flight_logs" / "neural_fly"
     got = answered(folder, f"baseline_{name}.csv.gz", healthy=[read_log(folder / "baseline_nowind.csv.gz")]).wind
+    assert abs(got.speed - speed) < got.half
     assert abs(got.speed - speed) < 2.0
+
+
+def test_recorded_calm_is_calm(shared_data: Path) -> None:
+    """One half of a flight without wind judged by the other, and flights indoors."""
+    log = read_log(shared_data / "flight_logs" / "neural_fly" / "baseline_nowind.csv.gz")
+    assert log.velocity is not None and log.axis is not None
+    n = log.t.size // 2
+    halves = [FlightLog("f", "made", log.t[s], velocity=log.velocity[s], axis=log.axis[s])
+              for s in (slice(0, n), slice(n, None))]  # fmt: skip
+    got = wind(halves[0], halves[1:])
+    assert got.speed < min(got.half, 1.0)
+    for stem in ("cf21_brushed_34.7g_*.usdlog", "cf21_brushless_37g_*.usdlog"):
+        logs = [read_log(p) for p in sorted((shared_data / "flight_logs").glob(stem))]
+        assert wind(logs[0], logs[1:]).speed < min(wind(logs[0], logs[1:]).half, 1.0)
 
 
 def test_picture_of_a_log_without_motors() -> None:

@@ -75,7 +75,7 @@ MAY: dict[str, set[str]] = {
     "bemt.proof.prove": {"files", "clock", "environment"},
     "bemt.proof.follow|bemt.proof.loop|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
     "bemt.exports.*": {"files"},
-    "bemt.flight.read|bemt.flight.crazyflie|bemt.flight.px4|bemt.flight.table": {"files"},
+    "bemt.flight.read|bemt.flight.ardupilot|bemt.flight.crazyflie|bemt.flight.px4|bemt.flight.table": {"files"},
     "bemt.cfd.*": {"files", "clock", "environment"},
     "bemt.library.*": {"files"},
     "bemt.design.motors_file": {"files"},

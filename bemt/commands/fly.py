@@ -21,11 +21,11 @@ EXAMPLE = "fly flight.ulg --mass 1.2 --case 10x4.5"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     kinds = "flight logs: PX4 ULog, ArduPilot DataFlash, Crazyflie usdlog, Betaflight or other CSV"
-    parser.add_argument("logs", nargs="+", metavar="LOG", help=kinds)
+    parser.add_argument("logs", nargs="*", metavar="LOG", help=kinds)
     parser.add_argument("--case", metavar="ROTOR", help="case or label of the propeller, compared with the flight")
     parser.add_argument("--mass", type=_mass, metavar="KG", help="mass in flight with battery [kg]")
-    layout = 'px4-x, crazyflie, betaflight-x, hexa-x, octo-x, or angles with turning: "-45+ 135+ 45- -135-"'
-    parser.add_argument("--layout", default="", metavar="LAYOUT", help=f"{layout} (default: of the format)")
+    layout = 'angles with turning, "-45+ 135+ 45- -135-", or quad-x, x8, ...; "list" prints the names'
+    parser.add_argument("--layout", default="", metavar="LAYOUT", help=f"{layout} (default: of the log)")
     healthy = "healthy flights of the same vehicle, 3 or more for a verdict"
     parser.add_argument("--healthy", default=[], metavar="LOG", help=healthy, **_options.MANY)
     known = "mass of the healthy flights [kg]: gives the mass of this one"
@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--false-alarm", type=_share, default=0.01, metavar="P", help=alarm)
     learnt = "write the case of --case with the rotor as these flights show it to this folder; needs --mass"
     parser.add_argument("--out-case", metavar="DIR", help=learnt)
-    parser.add_argument("--out", metavar="PNG", help="write a picture of the first log to this file")
+    parser.add_argument("--out", dest="picture", metavar="PNG", help="write a picture of the first log to this file")
     _options.add_json(parser, "bemt.flight/1")
     _options.add_quiet(parser, "no answer")
 
@@ -60,6 +60,13 @@ def run(args: argparse.Namespace) -> int:
     from bemt.flight.answer import answer_on
     from bemt.flight.read import read_log
 
+    if args.layout == "list":
+        from bemt.flight.layout import LAYOUTS
+
+        print("\n".join(f"{name:<14} {places}" for name, places in LAYOUTS.items()))
+        return EXIT_OK
+    if not args.logs:
+        raise InputError(Fault("LOG", "", "no file", "a flight log", "bemt fly flight.ulg"))
     faults: list[Fault] = []
     found = {}
     for path in dict.fromkeys([*args.logs, *args.healthy]):
@@ -76,10 +83,10 @@ def run(args: argparse.Namespace) -> int:
         answer = answer_on(found[path], others, args.mass, args.layout, args.healthy_mass, args.false_alarm)
         answers.append(_with_model(answer, args.case) if args.case else answer)
     learnt, code = _learn(args, answers) if args.out_case else ("", EXIT_OK)
-    if args.out:
+    if args.picture:
         from bemt.flight.picture import flight_picture
 
-        Path(args.out).write_bytes(flight_picture(answers[0], args.mass))
+        Path(args.picture).write_bytes(flight_picture(answers[0], args.mass))
     if args.json:
         documents = [a.document() for a in answers]
         print(
@@ -87,7 +94,9 @@ def run(args: argparse.Namespace) -> int:
             end="",
         )
     elif not args.quiet:
-        print("\n\n".join([*(a.text() for a in answers), *([learnt] if learnt else [])]))
+        from bemt.flight.text import text
+
+        print("\n\n".join([*(text(a) for a in answers), *([learnt] if learnt else [])]))
     return code
 
 
@@ -112,15 +121,24 @@ def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, 
 
 
 def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
-    """The answer with the model's thrust constant at the mean speed, hovering."""
+    """The answer with the model at the mean speed: hovering, and in the flow that the flight met."""
     from dataclasses import replace
 
+    import numpy as np
+
+    from bemt.flight.answer import Predicted
     from bemt.library.rotors import rotor_of
 
     speeds = answer.found.rotors.get("mean rpm")
     if speeds is None:
         return answer
-    rpm = sum(speeds) / len(speeds)
-    points = rotor_of(case).solve(rpm=rpm, airspeed_m_s=0.0)
-    u = points.u["thrust_N"]
-    return replace(answer, predicted=(float(points.thrust_N[0]) / rpm**2, float(u[0]) / rpm**2))
+    rpm, rotor, flow = sum(speeds) / len(speeds), rotor_of(case), answer.inflow
+    points = rotor.solve(rpm=rpm, airspeed_m_s=0.0)
+    hover, u = float(points.thrust_N[0]), float(points.u["thrust_N"][0])
+    along, across = np.linspace(*(flow.axial_m_s if flow else (0.0, 0.0)), 9), np.linspace(0.0, 1.0, 9)
+    across = across * (flow.inplane_m_s if flow else 0.0)
+    axial = rotor.solve(rpm=rpm, airspeed_m_s=np.abs(along), angle_deg=np.where(along < 0.0, 180.0, 0.0)).thrust_N
+    inplane = rotor.solve(rpm=rpm, airspeed_m_s=across, angle_deg=90.0).thrust_N
+    found = Predicted(hover / rpm**2, u / rpm**2, np.stack([along, axial / hover - 1.0]),
+                      np.stack([across, inplane / hover - 1.0]))  # fmt: skip
+    return replace(answer, predicted=found)

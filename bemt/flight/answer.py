@@ -7,21 +7,48 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
-from bemt.flight.judge import FALSE_ALARM, FlightVerdict, features, judge
+from bemt.flight.inflow import Inflow, inflow
+from bemt.flight.judge import FALSE_ALARM, FlightVerdict, axes_of, features, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
 from bemt.flight.simulator import simulator_constants
+from bemt.flight.vibration import Vibration, shaken, vibration
 from bemt.flight.wind import Wind, wind
 
-__all__ = ["FlightAnswer", "answer_on"]
+__all__ = ["FlightAnswer", "Predicted", "answer_on"]
+
+_BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
+_FULL = 0.98  # share of full drive that is a limit [1]
 
 SPEED_POWER = 0.1
 """Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
 8,000 or 15,000 rev/min on three benches of a Crazyflie (IMRCLab/crazyflie-data-collection @ 4d777a5a) [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What the model of a case says of the rotor in this flight.
+
+    Attributes
+    ----------
+    constant, u : float
+        Thrust constant at the mean speed, hovering, and its standard uncertainty [N/rpm^2].
+    axial, inplane : (2, n) float
+        Velocity along the axis (above zero in a climb) and in the plane [m/s], and the relative change of the thrust
+        constant that it makes [1].
+    """
+
+    constant: float
+    u: float
+    axial: NDArray[np.float64]
+    inplane: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +65,25 @@ class FlightAnswer:
         The decision, with the evidence and the error rate.
     wind : Wind
         Speed [m/s].
+    balance : tuple of float
+        By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
+        that turn to the left than those that turn to the right; empty without a layout [1].
+    limited : tuple of float
+        Share of the time at full command, of each motor [1].
+    change : FlightChange or None
+        A change within the flight.
+    vibration : Vibration
+        At the frequencies of the rotors.
+    shaken : tuple of (int, float, bool)
+        As :func:`bemt.flight.vibration.shaken` gives it.
+    speeds : tuple of (int, float)
+        As :func:`bemt.flight.motor_speed.speed_changes` gives it.
+    inflow : Inflow or None
+        Thrust over the flow.
     mass : Constant or None
         Mass from healthy flights of known mass [kg].
-    predicted : tuple of float or None
-        Thrust constant of the case at the mean speed, and its standard uncertainty [N/rpm^2].
+    predicted : Predicted or None
+        The case in this flight.
     simulator : dict of str to Constant
         Constants in the units of simulators; the band of the thrust constant holds what flights differ by.
     """
@@ -50,97 +92,65 @@ class FlightAnswer:
     found: Identified
     judged: FlightVerdict
     wind: Wind
+    balance: tuple[float, ...] = ()
+    limited: tuple[float, ...] = ()
+    change: FlightChange | None = None
+    vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
+    shaken: tuple[tuple[int, float, bool], ...] = ()
+    speeds: tuple[tuple[int, float], ...] = ()
+    inflow: Inflow | None = None
     mass: Constant | None = None
-    predicted: tuple[float, float] | None = None
+    predicted: Predicted | None = None
     simulator: dict[str, Constant] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1."""
-        log, f = self.log, self.found
+        log, f, j, flow, said = self.log, self.found, self.judged, self.inflow, self.predicted
         return {
             "schema": "bemt.flight/1",
             "readings": {
                 "file": log.file, "format": log.format, "rotors": log.rotors, "samples": int(log.t.size),
                 "flying_s": float(log.flying.mean() * np.ptp(log.t)), "command_unit": log.command_unit,
-                "join_s": log.join_s, "ends": log.ends,
+                "layout": log.layout, "join_s": log.join_s, "ends": log.ends,
             },
             "constants": {k: asdict(c) for k, c in f.constants.items()},
             "simulator": {k: asdict(c) for k, c in self.simulator.items()},
             "rotors": {k: list(v) for k, v in f.rotors.items()},
+            "balance": dict(zip(("left_right", "front_rear", "left_turning_right_turning"), self.balance,
+                                strict=False)),
+            "at_full_command": list(self.limited),
             "mass_kg": None if self.mass is None else asdict(self.mass),
-            "baseline": None if self.predicted is None else
-                {"thrust_constant": self.predicted[0], "u": self.predicted[1], "unit": "N/rpm^2"},
-            "decision": {"verdict": self.judged.verdict, "effects": list(self.judged.effects), "why": self.judged.why},
-            "explanations": [asdict(e) for e in self.judged.explanations],
-            "error_rate": {"accused": self.judged.accused, "healthy": self.judged.healthy,
-                           "interval95": list(self.judged.rate95)},
-            "visible": self.judged.visible,
-            "share_change": self.judged.readings.tolist(),
-            "total_change": self.judged.total,
+            "baseline": None if said is None else
+                {"thrust_constant": said.constant, "u": said.u, "unit": "N/rpm^2"},
+            "decision": {"verdict": j.verdict, "effects": list(j.effects), "why": j.why, "rule": j.rule},
+            "explanations": [asdict(e) for e in j.explanations],
+            "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95)},
+            "visible": j.visible,
+            "share_change": j.readings.tolist(),
+            "total_change": j.total,
+            "change_in_flight": None if self.change is None else asdict(self.change),
+            "vibration": asdict(self.vibration),
+            "shaken": [{"motor": k + 1, "ratio": r, "against_healthy": h} for k, r, h in self.shaken],
+            "speed_at_drive": [{"motor": k + 1, "change": c} for k, c in self.speeds],
+            "inflow": None if flow is None else {"axial": flow.axial, "axial_m_s": flow.axial_m_s,
+                                                 "inplane": flow.inplane, "inplane_m_s": flow.inplane_m_s},
             "wind": asdict(self.wind),
-            "unseen": list(f.unseen),
+            "unseen": list(self.unseen),
         }  # fmt: skip
 
-    def text(self) -> str:
-        """One screen."""
-        log, j, f = self.log, self.judged, self.found
-        seconds = log.flying.mean() * np.ptp(log.t)
-        lines = [f"{log.file}: {log.format}, {log.rotors} rotors, {seconds:.1f} s in the air"]
-        if log.ends:
-            lines.append(f"  {log.ends}")
-        lines += ["", _verdict(j)]
-        if j.healthy:
-            low, high = j.rate95
-            lines.append(
-                f"  Error rate: {j.accused} of {j.healthy} healthy flights accused when each is judged by the others "
-                f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)."
-            )
-        if np.isfinite(j.visible):
-            lines.append(f"  A rotor shows here from a change of its drive by {100 * j.visible:.0f} %.")
-        if j.verdict == "none" and j.healthy:
-            lines.append(
-                "  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data."
-            )
-        if j.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
-            lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
-                         f"±{100 * j.total_half:.1f} %): weight at the centre, battery or air.")  # fmt: skip
-        if np.isfinite(self.wind.speed):
-            w = self.wind
-            seen = "Wind" if w.speed > w.half else "No wind seen:"
-            lines.append(f"  {seen} {w.speed:.1f} ± {w.half:.1f} m/s towards {w.heading_deg:.0f} deg from x.")
-        lines += ["", "Identified (± 95 %)"]
-        lines += [f"  {name:<34} {_number(c)}" for name, c in f.constants.items()]
-        lines += [f"  {name:<34} {', '.join(f'{v:.4g}' for v in values)}" for name, values in f.rotors.items()]
-        if self.mass is not None:
-            lines.append(f"  {'mass, from the healthy flights':<34} {_number(self.mass)}")
-        if self.predicted is not None:
-            k, u = self.predicted
-            lines.append(
-                f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)"
-            )
-        if self.simulator:
-            lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
-            lines += [f"  {name:<34} {_number(c)}" for name, c in self.simulator.items()]
-        lines += ["", "Not visible here"] if f.unseen else []
-        lines += [f"  {u}" for u in f.unseen]
-        return "\n".join(lines)
-
-
-def _number(c: Constant) -> str:
-    return f"{c.value:.4g} ± {c.half:.2g} {'' if c.unit == '1' else c.unit}".rstrip()
-
-
-def _verdict(j: FlightVerdict) -> str:
-    leading = next((e for e in j.explanations if e.cause in j.effects), None)
-    size = "" if leading is None else f" ({100 * leading.size:+.0f} ± {100 * leading.half:.0f} % drive)"
-    words = {
-        "none": "No cause found: ",
-        "named": f"Cause found: {', '.join(j.effects)}{size}: ",
-        "class": f"One of these: {', '.join(j.effects)}{size}: ",
-        "unknown": "Something unlisted: ",
-        "insufficient": "Cannot tell: ",
-    }
-    return f"{words[j.verdict]}{j.why}."
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """What the log cannot show, with the manoeuvre or channel that would."""
+        out, flow, shake = list(self.found.unseen), self.inflow, self.vibration
+        if shake.missing and self.log.rotors:
+            more = "; log it at more than twice the shaft frequency" if "which rotor" not in shake.missing else ""
+            out.append(f"vibration, tape and imbalance: {shake.missing}{more}")
+        if flow is None:
+            out.append("thrust in forward flight, climb and descent: log speed of the rotors, accelerometer, velocity "
+                       "and attitude")  # fmt: skip
+        elif flow.axial is None or abs(flow.axial[0]) < flow.axial[1]:
+            out.append("thrust in climb and descent: fly both at three steady rates, up to a third of the hover's wash")
+        return tuple(out)
 
 
 def answer_on(
@@ -185,19 +195,65 @@ def answer_on(
     if layout:
         log = replace(log, layout=layout)
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
-    found = identify(log, mass_kg)
+    found, air = identify(log, mass_kg), wind(log, healthy)
     mine = features(log)
     if mine is None:
         judged = FlightVerdict("insufficient", (), "the log shows no flight with all motors running", (), np.zeros(0))
     else:
-        judged = judge(mine, [x for h in healthy if (x := features(h)) is not None], placed, false_alarm)
+        calm_ones = [x for h in healthy if (x := features(h)) is not None]
+        judged = judge(mine, calm_ones, placed, false_alarm, _windy(log, healthy, air))
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
         same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
         known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
         if known:
             mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
-    return FlightAnswer(log, found, judged, wind(log, healthy), mass, simulator=simulator_constants(log, found))
+    shake, calm = vibration(log), [vibration(h) for h in healthy]
+    moved = shaken(shake, calm)
+    judged = _with_vibration(judged, moved, calm)
+    balance: tuple[float, ...] = ()
+    limited: tuple[float, ...] = ()
+    if mine is not None and placed is not None:
+        balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ mine)
+    if log.command is not None and log.command_unit == "1" and log.flying.any():
+        limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
+    return FlightAnswer(
+        log, found, judged, air, balance, limited, change_in(log, placed), shake, moved,
+        speed_changes(log, healthy), inflow(log), mass, simulator=simulator_constants(log, found),
+    )  # fmt: skip
+
+
+def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
+    """Whether the rotors met more wind than in the healthy flights: from the force, or by their own way over ground."""
+
+    def speed(one: FlightLog) -> float:
+        if one.velocity is None or not one.flying.any():
+            return 0.0
+        return float(np.mean(np.linalg.norm(one.velocity[one.flying, :2], axis=1)))
+
+    if air.speed > max(air.half, _BREEZE):
+        return True
+    return speed(log) > _BREEZE + max([speed(h) for h in healthy], default=0.0)
+
+
+def _with_vibration(
+    judged: FlightVerdict, moved: tuple[tuple[int, float, bool], ...], calm: Sequence[Vibration]
+) -> FlightVerdict:
+    """The verdict where the balance shows nothing and one rotor shakes more than in healthy flights."""
+    known = [(k, ratio) for k, ratio, by_healthy in moved if by_healthy]
+    if judged.verdict != "none" or len(known) != 1:
+        return judged
+    from scipy import stats
+
+    k, ratio = known[0]
+    accused = sum(bool(shaken(c, [*calm[:i], *calm[i + 1 :]])) for i, c in enumerate(calm))
+    accused = min(accused + judged.accused, judged.healthy)
+    interval = stats.binomtest(accused, judged.healthy).proportion_ci(method="exact")
+    why = f"it shakes {ratio:.1f} times as much as in healthy flights at its shaft frequency; the balance did not move"
+    which = f"motor {k + 1}" if k >= 0 else "a rotor"
+    effects = f"imbalance or tape, {which}", f"damaged blade, {which}"
+    return replace(judged, verdict="class", effects=effects, why=why, rule="vibration", accused=accused,
+                   rate95=(float(interval.low), float(interval.high)))  # fmt: skip
 
 
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:

@@ -1,26 +1,53 @@
-"""ArduPilot: DataFlash (``.BIN``), read by pymavlink. Messages as in ArduPilot's log documentation; NED and FRD axes.
+"""ArduPilot: DataFlash (``.BIN``). Messages as in ArduPilot's log documentation; NED and FRD axes.
 
-Motors are the outputs whose SERVOn_FUNCTION is 33 to 40 (motors 1 to 8) or 82 to 85 (9 to 12).
+The file is walked once, by the lengths that its own FMT messages give; of the messages in `_WANTED` only the columns
+that are used are kept, so memory follows what is kept and not the size of the file (pymavlink's reader keeps an index
+of every message; its table of format letters is used).
+
+Motors are the outputs whose SERVOn_FUNCTION is 33 to 40 (motors 1 to 8) or 82 to 85 (9 to 12); commands are shares of
+MOT_PWM_MIN to MOT_PWM_MAX; the layout is that of FRAME_CLASS and FRAME_TYPE. Raw bursts of the accelerometer are ISBH
+and ISBD messages.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
+import mmap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.log import FlightLog, Source, joined
+from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 Array = NDArray[np.float64]
 KIND = "ArduPilot DataFlash"
-_TYPES = ("RCOU", "RCO2", "ESC", "IMU", "ATT", "BAT", "XKF1", "NKF1")
+_HEAD, _FORMATS, _FORMAT_SIZE, _CHUNK = b"\xa3\x95", 128, 89, 1 << 20
+_IMU = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
+_WANTED: dict[str, tuple[str, ...]] = {
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+    "ESC": ("Instance", "RPM", "Curr"),
+    "IMU": ("I", *_IMU),
+    "ATT": ("Roll", "Pitch", "Yaw"),
+    "BAT": ("Instance", "Inst", "Volt", "Curr"),
+    "XKF1": ("C", "VN", "VE", "VD", "PN", "PE", "PD"),
+    "NKF1": ("C", "VN", "VE", "VD", "PN", "PE", "PD"),
+    "ISBH": ("N", "type", "instance", "mul", "smp_cnt", "SampleUS", "smp_rate"),
+    "ISBD": ("N", "seqno", "x", "y", "z"),
+    "PARM": ("Name", "Value"),
+}
+_FIRST = {"IMU": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("C",)}  # of these the first is read
 _FLIP = np.array([1.0, -1.0, -1.0])
 _FUNCTIONS = {**{33 + i: i for i in range(8)}, **{82 + i: 8 + i for i in range(4)}}
+_FRAMES = {
+    (1, 0): "quad-plus", (1, 1): "quad-x", (1, 3): "quad-h", (1, 12): "betaflight-x", (2, 0): "hexa-plus",
+    (2, 1): "hexa-x", (3, 0): "octo-plus", (3, 1): "octo-x", (4, 0): "x8-plus", (4, 1): "x8", (4, 14): "x8-cw",
+    (5, 0): "y6", (5, 1): "y6",
+}  # fmt: skip
 
 
 def sniff(head: bytes) -> bool:
@@ -28,96 +55,215 @@ def sniff(head: bytes) -> bool:
     return head[:4] == b"\xa3\x95\x80\x80"
 
 
+@dataclass(eq=False)
+class _Table:
+    """Messages of one kind: their layout, bytes not yet unpacked, and columns."""
+
+    name: str
+    row: np.dtype[Any]
+    scale: dict[str, float]
+    raw: bytearray = field(default_factory=bytearray)
+    kept: Stretches[NDArray[Any]] = field(default_factory=lambda: Stretches(lambda rows: rows[::SPARSE].copy()))
+
+    def unpack(self) -> None:
+        """Keep the used columns of what was gathered."""
+        rows = np.frombuffer(bytes(self.raw), dtype=self.row)
+        self.raw.clear()
+        for key in _FIRST.get(self.name, ()):
+            if key in (self.row.names or ()):
+                rows = rows[rows[key] == 0]
+        keep = [n for n in self.row.names or () if n in ("TimeUS", *_WANTED[self.name])]
+        self.kept.add(repack_fields(rows[keep]))  # a copy without the other columns
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Column by name, in the unit of the log."""
+        if self.raw:
+            self.unpack()
+        if not self.kept.parts:
+            return {}
+        whole = np.concatenate(self.kept.parts)
+        self.kept.parts.clear()
+        return {n: whole[n] * self.scale[n] if n in self.scale else whole[n] for n in whole.dtype.names or ()}
+
+
 def read(path: Path) -> FlightLog:
-    """Read a log, as far as it is whole; messages stream, so the size does not matter."""
+    """Read a log, as far as it is whole."""
     name = str(path)
-    base = needs("pymavlink.DFReader", "flight").DFReader_binary
-    # The compiled index prints past Python's streams; the other one tells of damage where it can be heard.
-    slow = {"init_arrays_fast": lambda self, progress_callback=None: self.init_arrays(progress_callback)}
-
-    def made(self: Any, file: str) -> None:
-        try:
-            base.__init__(self, file)
-        except Exception:
-            # The library leaves the file open when it cannot index it.
-            for held in ("data_map", "filehandle"):
-                if hasattr(self, held):
-                    getattr(self, held).close()
-            raise
-
-    reader = type("DataFlash", (base,), {"__init__": made, **slow})
-    rows: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    noise = io.StringIO()
-    stopped, params = "", {}
+    letters = needs("pymavlink.DFReader", "flight").FORMAT_TO_STRUCT
     try:
-        with (
-            contextlib.redirect_stdout(noise),
-            contextlib.redirect_stderr(noise),
-            contextlib.closing(reader(name)) as log,
-        ):
-            try:
-                while (m := log.recv_match(type=list(_TYPES))) is not None:
-                    row = m.to_dict()
-                    kind = row.pop("mavpackettype")
-                    which = row.get("Instance", row.get("I", row.get("C", 0)))
-                    rows.setdefault((kind, int(which)), []).append(row)
-            except Exception as error:  # a parser meets any damage
-                stopped = f"damaged; reading ended ({type(error).__name__})"
-            params = dict(log.params)
-    except Exception as error:
-        got = f"a damaged log ({type(error).__name__}: {error})"
-        raise InputError(Fault(name, "", got, "whole DataFlash messages", "Download the log again")) from error
-    if noise.getvalue() and not stopped:
-        stopped = "damaged; unreadable bytes were skipped"
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            tables, ends = _tables(data, letters)
+        found = {k: t.columns() for k, t in tables.items()}
+    except (ValueError, TypeError, MemoryError) as error:
+        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole DataFlash messages")) from error
     try:
-        return _made(name, rows, params, stopped)
+        return _made(name, {k: v for k, v in found.items() if v}, ends)
     except (TypeError, ValueError, KeyError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(Fault(name, "", f"a damaged log ({error})", "whole DataFlash messages")) from error
 
 
-def _made(name: str, rows: dict[tuple[str, int], list[dict[str, Any]]], params: dict[str, Any], ends: str) -> FlightLog:
-    def take(kind: str, keys: tuple[str, ...], which: int = 0) -> Source | None:
-        found = [r for r in rows.get((kind, which), []) if all(k in r for k in ("TimeUS", *keys))]
-        if len(found) < 2:
+def _tables(data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type]]) -> tuple[dict[str, _Table], str]:
+    """Walk the messages; where they cannot be read, skip to the next mark."""
+    sizes: dict[int, int] = {_FORMATS: _FORMAT_SIZE}
+    kinds: dict[int, _Table] = {}
+    tables: dict[str, _Table] = {}
+    at, end, skipped, cut = 0, len(data), 0, 0
+    while at + 3 <= end:
+        size = sizes.get(data[at + 2]) if data[at : at + 2] == _HEAD else None
+        if size is None or at + size > end:
+            nearest = data.find(_HEAD, at + 1)
+            stop = end if nearest < 0 else nearest
+            if size is not None and nearest < 0:
+                cut = stop - at
+            elif any(data[at : min(stop, at + 4096)]):  # zeros fill up a file
+                skipped += stop - at
+            at = stop
+            continue
+        kind = data[at + 2]
+        if kind == _FORMATS:
+            number, made, table = _format(data[at + 3 : at + size], letters)
+            if made >= 3:
+                sizes[number] = made
+                if table is not None:
+                    known = tables.setdefault(table.name, table)
+                    if known.row == table.row:
+                        kinds[number] = known
+        elif (wanted := kinds.get(kind)) is not None:
+            wanted.raw += data[at + 3 : at + size]
+            if len(wanted.raw) > _CHUNK:
+                wanted.unpack()
+        at += size
+    if skipped:
+        return tables, f"damaged; {skipped} bytes that cannot be read were skipped"
+    return tables, f"ends within a message, {cut} bytes before its end" if cut else ""
+
+
+def _format(body: bytes, letters: Mapping[str, tuple[str, float | None, type]]) -> tuple[int, int, _Table | None]:
+    """Number and length of the messages that a FMT message describes; their table when they are wanted."""
+    number, size = body[0], body[1]
+    name, form, labels = (part.rstrip(b"\0").decode("latin-1") for part in (body[2:6], body[6:22], body[22:86]))
+    names = labels.split(",")
+    if name not in _WANTED or len(names) != len(form) or len(set(names)) != len(names):
+        return number, size, None
+    fields, scale = [], {}
+    for label, letter in zip(names, form, strict=True):
+        if letter not in letters:
+            return number, size, None
+        code, factor, _ = letters[letter]
+        shape = (32,) if letter == "a" else ()
+        fields.append((label, "<i2" if letter == "a" else f"S{code[:-1]}" if code.endswith("s") else f"<{code}", shape))
+        if factor is not None:
+            scale[label] = factor
+    row = np.dtype([(a, np.dtype((b, c))) for a, b, c in fields])
+    return (number, size, _Table(name, row, scale)) if row.itemsize == size - 3 else (number, size, None)
+
+
+def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> FlightLog:
+    parm = found.get("PARM", {"Name": np.zeros(0, "S16"), "Value": np.zeros(0)})
+    params = {n.decode("latin-1"): float(v) for n, v in zip(parm["Name"], parm["Value"], strict=True)}
+
+    def take(kind: str, keys: tuple[str, ...], rows: NDArray[np.bool_] | None = None) -> Source | None:
+        columns = found.get(kind, {})
+        if any(k not in columns for k in ("TimeUS", *keys)):
             return None
-        t = 1e-6 * np.array([r["TimeUS"] for r in found], dtype=float)
-        return t, np.array([[r[k] for k in keys] for r in found], dtype=float)
+        pick = slice(None) if rows is None else rows
+        t = 1e-6 * columns["TimeUS"][pick].astype(float)
+        return (t, np.stack([columns[k][pick].astype(float) for k in keys], axis=1)) if t.size > 1 else None
 
     def flipped(source: Source | None) -> Source | None:
         return None if source is None else (source[0], source[1] * _FLIP)
 
+    def whole(key: str, usual: float) -> float:
+        value = params.get(key, usual)
+        return value if np.isfinite(value) else usual
+
     motors = sorted(
-        (i, n) for n in range(1, 15) if (i := _FUNCTIONS.get(int(params.get(f"SERVO{n}_FUNCTION", 0)), -1)) >= 0
+        (i, n) for n in range(1, 15) if (i := _FUNCTIONS.get(int(whole(f"SERVO{n}_FUNCTION", 0.0)), -1)) >= 0
     )
-    outputs = tuple(f"C{n}" for _, n in motors) or ("C1", "C2", "C3", "C4")
-    speeds = [take("ESC", ("RPM",), i) for i in range(len(outputs))]
-    currents = [take("ESC", ("Curr",), i) for i in range(len(outputs))]
-    att, battery = take("ATT", ("Roll", "Pitch")), take("BAT", ("Volt", "Curr"))
-    state = "XKF1" if ("XKF1", 0) in rows else "NKF1"
-    command = take("RCOU", outputs)
+    channels = [n for _, n in motors] or _moving(found.get("RCOU", {}))
+    command = take("RCOU", tuple(f"C{n}" for n in channels)) if channels else None
+    low, high = whole("MOT_PWM_MIN", 1000.0), whole("MOT_PWM_MAX", 2000.0)
+    if command is not None:
+        low, high = (low, high) if high - low >= 100.0 else (1000.0, 2000.0)
+        command = command[0], np.clip((command[1] - low) / (high - low), 0.0, None)
+    esc = found.get("ESC", {})
+    speeds, currents = None, None
+    if "Instance" in esc:
+        there = [int(i) for i in np.unique(esc["Instance"])]
+        own = [n - 1 for n in channels] if {n - 1 for n in channels} <= set(there) else there
+        if len(own) == len(channels) or not channels:
+            speeds, currents = (
+                _together([take("ESC", (key,), esc["Instance"] == i) for i in own]) for key in ("RPM", "Curr")
+            )
+    if speeds is not None and not np.any(speeds[1]):
+        speeds = None
+    att, battery = take("ATT", ("Roll", "Pitch", "Yaw")), take("BAT", ("Volt", "Curr"))
+    axis = (att[0], _thrust_axis(np.radians(att[1]))) if att else None
+    state = "XKF1" if "XKF1" in found else "NKF1"
+    acceleration = flipped(take("IMU", _IMU[3:]))
     sources = {
         "command": command,
-        "rpm": _together(speeds),
-        "current": _together(currents),
-        "acceleration": flipped(take("IMU", ("AccX", "AccY", "AccZ"))),
-        "rates": flipped(take("IMU", ("GyrX", "GyrY", "GyrZ"))),
-        "upright": (att[0], np.prod(np.cos(np.radians(att[1])), axis=1)) if att else None,
+        "rpm": speeds,
+        "current": currents,
+        "acceleration": acceleration,
+        "rates": flipped(take("IMU", _IMU[:3])),
+        "upright": (axis[0], axis[1][:, 2]) if axis else None,
+        "axis": axis,
         "velocity": flipped(take(state, ("VN", "VE", "VD"))),
         "position": flipped(take(state, ("PN", "PE", "PD"))),
         "voltage": (battery[0], battery[1][:, 0]) if battery else None,
         "battery_current": (battery[0], battery[1][:, 1]) if battery else None,
     }
-    layout = "px4-x" if len(outputs) == 4 and int(params.get("FRAME_TYPE", 1)) == 1 else ""
-    main = "command" if command else "rpm" if sources["rpm"] else "acceleration"
-    return joined(name, KIND, sources, main, command_unit="us", layout=layout, ends=ends)
+    B = len(channels)
+    frame = (int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0)))
+    layout = _FRAMES.get(frame, "") if B == {1: 4, 2: 6, 3: 8, 4: 8, 5: 6}.get(frame[0], 0) else ""
+    main = "command" if command else "rpm" if speeds else "acceleration"
+    raw = _bursts(found) or acceleration
+    return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends)
 
 
-def _together(parts: list[Source | None]) -> Source | None:
+def _thrust_axis(angles: Array) -> Array:
+    """Thrust in north-west-up, from roll, pitch and yaw of front-right-down in NED [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles).T, np.cos(angles).T
+    return np.stack([-(cr * sp * cy + sr * sy), cr * sp * sy - sr * cy, cr * cp], axis=1)
+
+
+def _moving(outputs: Mapping[str, NDArray[Any]]) -> list[int]:
+    """Leading outputs that move within the range of a motor, for a log without parameters."""
+    used: list[int] = []
+    for n in range(1, 15):
+        v = outputs.get(f"C{n}")
+        if v is None or not v.size or v.max() > 2500 or v.max() < 1000 or v.max() - v.min() < 20:
+            break
+        used.append(n)
+    return used
+
+
+def _bursts(found: Mapping[str, Mapping[str, NDArray[Any]]]) -> Source | None:
+    """Raw accelerations of the batch sampler, in order of time; z up."""
+    heads, blocks = found.get("ISBH", {}), found.get("ISBD", {})
+    if any(k not in heads for k in _WANTED["ISBH"]) or any(k not in blocks for k in _WANTED["ISBD"]):
+        return None
+    times, values = [], []
+    for k in np.flatnonzero((heads["type"] == 0) & (heads["instance"] == 0)):
+        mul, rate = float(heads["mul"][k]), float(heads["smp_rate"][k])
+        rows = np.flatnonzero(blocks["N"] == heads["N"][k])
+        if not mul > 0.0 or not rate > 0.0 or not rows.size:
+            continue
+        rows = rows[np.argsort(blocks["seqno"][rows])]
+        xyz = np.stack([blocks[a][rows].reshape(-1).astype(float) for a in "xyz"], axis=1)[: int(heads["smp_cnt"][k])]
+        step = blocks["seqno"][rows][:, None] * 32 + np.arange(32)
+        times.append(1e-6 * float(heads["SampleUS"][k]) + step.reshape(-1)[: len(xyz)] / rate)
+        values.append(xyz / mul * _FLIP)
+    return (np.concatenate(times), np.concatenate(values)) if times else None
+
+
+def _together(every: list[Source | None]) -> Source | None:
     """Rotors with clocks of their own, on that of the first."""
-    whole = [p for p in parts if p is not None]
-    if len(whole) < max(len(parts), 1) or not whole:
+    whole = [p for p in every if p is not None]
+    if len(whole) < max(len(every), 1) or not whole:
         return None
     t = whole[0][0]
     return t, np.stack([np.interp(t, at, v[:, 0]) for at, v in whole], axis=1)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.flight.log import FlightLog, joined, upright_share
+from bemt.flight.log import FlightLog, joined, thrust_axis
 from bemt.readers import crazyflie_log
 
 Array = NDArray[np.float64]
@@ -62,15 +62,17 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     command = command or many(*(f"pwm.m{i}_pwm" for i in motors), factor=1 / 65535.0)
     q = many(*(f"stateEstimate.q{a}" for a in "wxyz"))
     roll = many("stateEstimate.roll", "stateEstimate.pitch", factor=np.pi / 180.0)
-    upright = (q[0], upright_share(q[1])) if q else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
+    axis = (q[0], thrust_axis(q[1])) if q else None
+    upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
     sources = {
         "command": command,
         "rpm": many(*(f"rpm.m{i}" for i in motors)),
         "acceleration": many(*(f"acc.{a}" for a in "xyz"), factor=G0),
         "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
         "upright": upright,
+        "axis": axis,
         "velocity": many(*(f"stateEstimate.v{a}" for a in "xyz")),
         "position": many(*(f"stateEstimate.{a}" for a in "xyz")),
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
     }
-    return joined(name, kind, sources, "command", layout="crazyflie", ends=ends)
+    return joined(name, kind, sources, "command", raw=sources["acceleration"], layout="crazyflie", ends=ends)

@@ -73,13 +73,22 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
     rotors: dict[str, tuple[float, ...]] = {}
     unseen: list[str] = []
     drive = log.rpm if log.rpm is not None else log.command
-    if drive is None or on.sum() < 50:
-        return Identified(out, rotors, ("no flight with motors running: log motor commands and fly 10 s",), None)
+    if drive is None:
+        text = (
+            "motors: the log holds neither commands nor speeds (RCOU of ArduPilot, actuator_motors of PX4, motor, pwm)"
+        )
+        return Identified(out, rotors, (text,), None)
+    if on.sum() < 50:
+        return Identified(out, rotors, ("rotors: no flight with the motors running; fly 10 s or more",), None)
     t, x = log.t[on], drive[on]
     upright = np.ones(t.size) if log.upright is None else log.upright[on]
     speeds = log.rpm is not None
     power = x**2 if speeds else x
-    word, unit = ("thrust constant", "N/rpm^2") if speeds else ("thrust per command", f"N/({log.command_unit})")
+    word, unit = (
+        ("thrust constant", "N/rpm^2")
+        if speeds
+        else ("thrust per command", "N" if log.command_unit == "1" else f"N/{log.command_unit}")
+    )
     m, per = (1.0, "/kg") if mass_kg is None else (mass_kg, "")
     weight = _balance(log, on, power.sum(axis=1) * upright)
     if weight is not None:
@@ -98,12 +107,6 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
         unseen.append("thrust over speed: log the speed of each rotor (ESC telemetry)")
     _yaw(log, on, power, speeds, out, unseen)
     _motor(log, on, out, unseen)
-    if log.acceleration is None:
-        unseen.append("vibration, tape and imbalance: log the accelerometer at more than twice the shaft frequency")
-    elif speeds and 0.5 / float(np.median(np.diff(log.t))) < float(np.median(x)) / 60.0:
-        rate = 1.0 / float(np.median(np.diff(log.t)))
-        unseen.append(f"vibration at the shaft's {np.median(x) / 60:.0f} Hz: the log has {rate:.0f} samples a second")
-    unseen.append("thrust over advance ratio and in descent: climb and descend at three steady rates")
     return Identified(out, rotors, tuple(unseen), weight)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["LAYOUTS", "effect_matrix", "layout_of"]
+__all__ = ["LAYOUTS", "effect_matrix", "layout_of", "layout_text"]
 
 Array = NDArray[np.float64]
 
@@ -17,30 +18,42 @@ LAYOUTS = {
     "crazyflie": "-45+ -135- 135+ 45-",
     "px4-x": "-45+ 135+ 45- -135-",
     "betaflight-x": "-135- -45+ 135+ 45-",
+    "quad-x": "-45+ 135+ 45- -135-",
+    "quad-plus": "-90+ 90+ 0- 180-",
+    "quad-h": "-45- 135- 45+ -135+",
     "hexa-x": "-90- 90+ 30- -150+ -30+ 150-",
+    "hexa-plus": "0- 180+ 120- -60+ 60+ -120-",
+    "y6": "-60+ 60- 60+ 180- -60- 180+",
     "octo-x": "-22.5- 157.5- -67.5+ -157.5+ 22.5+ 112.5+ 67.5- -112.5-",
+    "octo-plus": "0- 180- -45+ -135+ 45+ 135+ 90- -90-",
+    "x8": "-45+ 45- 135+ -135- 45+ -45- -135+ 135-",
+    "x8-plus": "0+ 90- 180+ -90- 90+ 0- -90+ 180-",
+    "x8-cw": "-45+ -45- -135+ -135- 135+ 135- 45+ 45-",
+    "dodeca-hexa": "-30+ -30- -90- -90+ -150+ -150- 150- 150+ 90+ 90- 30- 30+",
 }
 """Angle of each motor in its numbering [deg, from ahead to the left], and its turning seen from above: + to the left.
 
-Sources: Bitcraze, Crazyflie 2.x motor numbering; PX4 airframes reference; Betaflight default motor order; ArduPilot
-AP_MotorsMatrix (hexa X and octa X); not checked against their files here.
+Sources: Bitcraze, Crazyflie 2.x motor numbering; PX4 airframes reference; Betaflight default motor order (the same as
+ArduPilot's BF_X); all others ArduPilot, libraries/SITL/SIM_Frame.cpp and AP_MotorsMatrix.cpp, whose angles count to the
+right. px4-x and quad-x are one.
 """
 
 
 def layout_of(text: str, rotors: int) -> Array | None:
-    """Angles and turning.
+    """Angles, turning and arms.
 
     Parameters
     ----------
     text : str
-        A name of :data:`LAYOUTS`, or angles with signs such as ``"-45+ 135+ 45- -135-"`` [deg]; empty: not known.
+        A name of :data:`LAYOUTS`, or angles with signs such as ``"-45+ 135+ 45- -135-"`` [deg], each with its arm where
+        arms differ: ``"-30@0.29+"`` [any unit]; empty: not known.
     rotors : int
         Number of rotors in the log.
 
     Returns
     -------
-    (B, 2) float or None
-        Angle [rad] and turning, +1 or -1 [1].
+    (B, 3) float or None
+        Angle [rad], turning, +1 or -1 [1], arm [unit of the text; 1].
 
     Raises
     ------
@@ -55,27 +68,54 @@ def layout_of(text: str, rotors: int) -> Array | None:
     if not text:
         return None
     words = re.split(r"[\s,]+", LAYOUTS.get(text, text).strip())
-    found = [re.fullmatch(r"(-?\d+(?:\.\d+)?)([+-])", w) for w in words]
+    found = [re.fullmatch(r"(-?\d+(?:\.\d+)?)(?:@(\d+(?:\.\d+)?))?([+-])", w) for w in words]
     if not all(found):
-        expected = f"{', '.join(LAYOUTS)}, or angles with signs"
+        fitting = [name for name, places in LAYOUTS.items() if len(places.split()) == rotors] or list(LAYOUTS)
+        expected = f"{', '.join(fitting)}, or angles with signs"
         raise InputError(Fault("", "--layout", repr(text), expected, 'For example "-45+ 135+ 45- -135-"'))
     if len(found) != rotors:
         raise InputError(Fault("", "--layout", f"{len(found)} rotors", f"{rotors}, as in the log"))
-    return np.array([[np.radians(float(m[1])), 1.0 if m[2] == "+" else -1.0] for m in found if m])
+    return np.array([[np.radians(float(m[1])), 1.0 if m[3] == "+" else -1.0, float(m[2] or 1.0)] for m in found if m])
 
 
-def effect_matrix(layout: Array) -> Array:
-    """Loads per rotor thrust, scaled to the arm.
+def layout_text(ahead: ArrayLike, left: ArrayLike, turning: Sequence[float]) -> str:
+    """Layout from places, in the form that :func:`layout_of` reads.
 
     Parameters
     ----------
-    layout : (B, 2) float
-        Angle [rad] and turning [1].
+    ahead, left : (B,) float
+        Places [m].
+    turning : (B,) float
+        Above zero: to the left, seen from above.
+
+    Returns
+    -------
+    str
+        Angles [deg] with arms and signs.
+
+    Examples
+    --------
+    >>> layout_text([0.1, -0.1], [0.0, 0.0], [1, -1])
+    '0@0.1+ 180@0.1-'
+    """
+    x, y = np.asarray(ahead, dtype=float), np.asarray(left, dtype=float)
+    angle, arm = np.degrees(np.arctan2(y, x)), np.hypot(x, y)
+    return " ".join(f"{a:.5g}@{r:.4g}{'+' if s > 0 else '-'}" for a, r, s in zip(angle, arm, turning, strict=True))
+
+
+def effect_matrix(layout: Array) -> Array:
+    """Loads per rotor thrust, scaled to the mean arm.
+
+    Parameters
+    ----------
+    layout : (B, 3) float
+        Angle [rad], turning [1], arm [any unit].
 
     Returns
     -------
     (4, B) float
-        Rows: roll to the right, pitch nose down reversed (rotors ahead lift the nose), yaw reaction, total [1].
+        Rows: roll to the right, pitch nose up (rotors ahead lift the nose), yaw reaction, total [1].
     """
-    angle, turn = layout.T
-    return np.stack([np.sin(angle), np.cos(angle), turn, np.ones_like(angle)])
+    angle, turn, arm = layout.T
+    arm = arm / arm.mean()
+    return np.stack([arm * np.sin(angle), arm * np.cos(angle), turn, np.ones_like(angle)])

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["FlightLog", "joined", "upright_share"]
+__all__ = ["DENSE", "SPARSE", "FlightLog", "Stretches", "joined", "thrust_axis"]
 
 Array = NDArray[np.float64]
 Source = tuple[Array, Array]
+T = TypeVar("T", bound=Sized)
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
+_MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
+_LARGEST = 1e9  # value above which a number is damage: no unit here comes near
+DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +45,19 @@ class FlightLog:
         Angular velocity in body axes, z up [rad/s].
     upright : (N,) float or None
         Cosine of the tilt [1].
+    axis : (N, 3) float or None
+        Unit vector of the thrust, in axes of the world, z up [1].
     velocity, position : (N, 3) float or None
         In axes of the world, z up [m/s, m].
     force : (N, 3) float or None
         Residual force that the log holds, in its own unit.
     voltage, battery_current : (N,) float or None
         Battery [V, A].
+    raw : (times, values) or None
+        Accelerometer at its own rate, with gaps where it was sampled in bursts: (M,) [s], (M, 3) [m/s2]; where there is
+        none, the gyro [rad/s], as `raw_unit` says.
     command_unit, layout : str
-        Unit of the commands; usual layout of the format, may be empty.
+        Unit of the commands; layout that the log states or the format usually has, may be empty.
     join_s : dict of str to float
         Half the sample interval of each quantity's source: how far a value may lie from its time [s].
     ends : str
@@ -63,11 +73,14 @@ class FlightLog:
     acceleration: Array | None = None
     rates: Array | None = None
     upright: Array | None = None
+    axis: Array | None = None
     velocity: Array | None = None
     position: Array | None = None
     force: Array | None = None
     voltage: Array | None = None
     battery_current: Array | None = None
+    raw: Source | None = None
+    raw_unit: str = "m/s2"
     command_unit: str = "1"
     layout: str = ""
     join_s: dict[str, float] = field(default_factory=dict)
@@ -92,36 +105,58 @@ class FlightLog:
         on = (total > _ON * high) & (high > 0.0)
         if self.position is not None and np.ptp(self.position[:, 2]) > 2.0 * _LOW_M:
             z = self.position[:, 2]
-            above = z - np.percentile(z, 1.0) > _LOW_M if z[0] > _LOW_M else z > _LOW_M
-            on &= above
+            # A log that does not begin near zero began in the air, or its zero is elsewhere: the lowest place counts.
+            on &= z - (np.percentile(z, 1.0) if abs(z[0]) > _LOW_M else 0.0) > _LOW_M
         starts = self.t[np.flatnonzero(on)[:1]]
         late = self.t >= starts[0] + _TRIM_S if starts.size else on
         return np.asarray(on & late, dtype=bool)
 
 
-def upright_share(q: Array) -> Array:
-    """Cosine of the tilt of unit quaternions.
+def thrust_axis(q: Array) -> Array:
+    """The body's z axis in axes of the world.
 
     Parameters
     ----------
     q : (N, 4) float
-        Scalar first [1].
+        Unit quaternions from body to world, scalar first [1].
 
     Returns
     -------
-    (N,) float
-        Share of the body's z axis along the world's [1].
+    (N, 3) float
+        Unit vectors [1].
 
     Examples
     --------
-    >>> upright_share(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))
+    >>> thrust_axis(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))[:, 2]
     array([ 1., -1.])
     """
-    out: Array = 1.0 - 2.0 * (q[:, 1] ** 2 + q[:, 2] ** 2)
-    return out
+    w, x, y, z = q.T
+    return np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x**2 + y**2)], axis=1)
 
 
-def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str, **more: str) -> FlightLog:
+class Stretches(Generic[T]):
+    """A fast sensor in memory that does not follow the length of the log.
+
+    Stretches are kept whole up to :data:`DENSE` samples; beyond, of every second whole one every 20th sample stays. So
+    the slow motion is there throughout, and the fast one in stretches that spread over the log.
+    """
+
+    def __init__(self, thin: Callable[[T], T]) -> None:
+        """Begin empty; `thin` takes every 20th sample of a stretch."""
+        self._thin, self.parts, self._whole = thin, cast(list[T], []), cast(list[bool], [])
+
+    def add(self, part: T) -> None:
+        """Keep a stretch."""
+        self.parts.append(part)
+        self._whole.append(True)
+        while sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
+            for i in [k for k, whole in enumerate(self._whole) if whole][1::2]:
+                self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
+
+
+def joined(
+    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
+) -> FlightLog:
     """Put sources with clocks of their own on one time base, linearly.
 
     Parameters
@@ -131,7 +166,9 @@ def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str
     sources : mapping of str to (times, values) or None
         Times (M,) [s]; values (M,) or (M, k) in units of :class:`FlightLog`.
     main : str
-        Source whose times are kept.
+        Source whose times are kept; of more than 200,000 as many, evenly spread.
+    raw : (times, values) or None
+        Accelerometer or gyro that keeps its own times.
     **more : str
         Further attributes of the log.
 
@@ -145,22 +182,33 @@ def joined(file: str, kind: str, sources: Mapping[str, Source | None], main: str
         if source is None:
             continue
         t, v = np.asarray(source[0], dtype=float), np.asarray(source[1], dtype=float)
-        good = np.isfinite(t) & np.isfinite(v.reshape(t.size, -1)).all(axis=1)
-        # A damaged clock jumps: times that fall back, and gaps of hours, end the usable part.
-        t, v = t[good], v[good]
-        jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
-        if jump.size:
-            t, v = t[: jump[0] + 1], v[: jump[0] + 1]
-        t, order = np.unique(t, return_index=True)
-        if t.size > 1:
-            clean[key] = (t, v[order])
+        whole = _whole(t, v)
+        if whole[0].size > 1:
+            clean[key] = whole
     if main not in clean or clean[main][0].size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
     t = clean[main][0]
+    if t.size > _MOST:
+        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], _MOST)))]
     columns, halves = {}, {}
     for key, (at, v) in clean.items():
         flat = v.reshape(at.size, -1)
         put = np.stack([np.interp(t, at, c) for c in flat.T], axis=1)
         columns[key] = put[:, 0] if v.ndim == 1 else put
         halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
-    return FlightLog(file, kind, t - t[0], join_s=halves, **columns, **more)  # type: ignore[arg-type]
+    fast = None
+    if raw is not None and raw[0].size > 1:
+        at, v = _whole(raw[0], raw[1])
+        fast = (at - t[0], v)
+    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)  # type: ignore[arg-type]
+
+
+def _whole(t: Array, v: Array) -> Source:
+    """Samples that can be, in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
+    good = np.isfinite(t) & (np.abs(v.reshape(t.size, -1)) < _LARGEST).all(axis=1)  # not so of NaN
+    t, v = t[good], v[good]
+    jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
+    if jump.size:
+        t, v = t[: jump[0] + 1], v[: jump[0] + 1]
+    t, order = np.unique(t, return_index=True)
+    return t, v[order]

@@ -1,8 +1,9 @@
-"""A flight in one picture: thrust over speed beside the model, and the change of each rotor's drive."""
+"""A flight in one picture: thrust over speed and in moving air beside the model, and each motor's drive."""
 
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from bemt.flight.answer import FlightAnswer
 __all__ = ["flight_picture"]
 
 _BLUE, _ORANGE, _GREEN = "#0072B2", "#E69F00", "#009E73"
+_LINES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 
 
 def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
@@ -30,22 +32,75 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
     bytes
         PNG.
     """
+    import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    left, right = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
-    for ax in (left, right):
-        ax.grid(True, alpha=0.3)
-        ax.spines[["top", "right"]].set_visible(False)
-    _thrust(left, answer, mass_kg)
-    _balance(right, answer)
-    figure.suptitle(f"{answer.log.format}, {answer.log.rotors} rotors: {answer.judged.verdict}"
-                    + (f" ({', '.join(answer.judged.effects)})" if answer.judged.effects else ""))  # fmt: skip
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.5, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
+        figure = Figure(figsize=(7.6, 6.6), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(2, 2)
+        for ax in axes.flat:
+            ax.locator_params(axis="x", nbins=5)
+            ax.grid(True, alpha=0.3)
+            ax.spines[["top", "right"]].set_visible(False)
+        _thrust(axes[0, 0], answer, mass_kg)
+        _flow(axes[0, 1], answer)
+        _drives(axes[1, 0], answer)
+        _balance(axes[1, 1], answer)
+        title = f"{answer.log.format}, {answer.log.rotors} rotors: {answer.judged.verdict}"
+        effects = ", ".join(answer.judged.effects)
+        figure.suptitle(title + (f"\n{effects}" if effects else ""), fontsize=11.0)
+        out = io.BytesIO()
+        figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
     return out.getvalue()
+
+
+def _empty(ax: Any, text: str) -> None:
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, color="0.4", wrap=True)
+
+
+def _flow(ax: Any, answer: FlightAnswer) -> None:
+    flow, said = answer.inflow, answer.predicted
+    if flow is None or (flow.axial is None and flow.inplane is None):
+        _empty(ax, "Thrust in moving air:\nthis flight does not show it")
+        return
+    parts = ((flow.axial, flow.bins[0], said.axial if said else None, _BLUE, "along the axis"),
+             (flow.inplane, flow.bins[1], said.inplane if said else None, _GREEN, "in the plane"))  # fmt: skip
+    for got, bins, model, colour, name in parts:
+        if got is None or not bins.size:
+            continue
+        zero = float(np.interp(0.0, bins[0], bins[1]))
+        ax.errorbar(bins[0], 100 * (bins[1] - zero), 200 * bins[2], fmt="o", ms=4, color=colour, capsize=2, label=name)
+        if model is not None:
+            ax.plot(model[0], 100 * model[1], color=colour, lw=1.5, label=f"model, {name}")
+    ax.axhline(0.0, color="0.3", lw=0.8)
+    ax.set_xlabel("velocity [m/s], climb above zero")
+    ax.set_ylabel("change of thrust at equal speed [%]")
+    ax.legend(frameon=False)
+
+
+def _drives(ax: Any, answer: FlightAnswer) -> None:
+    log, on = answer.log, answer.log.flying
+    drive = log.command if log.command is not None else log.rpm
+    if drive is None or on.sum() < 50:
+        _empty(ax, "no flight with motors running")
+        return
+    t, x = log.t[on], drive[on]
+    parts = np.array_split(np.arange(t.size), min(max(int((t[-1] - t[0]) / 0.5), 10), 300))
+    when, mean = np.array([t[p].mean() for p in parts]), np.array([x[p].mean(axis=0) for p in parts])
+    share = 100 * (mean / mean.mean(axis=1, keepdims=True) - 1.0)
+    for i in range(share.shape[1]):
+        ax.plot(when, share[:, i], lw=1.2, label=f"{i + 1}", color=_LINES[i % len(_LINES)],
+                ls="-" if i < len(_LINES) else "--")  # fmt: skip
+    if answer.change is not None and np.isfinite(answer.change.at_s):
+        ax.axvline(answer.change.at_s, color="0.2", ls=":", lw=1.5)
+    ax.margins(y=0.2)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel("drive, against the mean [%]")
+    ax.legend(frameon=False, ncols=min(share.shape[1], 6), title="motor", title_fontsize=9, handlelength=1.2,
+              columnspacing=0.8)  # fmt: skip
 
 
 def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
@@ -53,7 +108,7 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
     m, unit = (mass_kg, "N") if mass_kg is not None else (1.0, "N/kg")
     drive = log.rpm if log.rpm is not None else log.command
     if drive is None or not on.any():
-        ax.set_title("no flight with motors running")
+        _empty(ax, "no flight with motors running")
         return
     speeds = log.rpm is not None
     x = np.sqrt(np.mean(drive[on] ** 2, axis=1)) if speeds else drive[on].mean(axis=1)
@@ -61,39 +116,46 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
     if log.acceleration is not None:
         step = max(x.size // 1500, 1)
         ax.plot(x[::step], m * log.acceleration[on, 2][::step] / B, ".", ms=2, color="0.7", zorder=1,
-                label="accelerometer times mass" if mass_kg is not None else "accelerometer")  # fmt: skip
+                label="accelerometer")  # fmt: skip
     name = "thrust constant" if speeds else "thrust per command"
     grid = np.linspace(0.97 * x.min(), 1.03 * x.max(), 50)
     power = 2 if speeds else 1
     c = answer.found.constants.get(name)
     if c is not None:
-        ax.plot(grid, c.value * grid**power, color=_BLUE, label="flight (momentum balance)")
+        ax.plot(grid, c.value * grid**power, color=_BLUE, label="flight")
         ax.fill_between(grid, (c.value - c.half) * grid**power, (c.value + c.half) * grid**power,
                         color=_BLUE, alpha=0.25, lw=0)  # fmt: skip
     if answer.predicted is not None and speeds and mass_kg is not None:
-        k, u = answer.predicted
-        ax.plot(grid, k * grid**2, color=_ORANGE, label="model of the case")
+        k, u = answer.predicted.constant, answer.predicted.u
+        ax.plot(grid, k * grid**2, color=_ORANGE, label="model")
         ax.fill_between(grid, (k - 2 * u) * grid**2, (k + 2 * u) * grid**2, color=_ORANGE, alpha=0.2, lw=0)
     ax.plot([x.mean()], [m * G0 / B], "D", color=_GREEN, label="weight over rotors")
-    ax.set_xlabel("speed [rev/min]" if speeds else f"command [{log.command_unit}]")
+    ax.set_xlabel(
+        "speed [rev/min]"
+        if speeds
+        else "command, share of full"
+        if log.command_unit == "1"
+        else f"command [{log.command_unit}]"
+    )
     ax.set_ylabel(f"thrust per rotor [{unit}]")
-    ax.legend(fontsize=8, frameon=False)
+    ax.legend(frameon=False)
 
 
 def _balance(ax: Any, answer: FlightAnswer) -> None:
     j = answer.judged
     if not j.readings.size:
-        ax.set_title("no balance")
+        _empty(ax, "no balance")
         return
-    accused = {int(e.rsplit(" ", 1)[1]) - 1 for e in j.effects}
+    accused = {int(n) - 1 for e in j.effects for n in re.findall(r"\d+", e)}
     colours = [_ORANGE if i in accused else _BLUE for i in range(j.readings.size)]
     ax.bar(np.arange(1, j.readings.size + 1), 100 * j.readings, color=colours)
     if np.isfinite(j.scatter):
         ax.axhspan(-200 * j.scatter, 200 * j.scatter, color="0.5", alpha=0.2, lw=0,
-                   label="healthy flights differ by (2 sd)")  # fmt: skip
-        ax.legend(fontsize=8, frameon=False)
+                   label="healthy flights (2 sd)" if j.given else "healthy vehicles (2 sd)")  # fmt: skip
+        ax.legend(frameon=False)
+    ax.margins(y=0.2)
     ax.axhline(0.0, color="0.3", lw=0.8)
     ax.set_xticks(np.arange(1, j.readings.size + 1))
     ax.set_xlabel("motor")
     against = "healthy flights" if np.isfinite(j.total) else "the other rotors"
-    ax.set_ylabel(f"share of the drive, against {against} [%]")
+    ax.set_ylabel(f"drive, against {against} [%]")

@@ -1,23 +1,32 @@
-"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes."""
+"""PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes.
+
+Only the topics that are used are kept, so memory does not follow the size of the file. The layout is that of the
+parameters CA_ROTORn_PX, PY (ahead, to the right) and KM (above zero: turns to the left, seen from above). Pulse widths
+are shares of PWM_MIN to PWM_MAX. Raw bursts of the accelerometer are sensor_accel_fifo.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import re
+import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.log import FlightLog, Source, joined, upright_share
+from bemt.flight.layout import layout_text
+from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
-           "vehicle_local_position", "battery_status"]  # fmt: skip
+           "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
+_LONG, _STRETCH = 1 << 26, 16_384  # size from which a log is reduced first [bytes]; samples of a stretch
+_AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
 
@@ -32,11 +41,51 @@ def read(path: Path) -> FlightLog:
     ulog = needs("pyulog", "flight").ULog
     try:
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-            found = ulog(file, _TOPICS, disable_str_exceptions=True)
+            long = path.stat().st_size > _LONG
+            found = ulog(_reduced(file) if long else file, _TOPICS, disable_str_exceptions=True)
     except Exception as error:  # a parser meets any damage: struct, key, value, index, memory, its own
         got = f"a damaged log ({type(error).__name__}: {error})"
         raise InputError(Fault(name, "", got, "whole ULog messages", "Download the log again")) from error
-    return _made(name, found)
+    try:
+        return _made(name, found)
+    except (TypeError, ValueError, KeyError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole ULog messages")) from error
+
+
+def _reduced(file: BinaryIO) -> io.BytesIO:
+    """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
+    head, data = bytearray(file.read(16)), dict[int, Stretches[list[bytes]]]()
+    begun, each = dict[int, list[bytes]](), dict[int, int]()
+    while len(start := file.read(3)) == 3:
+        size, kind = struct.unpack("<Hc", start)
+        body = file.read(size)
+        if len(body) < size or kind not in b"BFIMPQADLSOCR":
+            break
+        if kind == b"A":
+            name = body[3:].decode("latin-1")
+            if name in _TOPICS:
+                number = struct.unpack_from("<H", body, 1)[0]
+                each[number] = 32 if name == "sensor_accel_fifo" else 1
+                # Single bursts are too short for a spectrum; of the others every 20th message stays.
+                step = SPARSE if each[number] == 1 else _STRETCH
+                data[number], begun[number] = Stretches(lambda part, step=step: part[::step]), []  # type: ignore[misc]
+                head += start + body
+        elif kind == b"D" and size > 2:
+            number = struct.unpack_from("<H", body)[0]
+            if number in begun:
+                # A message of a burst holds 32 samples, so it weighs as 32.
+                begun[number] += [start + body, *[b""] * (each[number] - 1)]
+                if len(begun[number]) >= _STRETCH:
+                    data[number].add(begun[number])
+                    begun[number] = []
+        elif kind == b"B":
+            head += start + bytes(size)  # without the places of appended data, which are other ones now
+        elif kind in b"FPQ":
+            head += start + body
+    parts = [m for number, kept in data.items() for p in (*kept.parts, begun[number]) for m in p]
+    return io.BytesIO(bytes(head) + b"".join(parts))
 
 
 def _made(name: str, found: Any) -> FlightLog:
@@ -54,18 +103,25 @@ def _made(name: str, found: Any) -> FlightLog:
             [np.asarray(data[k], dtype=float) for k in keys], axis=1
         )
 
+    params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
     if command is None:
         command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
+        low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
+        if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
+            command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
     B = command[1].shape[1] if command else 0
-    count = min(B or 8, 8)
-    speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in range(count)])
+    escs = _escs(tables.get("esc_status", {}), B)
+    speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in escs])
     if speeds is not None and not np.any(speeds[1]):
         speeds = None
-    if B == 0 and speeds is not None:
+    if speeds is not None:
+        speeds = (speeds[0], np.abs(speeds[1]))  # the sign is the turning in a simulator
+    if B == 0:
         speeds = _active(speeds)
-    currents = take("esc_status", [f"esc[{i}].esc_current" for i in range(count)])
+    currents = take("esc_status", [f"esc[{i}].esc_current" for i in escs])
     q = take("vehicle_attitude", [f"q[{i}]" for i in range(4)])
+    axis = (q[0], thrust_axis(q[1]) * _AXIS) if q else None
     xyz, vel = take("vehicle_local_position", list("xyz")), take("vehicle_local_position", ["vx", "vy", "vz"])
     acc = take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)])
     gyro = take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)])
@@ -76,7 +132,8 @@ def _made(name: str, found: Any) -> FlightLog:
         "current": currents,
         "acceleration": (acc[0], acc[1] * _FLIP) if acc else None,
         "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None,
-        "upright": (q[0], upright_share(q[1])) if q else None,
+        "upright": (axis[0], axis[1][:, 2]) if axis else None,
+        "axis": axis,
         "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
         "position": (xyz[0], xyz[1] * _FLIP) if xyz else None,
         "voltage": (volt[0], volt[1][:, 0]) if volt else None,
@@ -84,9 +141,46 @@ def _made(name: str, found: Any) -> FlightLog:
     }
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
-    layout = "px4-x" if (B or 4) == 4 else ""
+    layout = _layout(params, B) or ("px4-x" if (B or 4) == 4 else "")
     main = "command" if command else "rpm" if speeds else "acceleration"
-    return joined(name, KIND, sources, main, command_unit=unit, layout=layout, ends=ends)
+    raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
+    return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends)
+
+
+def _escs(data: dict[str, Array], B: int) -> list[int]:
+    """Speed controllers in the order of the motors: by the function of each where it is logged (101 is motor 1)."""
+    count = min(B or 8, 8)
+    known = {}
+    for i in range(8):
+        function = data.get(f"esc[{i}].actuator_function", np.zeros(0))
+        if function.size and 101 <= function[-1] <= 112:
+            known[int(function[-1]) - 101] = i
+    return [known[k] for k in range(count)] if set(range(count)) <= set(known) else list(range(count))
+
+
+def _layout(params: dict[str, float], B: int) -> str:
+    """Layout by the parameters of the control allocation; empty where they are not set."""
+    if B < 2 or params.get("CA_ROTOR_COUNT") != B:
+        return ""
+    x, y, turn = ([params.get(f"CA_ROTOR{i}_{k}", 0.0) for i in range(B)] for k in ("PX", "PY", "KM"))
+    if not (np.all(np.isfinite([x, y, turn])) and np.all(turn) and np.all(np.hypot(x, y) > 1e-3)):
+        return ""
+    return layout_text(x, -np.array(y), turn)
+
+
+def _bursts(data: dict[str, Array]) -> Source | None:
+    """Raw accelerations, in order of time; z up."""
+    if any(k not in data for k in ("timestamp_sample", "dt", "scale", "samples", "x[0]", "y[31]", "z[31]")):
+        return None
+    count = np.clip(np.asarray(data["samples"], dtype=int), 0, 32)
+    step = np.asarray(data["dt"], dtype=float)
+    k = np.arange(32)
+    # The stamp is that of the last sample.
+    t = 1e-6 * (np.asarray(data["timestamp_sample"], dtype=float)[:, None] - step[:, None] * (count[:, None] - 1 - k))
+    used = k < count[:, None]
+    scale = np.asarray(data["scale"], dtype=float)[:, None]
+    xyz = [np.stack([np.asarray(data[f"{a}[{i}]"], dtype=float) for i in k], axis=1) * scale for a in "xyz"]
+    return t[used], np.stack([a[used] for a in xyz], axis=1) * _FLIP
 
 
 def _moves(data: dict[str, Array]) -> int:

@@ -1,7 +1,8 @@
 """Flights as CSV, plain or gzipped: Betaflight blackbox, variables of a Crazyflie, arrays in cells (t, v, R, pwm, fa).
 
 Betaflight (blackbox_decode): time in us, motor[i] 1000 to 2000 or DShot, eRPM[i] in hundreds of electrical rev/min,
-accSmooth counts, vbatLatest in V. Mechanical speed needs the pole count, so eRPM is used only with motor_poles.
+accSmooth counts, vbatLatest in V. Mechanical speed needs the pole count and acceleration the counts of 1 g: eRPM is
+used only with a row motor_poles before the headings, accSmooth with acc_1G.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ import json
 import re
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import G0
 from bemt.flight import crazyflie
-from bemt.flight.log import FlightLog, joined
+from bemt.flight.log import SPARSE, FlightLog, Stretches, joined
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,27 +35,41 @@ def sniff(head: bytes) -> bool:
     return head[:2] == b"\x1f\x8b" or (bool(head) and b"\0" not in head)
 
 
+_CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time")
+_USED = re.compile(r"t|t_s|time|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate)\..+|(vbat|amperage)(Latest)?"
+                   r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
+_HEAD_BYTES = 1 << 18  # within which the headings stand
+_ROWS = 20_000  # of a piece
+
+
 def read(path: Path) -> FlightLog:
-    """Read a table; its headings decide what it is."""
+    """Read a table, in pieces; its headings decide what it is."""
     import pandas as pd
 
-    name, raw, ends = str(path), path.read_bytes(), ""
-    if raw[:2] == b"\x1f\x8b":
+    name, ends = str(path), ""
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    source: Path | io.BytesIO = path
+    if head[:2] == b"\x1f\x8b":
+        raw = path.read_bytes()
         try:
             raw = gzip.decompress(raw)
         except (OSError, EOFError, zlib.error):
             raw, ends = _partly(raw), "damaged gzip; read as far as it goes"
-    lines = raw.decode("utf-8", errors="replace").splitlines()
+        source, head = io.BytesIO(raw), raw[:_HEAD_BYTES]
+    lines = head.decode("utf-8", errors="replace").split("\n")
     start = next((k for k, line in enumerate(lines[:400]) if re.search(r"\btime\b|\bt\b|\bt_s\b|loopIteration", line)
-                  and re.search(r"motor|pwm|rpm", line)), None)  # fmt: skip
+                  and re.search(r"motor\[|motor\.|pwm|rpm", line)), None)  # fmt: skip
     if start is None:
         raise InputError(Fault(name, "", "no row of headings with a time and motors", "a flight log"))
-    poles = next((int(m.group(1)) for line in lines[:start] if (m := re.search(r"motor_poles\"?,\"?(\d+)", line))), 0)
+    said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?(\w+)"?,"?([^"]*)"?\s*$', line))}
     try:
-        frame = pd.read_csv(io.StringIO("\n".join(lines[start:])), on_bad_lines="skip", low_memory=False)
+        with path.open("rb") if isinstance(source, Path) else source as rows:
+            for _ in range(start):
+                rows.readline()
+            frame = _frame(rows)
     except (ValueError, pd.errors.ParserError) as error:
         raise InputError(Fault(name, "", f"a damaged table ({error})", "rows of equal length")) from error
-    frame.columns = [re.sub(r"\s*\(.*\)$", "", str(c)).strip() for c in frame.columns]
     if {"pwm", "v", "R", "t"} <= set(frame.columns):
         return _cells(name, frame, ends)
     if "t_s" in frame and any(c.startswith(("motor.m", "pwm.m")) for c in frame.columns):
@@ -62,8 +78,30 @@ def read(path: Path) -> FlightLog:
         columns = {c: (t, numbers[c].to_numpy(float)) for c in numbers.columns if c != "t_s"}
         return crazyflie.from_columns(name, "Crazyflie CSV", columns, ends)
     if any(c.startswith("motor[") for c in frame.columns):
-        return _betaflight(name, frame, poles, ends)
+        return _betaflight(name, frame, said, ends)
     raise InputError(Fault(name, "", "unknown headings", "Betaflight, Crazyflie, or t, v, R, pwm"))
+
+
+def _label(heading: str) -> str:
+    """Heading without its unit."""
+    return re.sub(r"\s*\(.*\)$", "", heading).strip()
+
+
+def _frame(rows: BinaryIO) -> pd.DataFrame:
+    """The columns that are used. Numbers are kept in single precision, times in double."""
+    import pandas as pd
+
+    kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
+    pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
+                         usecols=lambda c: bool(_USED.fullmatch(_label(str(c)))))  # fmt: skip
+    for piece in pieces:
+        piece.columns = [_label(str(c)) for c in piece.columns]
+        for c in piece.columns:
+            if c not in _CELLS:
+                numbers = pd.to_numeric(piece[c], errors="coerce")
+                piece[c] = numbers if c in _TIMES else numbers.astype(np.float32)
+        kept.add(piece)
+    return pd.concat(kept.parts, ignore_index=True)
 
 
 def _partly(raw: bytes) -> bytes:
@@ -106,6 +144,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
         "command": got["pwm"],
         "rates": got.get("w"),
         "upright": (time, got["R"][1][:, 2, 2]),
+        "axis": (time, got["R"][1][:, :, 2]),
         "velocity": got["v"],
         "position": got.get("p"),
         "force": got.get("fa"),
@@ -113,10 +152,7 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
     return joined(name, "CSV of arrays", sources, "command", command_unit="pwm", ends=ends)
 
 
-def _betaflight(name: str, frame: pd.DataFrame, poles: int, ends: str) -> FlightLog:
-    import pandas as pd
-
-    numbers = frame.apply(pd.to_numeric, errors="coerce")
+def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: str) -> FlightLog:
     if "time" not in numbers:
         raise InputError(Fault(name, "time", "no such column", "time in us", "Decode with blackbox_decode"))
     t = 1e-6 * numbers["time"].to_numpy(float)
@@ -127,16 +163,40 @@ def _betaflight(name: str, frame: pd.DataFrame, poles: int, ends: str) -> Flight
 
     volt = next((k for k in ("vbatLatest", "vbat") if k in numbers), "")
     amp = next((k for k in ("amperageLatest", "amperage") if k in numbers), "")
-    command = many("motor")
-    low, high = (0.0, 1.0) if command is None else (np.nanmin(command[1]), np.nanmax(command[1]))
-    unit = "us" if low >= 900.0 and high <= 2100.0 else "DShot"
+    command, poles, per_g = many("motor"), _number(said.get("motor_poles")), _number(said.get("acc_1G"))
+    if command is not None:
+        low, high = _range(command[1], said.get("motorOutput", ""))
+        command = (t, np.clip((command[1] - low) / (high - low), 0.0, None))
+    gyro, unfiltered = many("gyroADC", np.pi / 180.0), many("gyroUnfilt", np.pi / 180.0)
+    acceleration = many("accSmooth", G0 / per_g) if per_g > 0.0 else None
     sources = {
         "command": command,
-        "rpm": many("eRPM", 200.0 / poles) if poles else None,
-        "rates": many("gyroADC", np.pi / 180.0),
+        "rpm": many("eRPM", 200.0 / poles) if poles > 0.0 else None,
+        "acceleration": acceleration,
+        "rates": gyro,
         "voltage": (t, numbers[volt].to_numpy(float)) if volt else None,
         "battery_current": (t, numbers[amp].to_numpy(float)) if amp else None,
     }
     B = command[1].shape[1] if command else 0
     layout = "betaflight-x" if B == 4 else ""
-    return joined(name, "Betaflight CSV", sources, "command", command_unit=unit, layout=layout, ends=ends)
+    raw = unfiltered or gyro
+    raw = raw if raw is not None and raw[1].shape[1] == 3 else None
+    return joined(name, "Betaflight CSV", sources, "command", raw=raw, raw_unit="rad/s", layout=layout, ends=ends)
+
+
+def _number(text: str | None) -> float:
+    try:
+        value = float(text or 0.0)
+    except ValueError:
+        return 0.0
+    return value if np.isfinite(value) else 0.0
+
+
+def _range(command: Array, stated: str) -> tuple[float, float]:
+    """Commands at rest and at full drive: as the header says, or 1000 to 2000 us, or DShot's 48 to 2047."""
+    parts = [_number(p) for p in stated.split(",")]
+    if len(parts) == 2 and parts[1] - parts[0] >= 100.0:
+        return parts[0], parts[1]
+    found = command[np.isfinite(command)]
+    pulses = found.size and found.min() >= 900.0 and found.max() <= 2100.0
+    return (1000.0, 2000.0) if pulses else (48.0, 2047.0)

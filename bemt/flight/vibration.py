@@ -1,0 +1,229 @@
+"""Vibration at the shaft and blade frequencies of each rotor: imbalance, a damaged or taped blade.
+
+An unbalanced rotor shakes the body once a turn, unequal blades too; B equal blades in uneven air B times a turn. The
+logged speeds give the angle of each rotor but for its start, so in windows of one to four seconds the accelerometer is
+regressed on sine and cosine of all rotors' angles at once (order tracking; Vold and Leuridan, SAE 931288, 1993; not
+checked there). Rotors whose angles stay together over a window cannot be told apart, and a window in which the speeds
+were not good enough to follow the phase holds less than the spectrum's line: both are left out.
+
+Without speeds the strongest line between 20 Hz and the Nyquist frequency is told; which rotor it is, is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.diagnose.thresholds import GATE
+from bemt.flight.log import FlightLog
+
+__all__ = ["Vibration", "shaken", "vibration"]
+
+Array = NDArray[np.float64]
+_WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # lengths tried; longest used; least windows
+_APART, _FOLLOWED = 5.0, 0.5  # largest condition number of the angles; least share of the line's power [1]
+_SIDE = 3  # half width of a band in bins: the lobe of the window and a speed that is off by one bin
+_SPREAD, _FREE = 0.35, 4
+"""Scatter of the log of an amplitude between healthy flights, and the degrees of freedom it counts as: an assumption,
+not checked (a factor of 1.4; no recording here holds vibration at the shaft frequency)."""
+_FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
+"""Amplitude below which no rotor is unbalanced in any way that matters (an assumption)."""
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """What the accelerometer shows of the rotors.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Samples a second; NaN without an accelerometer or gyro [Hz].
+    shaft_hz : float
+        Mean speed of the rotors; NaN without speeds [Hz].
+    amplitude, blade : tuple of float
+        Of each rotor at once and at twice a turn; NaN where it is above the Nyquist frequency or not told apart
+        [`unit`].
+    line_hz, line : float
+        Strongest line above 20 Hz and its amplitude, for a log without speeds [Hz, `unit`].
+    unit : str
+        m/s2, or rad/s of a gyro.
+    missing : str
+        What the log cannot show, and why.
+    """
+
+    rate_hz: float
+    shaft_hz: float
+    amplitude: tuple[float, ...] = ()
+    blade: tuple[float, ...] = ()
+    line_hz: float = float("nan")
+    line: float = float("nan")
+    unit: str = "m/s2"
+    missing: str = ""
+
+
+def vibration(log: FlightLog) -> Vibration:
+    """Amplitudes at the rotors' frequencies, in flight.
+
+    Parameters
+    ----------
+    log : FlightLog
+        With raw accelerations (or rates), and speeds where the rotors are to be told apart.
+
+    Returns
+    -------
+    Vibration
+        In the unit of the sensor.
+    """
+    on = log.flying
+    speeds = None if log.rpm is None else log.rpm / 60.0
+    shaft = float(np.median(speeds[on])) if speeds is not None and on.any() else float("nan")
+    if not shaft > 1.0:
+        speeds, shaft = None, float("nan")
+    if log.raw is None or log.raw[0].size < 2:
+        return Vibration(float("nan"), shaft, missing="no accelerometer in the log")
+    t, v = log.raw
+    step = float(np.median(np.diff(t)))
+    rate = 1.0 / step
+    nyquist = 0.5 * rate
+    if np.isfinite(shaft) and shaft > 0.97 * nyquist:
+        why = (f"the shaft turns at {shaft:.0f} Hz and the {'accelerometer' if log.raw_unit == 'm/s2' else 'gyro'} has "
+               f"{rate:.0f} samples a second, which show up to {0.97 * nyquist:.0f} Hz")  # fmt: skip
+        return Vibration(rate, shaft, unit=log.raw_unit, missing=why)
+    windows = _windows(log, t, step, _WINDOWS_S[0])
+    if len(windows) < _LEAST or nyquist < 2.0 * _LOW_HZ:
+        why = f"{rate:.0f} samples a second of the accelerometer" if nyquist < 2.0 * _LOW_HZ else "under 3 s of samples"
+        return Vibration(rate, shaft, unit=log.raw_unit, missing=f"{why} are too few")
+    f, power = _spectrum(v, windows, step)
+    if speeds is None or not np.isfinite(shaft):
+        mean = power.mean(axis=0)
+        above = np.flatnonzero((f > _LOW_HZ) & (f < nyquist - 2.0 * _SIDE * f[1]))
+        peak = int(above[np.argmax(mean[above])])
+        return Vibration(rate, shaft, line_hz=float(f[peak]), line=_line(mean, peak - _SIDE, peak + _SIDE),
+                         unit=log.raw_unit, missing="which rotor shakes: log the speed of each")  # fmt: skip
+    turns = np.stack([np.interp(t, log.t, s) for s in speeds.T], axis=1)
+    span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
+    total = float(np.mean([_line(p, int(low) - _SIDE, int(high) + 1 + _SIDE) ** 2
+                           for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
+    once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total, rate / shaft)
+    return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
+                     missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+
+
+def _by_rotor(
+    v: Array, t: Array, turns: Array, windows: list[list[slice]], total: float, per_turn: float
+) -> tuple[tuple[float, ...], tuple[float, ...], str]:
+    """Amplitudes once and twice a turn in windows of the length that holds most; or why not. Samples `per_turn`."""
+    steps = 0.5 * (turns[1:] + turns[:-1]) * np.diff(t)[:, None]
+    angle = 2.0 * np.pi * np.concatenate([np.zeros((1, turns.shape[1])), np.cumsum(steps, axis=0)])
+    smooth = max(int(2.0 * per_turn), 2)
+    tried = [(found, use) for use in windows if (found := _tracked(v, angle, use, smooth)) is not None]
+    if not tried:
+        return (), (), "all turn at the same speed"
+    once, use = max(tried, key=lambda one: float(np.sum(one[0] ** 2)))
+    if float(np.sum(once**2)) < max(_FOLLOWED * total, 1e-12):
+        return (), (), "the speeds are too coarse to follow the phase"
+    twice = _tracked(v, 2.0 * angle, use, max(smooth // 2, 2)) if per_turn > 4.0 / 0.97 else None
+    unknown = (float("nan"),) * turns.shape[1]
+    return tuple(map(float, once)), unknown if twice is None else tuple(map(float, twice)), ""
+
+
+def _spectrum(v: Array, windows: list[slice], step: float) -> tuple[Array, Array]:
+    """Frequencies, and the power of all axes in each window; a line of amplitude A sums to A^2."""
+    size = windows[0].stop - windows[0].start
+    shape = np.hanning(size)
+    # Over its lobe a line of amplitude A sums to A^2 n sum(w^2) / 4.
+    scale = 4.0 / (size * np.sum(shape**2))
+    power = [scale * np.sum(np.abs(np.fft.rfft(shape[:, None] * (v[w] - v[w].mean(axis=0)), axis=0)) ** 2, axis=1)
+             for w in windows]  # fmt: skip
+    return np.asarray(np.fft.rfftfreq(size, step), dtype=float), np.array(power, dtype=float)
+
+
+def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array | None:
+    """Amplitude of each rotor, (B,), less what noise gives; None where the angles stay together."""
+    squares = []
+    for w in windows:
+        X = np.concatenate([np.cos(angle[w]), np.sin(angle[w])], axis=1)
+        y = v[w] - np.stack([np.convolve(c, np.ones(smooth) / smooth, "same") for c in v[w].T], axis=1)
+        y, X = y[smooth:-smooth], X[smooth:-smooth]
+        if y.shape[0] < 2 * X.shape[1] or np.linalg.cond(X) > _APART:
+            continue
+        gram = np.linalg.inv(X.T @ X)
+        b = gram @ X.T @ y
+        noise = np.sum((y - X @ b) ** 2) / max(y.shape[0] - X.shape[1], 1) * np.diag(gram)
+        B = angle.shape[1]
+        parts = np.sum(b**2, axis=1) - noise
+        squares.append(parts[:B] + parts[B:])
+    return np.sqrt(np.clip(np.mean(squares, axis=0), 0.0, None)) if len(squares) >= _LEAST else None
+
+
+def _windows(log: FlightLog, t: Array, step: float, length: float) -> list[slice]:
+    """Gapless windows in the air; shorter ones where the sensor was sampled in bursts."""
+    breaks = np.flatnonzero(np.diff(t) > 1.5 * step) + 1
+    runs = [r for r in np.split(np.arange(t.size), breaks) if r.size >= 128]
+    if not runs:
+        return []
+    size = min(int(length / step), int(np.median([r.size for r in runs])))
+    if size < 16:
+        return []
+    air = np.interp(t, log.t, log.flying.astype(float)) > 0.5
+    out = []
+    for run in runs:
+        for begin in range(run[0], run[-1] + 2 - size, size):
+            part = slice(begin, begin + size)
+            if air[part].all():
+                out.append(part)
+    return out[: max(int(_MOST_S / (size * step)), 1)]
+
+
+def _line(power: Array, low: int, high: int) -> float:
+    """Amplitude within a band of bins, less the floor on both sides of it."""
+    low, high = max(low, 1), min(high + 1, power.size)
+    beside = np.concatenate([power[max(low - 12, 1) : low], power[high : high + 12]])
+    floor = float(np.median(beside)) if beside.size else 0.0
+    return float(np.sqrt(max(float(np.sum(power[low:high])) - floor * (high - low), 0.0)))
+
+
+def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, float, bool], ...]:
+    """Rotors that shake more than in healthy flights, or than the others where none is given.
+
+    Parameters
+    ----------
+    mine : Vibration
+        Of the flight.
+    healthy : sequence of Vibration
+        Of healthy flights of the same vehicle.
+
+    Returns
+    -------
+    tuple of (int, float, bool)
+        Rotor (0 is the first; -1: all together, where they cannot be told apart), ratio of its amplitude at the shaft
+        frequency [1], whether healthy flights say so.
+    """
+    from scipy import stats
+
+    def read(v: Vibration) -> Array:
+        logs: Array = np.log(np.maximum(np.array([*v.amplitude, v.line]), _FLOOR[v.unit]))
+        return logs
+
+    logs = read(mine)
+    calm = [r for h in healthy if h.unit == mine.unit and (r := read(h)).size == logs.size]
+    alone = [read(h)[-1] for h in healthy if h.unit == mine.unit]
+    out: list[tuple[int, float, bool]] = []
+    for k in range(logs.size):
+        total = k == logs.size - 1
+        past = np.array(alone if total else [c[k] for c in calm])
+        past = past[np.isfinite(past)]
+        rest = np.delete(logs[:-1], k) if not total and not healthy else np.zeros(0)
+        before = past if past.size else rest[np.isfinite(rest)]
+        if not np.isfinite(logs[k]) or before.size < (1 if past.size else 2) or (total and out):
+            continue
+        n = before.size
+        free = _FREE + n - 1
+        square = (_FREE * _SPREAD**2 + float(np.sum((before - before.mean()) ** 2))) / free * (1.0 + 1.0 / n)
+        change = float(logs[k] - before.mean())
+        if change > float(stats.t.ppf(1.0 - GATE / logs.size, free)) * np.sqrt(square):
+            out.append((-1 if total else k, float(np.exp(change)), bool(past.size)))
+    return tuple(out)

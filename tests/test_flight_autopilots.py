@@ -1,0 +1,192 @@
+"""The promise of flights of any autopilot and layout: rotors in the right places, faults at the right motor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flight_files import Hover, broken_copies, dataflash, ulog
+
+from bemt.base.errors import InputError
+from bemt.commands.cli import main
+from bemt.flight import log as flight_log
+from bemt.flight import px4
+from bemt.flight.answer import FlightAnswer, answer_on
+from bemt.flight.change import change_in
+from bemt.flight.inflow import inflow
+from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.flight.log import FlightLog
+from bemt.flight.motor_speed import speed_changes
+from bemt.flight.read import read_log
+
+pytest.importorskip("pyulog")
+pytest.importorskip("pymavlink")
+
+FRAMES = {"quad-x": (1, 1), "hexa-x": (2, 1), "octo-x": (3, 1), "x8": (4, 1)}
+
+
+def read(folder: Path, kind: str, flight: Hover, **more: object) -> FlightLog:
+    """A flight written and read."""
+    file = folder / "log"
+    if kind == "ardupilot":
+        file.write_bytes(dataflash(flight, frame=FRAMES[flight.layout], **more))  # type: ignore[arg-type]
+    else:
+        file.write_bytes(ulog(flight, **more))  # type: ignore[arg-type]
+    return read_log(file)
+
+
+def answered(folder: Path, kind: str, layout: str, loss: tuple[tuple[int, float], ...]) -> FlightAnswer:
+    """A flight with losses beside five healthy ones."""
+    calm = [read(folder, kind, Hover(layout, seconds=12.0, seed=k)) for k in range(5)]
+    return answer_on(read(folder, kind, Hover(layout, seconds=12.0, seed=9, loss=loss)), calm, 1.5)
+
+
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("layout", sorted(FRAMES))
+def test_damage_is_found_at_its_motor(kind: str, layout: str, tmp_path: Path) -> None:
+    """The layout comes from the log, speeds and currents reach their motors, and none healthy is accused."""
+    flight = Hover(layout, seconds=12.0)
+    log = read(tmp_path, kind, flight)
+    command, rpm = flight.drives(np.arange(0.0, flight.seconds, 0.02))
+    assert log.command is not None and log.rpm is not None and log.current is not None
+    np.testing.assert_allclose(log.command[log.flying].mean(axis=0), command.mean(axis=0), rtol=0.01)
+    np.testing.assert_allclose(log.rpm[log.flying].mean(axis=0), rpm.mean(axis=0), rtol=0.01)
+    placed, wanted = layout_of(log.layout, log.rotors), layout_of(layout, log.rotors)
+    assert placed is not None and wanted is not None
+    np.testing.assert_allclose(effect_matrix(placed), effect_matrix(wanted), atol=1e-4)
+    got = answered(tmp_path, kind, layout, ((2, 0.2),))
+    assert got.judged.verdict in ("named", "class") and got.judged.effects[0] == "damaged blade, motor 3"
+    assert got.judged.accused <= 1 and got.found.constants["thrust constant"].unit == "N/rpm^2"
+
+
+@pytest.mark.parametrize("layout", ["quad-x", "hexa-x", "x8"])
+def test_two_damaged_rotors(layout: str, tmp_path: Path) -> None:
+    """Both are named, or stand in the class of pairs that load the body alike."""
+    got = answered(tmp_path, "ardupilot", layout, ((1, 0.25), (3, 0.3))).judged
+    assert got.verdict in ("named", "class") and "damaged blades, motors 2 and 4" in got.effects
+
+
+def test_blade_lost_in_flight(tmp_path: Path) -> None:
+    """The time within a second, and the motor; a calm flight shows no change."""
+    log = read(tmp_path, "px4", Hover(seconds=20.0, loss=((1, 0.2),), loss_from_s=12.0))
+    got = change_in(log, layout_of(log.layout, 4))
+    assert got is not None and got.kind == "step" and abs(got.at_s - 12.0) < 1.0
+    assert got.causes[0] == "damaged blade, motor 2" and abs(got.size - 0.22) < 0.03
+    calm = read(tmp_path, "px4", Hover(seconds=20.0))
+    assert change_in(calm, layout_of(calm.layout, 4)) is None
+
+
+def test_damage_that_grows(tmp_path: Path) -> None:
+    """A motor that needs more and more drive."""
+    log = read(tmp_path, "px4", Hover(seconds=20.0))
+    assert log.command is not None
+    log.command[:, 3] *= 1.0 + 0.2 * log.t / log.t[-1]
+    got = change_in(log, layout_of(log.layout, 4))
+    assert got is not None and got.kind == "growth" and got.causes[0] == "damaged blade, motor 4"
+    assert abs(got.size - 0.18) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [("ardupilot", {"imu_hz": 1000.0}), ("ardupilot", {"bursts": True}), ("px4", {"fifo": True})],
+    ids=["IMU at 1 kHz", "ISBH and ISBD", "sensor_accel_fifo"],
+)
+def test_rotor_that_shakes(kind: str, more: dict[str, object], tmp_path: Path) -> None:
+    """Rotors a few turns a second apart are told apart by their logged speeds; the amplitude is that of the body."""
+    shakes = read(tmp_path, kind, Hover(seconds=20.0, seed=3, unbalanced=(1, 2.0)), **more)
+    got = answer_on(shakes)
+    assert got.vibration.amplitude[1] == pytest.approx(2.0 * np.sqrt(2.0), rel=0.1)
+    assert [k for k, _, _ in got.shaken] == [1]
+    calm = [read(tmp_path, kind, Hover(seconds=20.0, seed=k, unbalanced=(k % 4, 0.1)), **more) for k in range(4, 8)]
+    beside = answer_on(shakes, calm)
+    assert beside.judged.verdict == "class" and beside.judged.effects[0].startswith("imbalance or tape, ")
+    assert beside.judged.effects[0].endswith("motor 2") or "bursts" in more
+    assert answer_on(calm[0], calm[1:]).judged.verdict == "none"
+
+
+def test_too_slow_for_vibration(tmp_path: Path) -> None:
+    """The rate that would show it is said."""
+    got = answer_on(read(tmp_path, "ardupilot", Hover(seconds=12.0)))
+    assert not got.vibration.amplitude and "25 Hz" not in got.vibration.missing
+    assert any("50 samples a second" in u for u in got.unseen)
+
+
+@pytest.mark.parametrize(("part", "sign"), [(1.08, 1.0), (0.92, -1.0)])
+def test_motor_off_its_drive(part: float, sign: float, tmp_path: Path) -> None:
+    """A motor that turns faster or slower at its command than in healthy flights."""
+    calm = [read(tmp_path, "px4", Hover(seconds=12.0, seed=k)) for k in range(3)]
+    log = read(tmp_path, "px4", Hover(seconds=12.0, seed=7))
+    assert log.rpm is not None and not speed_changes(log, calm)
+    log.rpm[:, 2] *= part
+    ((motor, change),) = speed_changes(log, calm)
+    assert motor == 2 and change * sign > 0.04
+
+
+def test_thrust_over_the_flow() -> None:
+    """The slope along the axis and the curvature in the plane come back."""
+    rng = np.random.default_rng(4)
+    t = np.arange(0.0, 60.0, 0.02)
+    v = np.stack([3.0 * np.sin(0.3 * t), 0.0 * t, 2.0 * np.sin(0.5 * t)], axis=1)
+    n = 100.0 + rng.normal(size=(t.size, 4))
+    turns = np.sqrt(np.mean(n**2, axis=1))
+    change = -8.0 * v[:, 2] / turns + 60.0 * (v[:, 0] / turns) ** 2
+    lift = 9.8e-4 * turns**2 * np.exp(change) + 0.1 * rng.normal(size=t.size)
+    up = np.tile([0.0, 0.0, 1.0], (t.size, 1))
+    log = FlightLog(
+        "f", "made", t, command=n / 200.0, rpm=60.0 * n, acceleration=up * lift[:, None], velocity=v, axis=up
+    )
+    got = inflow(log)
+    assert got is not None and got.axial is not None and got.inplane is not None
+    assert abs(got.axial[0] + 8.0 * 2.0 / 100.0) < max(got.axial[1], 0.01)
+    assert abs(got.inplane[0] - 60.0 * 0.03**2) < max(got.inplane[1], 0.01)
+
+
+def test_a_long_log_keeps_its_stretches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fast sensors are thinned in stretches, the rest is as in the whole log."""
+    flight = Hover(seconds=60.0, unbalanced=(1, 2.0))
+    whole = {k: read(tmp_path, k, flight, **m) for k, m in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True}))}
+    monkeypatch.setattr(flight_log, "DENSE", 50_000)
+    monkeypatch.setattr("bemt.flight.ardupilot._CHUNK", 1 << 18)
+    monkeypatch.setattr(px4, "_LONG", 0)
+    for kind, more in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True})):
+        thin, full = read(tmp_path, kind, flight, **more), whole[kind]
+        assert thin.raw is not None and full.raw is not None and thin.command is not None and full.command is not None
+        assert thin.raw[0].size < 0.7 * full.raw[0].size
+        np.testing.assert_array_equal(thin.command, full.command)
+        got = answer_on(thin).vibration
+        assert np.nanargmax(got.amplitude) == 1 and got.amplitude[1] == pytest.approx(2.8, rel=0.15)
+
+
+def test_layouts_are_listed_and_others_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the names that fit the number of rotors."""
+    assert main(["fly", "--layout", "list"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in LAYOUTS)
+    (tmp_path / "log").write_bytes(ulog(Hover(seconds=5.0)))
+    assert main(["fly", str(tmp_path / "log"), "--layout", "quad-z"]) == 2
+    said = capsys.readouterr().err
+    assert "quad-x" in said and "octo-x" not in said
+    with pytest.raises(InputError):
+        layout_of("quad-z", 4)
+    assert main(["fly"]) == 2
+
+
+def test_cut_copies_are_read_as_far_as_they_go(tmp_path: Path) -> None:
+    """Half a log, and one with bytes that were turned, end or are skipped with a word."""
+    for data in (dataflash(Hover(seconds=12.0)), ulog(Hover(seconds=12.0))):
+        (tmp_path / "log").write_bytes(data[: len(data) // 3])
+        assert 3.0 < read_log(tmp_path / "log").t[-1] < 10.0
+    broken = bytearray(dataflash(Hover(seconds=12.0)))
+    broken[40_000:40_050] = bytes([7]) * 50
+    (tmp_path / "log").write_bytes(broken)
+    log = read_log(tmp_path / "log")
+    assert "skipped" in log.ends and log.t[-1] > 11.0
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(600, marks=pytest.mark.slow)])
+def test_damaged_copies_never_raise_anything_else(count: int, tmp_path: Path) -> None:
+    """Logs with motors, speeds and raw bursts: refused with a fault, or read as far as they go."""
+    flight = Hover(seconds=6.0)
+    samples = [dataflash(flight, bursts=True), ulog(flight, imu_hz=50.0, fifo=True)]
+    broken_copies(samples, count, tmp_path / "log")
