@@ -36,6 +36,7 @@ from bemt.bem.residual import (
     N_SWIRL,
     N_WAKE,
     ducted_rotor,
+    flagged,
     lookup_factored,
     lookup_full,
     lookup_plain,
@@ -320,7 +321,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
                     reversed_ += 1 if axial < 0.0 else 0
                 elif fx[N_BRIDGE] > 0.0 and UP != 0.0:
                     y = s * (UT * c + UP * s) / UP
-                    bridged += 1 if -1.0 < y < 0.6 else 0
+                    bridged += 1 if flagged(y, UP < 0.0) else 0
                 # the drag term of W's denominator exceeds the rest of it
                 stagnant += 1 if swirl and w[_SG4 + k] * cd > F * abs(s) else 0
             if radial.shape[0] == n:

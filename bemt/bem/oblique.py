@@ -65,7 +65,7 @@ from bemt.bem.kernel import (
     S_TANG_FACTOR,
     S_TIP,
 )
-from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, loss, mass_flow
+from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, flagged, in_bridge, loss, mass_flow
 from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
 
 Array = NDArray[np.float64]
@@ -106,8 +106,8 @@ def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g,
     t *= t
     F = 1.0 - (1.0 - F) / (1.0 + t)
     y = w0 / UP if UP != 0.0 else 2.0
-    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y > -1.0 and y < 0.6
-    f, _ = mass_flow(y)
+    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and in_bridge(y, UP < 0.0)
+    f, _ = mass_flow(y, UP < 0.0)
     M = abs(UP) * f / W0 if zone else sa
     across = Vy / W0
     M = math.sqrt(M * M + across * across)
@@ -136,7 +136,7 @@ def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g,
     a = an * scale
     b = at * scale
     res = FM * (UT * s - UP * c) - (a * UT + b * UP * swirl)
-    return res, q, W, FM, s, c, grad, FM * W0, F, zone
+    return res, q, W, FM, s, c, grad, FM * W0, F, zone and flagged(y, UP < 0.0)
 
 
 @inlined

@@ -100,13 +100,50 @@ def loss(u):
     return ((a * t + b) * t + m0) * t + f0, ((3.0 * a * t + 2.0 * b) * t + m0) * _U_INV
 
 
-@inlined
-def mass_flow(y):
-    """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` between -1 and 0.6, and its derivative.
+# Induced speed over that of hover at the same thrust, over the sink rate likewise, as measured: Leishman (2006),
+# Principles of Helicopter Aerodynamics, 2nd ed., eq. 2.96 with kappa = 1 (from memory, not checked).
+_DESCENT = (1.0, 1.125, -1.372, 1.718, -0.655)
+_ROWS = 2000
 
-    ``y >= 0``: Buhl (2005), NREL/TP-500-36834, eq. 18 with F = 1, CT = 8/9 - 4/9 a + 14/9 a^2 with a = 1 - y, tangent
-    to momentum theory (``y`` itself) at y = 0.6.  ``y < 0``: cubic bridge to the helicopter branch ``-y``, which it
-    meets at y = -1 (own choice, C1 at both ends; vortex-ring state, flagged by the solver).
+
+def _mass_table() -> tuple[Any, float]:
+    """Mass flow in descent over the induced speed, over s = abs(UP) / v, and the s where momentum theory takes over."""
+    x = np.linspace(0.0, 2.01, 20101)
+    v = np.polynomial.polynomial.polyval(x, _DESCENT)
+    s, share = x / v, v**-2.0
+    end = float(np.interp(0.0, (s - 1.0 - share)[20000:], s[20000:]))  # the windmill state has m = abs(UP) - v
+    return np.interp(np.arange(_ROWS + 2) * (end / _ROWS), s, share), end
+
+
+_MASS, _S_SINK = _mass_table()
+_S_INV = _ROWS / _S_SINK
+Y_SINK = 1.0 - 1.0 / _S_SINK
+Y_RING = -2.0
+"""At less than 0.45 of the hover's induced speed no vortex ring was seen (Johnson 2005, NASA/TP-2005-213477, p. 24)."""
+
+
+@inlined
+def in_bridge(y, sink):
+    """Whether an empirical curve replaces momentum theory at ``y = w / UP``."""
+    return y < (Y_SINK if sink else 0.6) and (sink or y > -1.0)
+
+
+@inlined
+def flagged(y, sink):
+    """Whether the flow through the disk is one of the states to warn of."""
+    return y < (Y_SINK if sink else 0.6) and y > (Y_RING if sink else -1.0)
+
+
+@inlined
+def mass_flow(y, sink):
+    """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` up to 0.6, and its derivative.
+
+    Onset from the front: Buhl (2005), NREL/TP-500-36834, eq. 18 with F = 1, CT = 8/9 - 4/9 a + 14/9 a^2 with a = 1 - y,
+    tangent to momentum theory (``y`` itself) at y = 0.6.  ``y < 0``: cubic bridge to ``-y``, which it meets at y = -1
+    (own choice, C1 at both ends).
+
+    Descent (``sink``): the measured curve of helicopter rotors from hover (y at minus infinity) to the windmill state
+    (y = 0.488).  As ``m v`` is the square of the induced speed in hover, ``m = v / x_v^2``, x_v = v over that speed.
     """
     a = 1.0 - y
     a = a if a > 0.4 else 0.4
@@ -114,7 +151,13 @@ def mass_flow(y):
     i_a = 1.0 / a
     f = 2.0 / 9.0 * i_a - 1.0 / 9.0 + 7.0 / 18.0 * a if y >= 0.0 else (((t + 1.0) * t + 1.0) * t + 3.0) * (1.0 / 6.0)
     df = 2.0 / 9.0 * i_a * i_a - 7.0 / 18.0 if y >= 0.0 else -((3.0 * t + 2.0) * t + 1.0) * (1.0 / 6.0)
-    return f, df
+    x = (i_a if i_a < _S_SINK else _S_SINK) * _S_INV
+    i = np.int32(x)
+    k = np.uint64(i)
+    g = _MASS[k]
+    dg = _MASS[k + np.uint64(1)] - g
+    g += (x - i) * dg
+    return (g * a if sink else f), (dg * _S_INV * i_a - g if sink else df)
 
 
 @inlined
@@ -302,8 +345,8 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
     y = w0 * i_UP
-    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y > -1.0 and y < 0.6
-    f, df = mass_flow(y)
+    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and in_bridge(y, i_UP < 0.0)
+    f, df = mass_flow(y, i_UP < 0.0)
     m = abs(UP) * (ss * i_w)
     M = f * m if zone else sa
     dM = m * (df * dw0 * i_UP - f * dlnW) if zone else (c if s >= 0.0 else -c)
