@@ -70,7 +70,8 @@ from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
 
 Array = NDArray[np.float64]
 
-P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE = range(6)
+P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE, P_CONE, P_BACK, P_TOWARD = range(9)
+N_POINT = 9
 AZIMUTHS = 16
 """Stations round the azimuth where loads are integrated; annuli are balanced at every second one [1]."""
 H_FORCE, Y_FORCE, ROLL, PITCH = range(4)
@@ -82,7 +83,30 @@ _MAX = 120
 
 
 @inlined
-def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g, fx, cs, sn, n):
+def _flapping(flap, Vy, c, s):
+    """Speed downwards through a blade from its flapping, b = cone - back cos(psi) - toward sin(psi): r b' + V_y b cos.
+
+    ``flap`` holds the three angles and ``r Omega`` (Leishman 2006, sec. 4.5 and 4.7; Johnson 1980, sec. 5-2).
+    """
+    return flap[3] * (flap[1] * s - flap[2] * c) + Vy * c * (flap[0] - flap[1] * c - flap[2] * s)
+
+
+@inlined
+def _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, beta, cs, sn, lre, base, tab, g):
+    """Thrust and force against the rotation of a blade element at one azimuth, over rho chord dr / 2. [m2/s2]"""
+    ut = W * c + Vy * sn
+    wk = W * s + grad * cs + _flapping(flap, Vy, cs, sn)
+    W2 = ut * ut + wk * wk
+    # Re and Mach number leave out the drag term, as in the axial kernel
+    along = (UT + Vy * sn) * ut + UP * wk
+    ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
+    cl, cd, _, _, _, _ = lookup(beta - atan2(wk, ut), lre, ref, base, tab, g)
+    size = math.sqrt(W2)
+    return size * (cl * ut - cd * wk), size * (cl * wk + cd * ut)
+
+
+@inlined
+def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, tab, g, fx, cs, sn, n):
     """Residual [m/s] and the state of one annulus, loads averaged over n azimuths."""
     s, c = sincos(phi)
     swirl = fx[N_SWIRL]
@@ -118,20 +142,12 @@ def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g,
     w = W * s
     v = w - UP
     grad = PITT_PETERS * Vy / (math.sqrt(w * w + Vy * Vy) + abs(w) + 1e-12) * x * v
-    u = W * c
     an = 0.0
     at = 0.0
     for k in range(n):
-        ut = u + Vy * sn[k]
-        wk = w + grad * cs[k]
-        W2 = ut * ut + wk * wk
-        # Re and Mach number leave out the drag term, as in the axial kernel
-        along = (UT + Vy * sn[k]) * ut + UP * wk
-        ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
-        cl, cd, _, _, _, _ = lookup(beta - atan2(wk, ut), lre, ref, base, tab, g)
-        size = math.sqrt(W2)
-        an += size * (cl * ut - cd * wk)
-        at += size * (cl * wk + cd * ut)
+        dT, dF = _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, beta, cs[k], sn[k], lre, base, tab, g)
+        an += dT
+        at += dF
     scale = sg4 / (n * W * W)
     a = an * scale
     b = at * scale
@@ -140,7 +156,7 @@ def _annulus(lookup, phi, UT, UP, Vy, x, beta, sg4, tip, hub, lre, base, tab, g,
 
 
 @inlined
-def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
+def _root(lookup, UT, UP, Vy, x, flap, near, i, st, lre, base, tab, g, fx, cs, sn, n):
     """Inflow angle of one annulus: bracketed secant steps; returns angle and status."""
     sg4 = 0.25 * st[i, S_SIGMA]
     beta = st[i, S_BETA]
@@ -162,21 +178,26 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
     half = math.acos(low if low < 0.7 else 0.7)
     lo = middle - half
     hi = middle + half
-    phi = min(max(phi_in + psi, lo + 0.01), hi - 0.01)
+    phi = near[0] if near[0] > lo + 0.01 and near[0] < hi - 0.01 else min(max(phi_in + psi, lo + 0.01), hi - 0.01)
     last = math.pi
     before = 0.0
     before_phi = 0.0
     status = NOT_CONVERGED
     for it in range(_MAX):
         res, _, _, _, _, _, _, stiff, _, _ = _annulus(
-            lookup, phi, UT, UP, Vy, x, beta, sg4, st[i, S_TIP], st[i, S_HUB], lre, base, tab, g, fx, cs, sn, n
+            lookup, phi, UT, UP, Vy, x, flap, beta, sg4, st[i, S_TIP], st[i, S_HUB], lre, base, tab, g, fx, cs, sn, n
         )
         if not (abs(res) < 1e300):
             status = NOT_FINITE
             break
         lo = phi if res < 0.0 else lo
         hi = phi if res > 0.0 else hi
-        slope = stiff + k * abs(UT) if it == 0 else (res - before) / (phi - before_phi)
+        if it > 0:
+            slope = (res - before) / (phi - before_phi)
+        elif near[1] > 0.0:
+            slope = near[1] * abs(UT)
+        else:
+            slope = stiff + k * abs(UT)
         before = res
         before_phi = phi
         step = -res / slope if slope > 0.0 else math.inf
@@ -189,7 +210,7 @@ def _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, cs, sn, n):
         if last < _TOL:
             status = OK if abs(res) < 1e-5 * (UT + abs(UP) + Vy) else JUMP
             break
-    return phi, status
+    return phi, status, slope / abs(UT)
 
 
 @inlined
@@ -210,6 +231,10 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
     out[:] = 0.0
     hub[:] = 0.0
     out[O_WHERE] = -1.0
+    # root and slope of the station before, where it is of an ordinary state
+    last_alpha = math.nan
+    step_alpha = 0.0
+    last_slope = 0.0
     for i in range(st.shape[0]):
         r = st[i, S_R]
         UT = point[P_OMEGA] * r * st[i, S_TANG_FACTOR] + st[i, S_TANG]
@@ -217,41 +242,57 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
         lre = log_rho_mu + st[i, S_LOGC]
         base = np.int32(stride * i)
         x = r / R
+        flap = (point[P_CONE], point[P_BACK], point[P_TOWARD], point[P_OMEGA] * r)
         phi = atan2(UP, UT)
         status = OK
         if st[i, S_SIGMA] > 0.0:
-            phi, status = _root(lookup, UT, UP, Vy, x, i, st, lre, base, tab, g, fx, few_cs, few_sn, few)
+            near = (st[i, S_BETA] - last_alpha - step_alpha, last_slope)
+            phi, status, last_slope = _root(
+                lookup, UT, UP, Vy, x, flap, near, i, st, lre, base, tab, g, fx, few_cs, few_sn, few
+            )
         if status != OK:
             if status > out[O_STATUS]:
                 out[O_STATUS] = status
                 out[O_WHERE] = i
             continue
         _, q, W, FM, s, c, grad, _, F, zone = _annulus(
-            lookup, phi, UT, UP, Vy, x, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
+            lookup, phi, UT, UP, Vy, x, flap, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
             tab, g, fx, few_cs, few_sn, few,
         )  # fmt: skip
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
         out[O_BRIDGED] += 1.0 if (zone and Vy < abs(UP)) else 0.0
         out[O_STAGNANT] += 1.0 if q * FM > F * math.sqrt(s * s + (Vy / W) ** 2) else 0.0
+        if zone:
+            last_alpha = math.nan
+        else:
+            step_alpha = st[i, S_BETA] - phi - last_alpha
+            step_alpha = step_alpha if abs(step_alpha) < 0.1 else 0.0
+            last_alpha = st[i, S_BETA] - phi
         scale = 0.5 * point[P_RHO] * st[i, S_CHORD] * st[i, S_DR] * B / n
-        for k in range(n):
-            ut = W * c + Vy * sn[k]
-            wk = W * s + grad * cs[k]
-            W2 = ut * ut + wk * wk
-            along = (UT + Vy * sn[k]) * ut + UP * wk
-            ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
-            cl, cd, _, _, _, _ = lookup(st[i, S_BETA] - atan2(wk, ut), lre, ref, base, tab, g)
-            size = math.sqrt(W2) * scale
-            dT = size * (cl * ut - cd * wk)
-            dF = size * (cl * wk + cd * ut)
-            out[O_T] += dT
-            out[O_Q] += dF * r
-            hub[H_FORCE] += dF * sn[k]
-            hub[Y_FORCE] -= dF * cs[k]
-            hub[ROLL] += dT * r * sn[k]
-            hub[PITCH] -= dT * r * cs[k]
-            if disk.shape[0] > 0:
-                disk[i, k] = dT * n / (2.0 * math.pi * r * st[i, S_DR])
+        T = 0.0
+        swirl = 0.0
+        H = 0.0
+        Y = 0.0
+        T_sin = 0.0
+        T_cos = 0.0
+        for k in range(n):  # nothing is stored here: with it the loop would not become SIMD code
+            dT, dF = _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, st[i, S_BETA], cs[k], sn[k], lre, base, tab, g)
+            tilt = dT * (flap[0] - flap[1] * cs[k] - flap[2] * sn[k])
+            T += dT
+            swirl += dF
+            H += dF * sn[k] - tilt * cs[k]
+            Y -= dF * cs[k] + tilt * sn[k]
+            T_sin += dT * sn[k]
+            T_cos += dT * cs[k]
+        out[O_T] += T * scale
+        out[O_Q] += swirl * scale * r
+        hub[H_FORCE] += H * scale
+        hub[Y_FORCE] += Y * scale
+        hub[ROLL] += T_sin * scale * r
+        hub[PITCH] -= T_cos * scale * r
+        for k in range(disk.shape[1] if disk.shape[0] > 0 else 0):
+            dT, _ = _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, st[i, S_BETA], cs[k], sn[k], lre, base, tab, g)
+            disk[i, k] = dT * scale * n / (2.0 * math.pi * r * st[i, S_DR])
 
 
 def _entries(stamp: int) -> dict[str, Any]:
@@ -289,6 +330,8 @@ def run(
     layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, n: int = AZIMUTHS, disk: bool = False
 ) -> tuple[Array, Array, Array]:
     """Solve points (P, 6): columns of the kernel's (P, N_OUT), hub loads (P, 4), disk loading (P, N, n) [N/m2]."""
+    if points.shape[1] < N_POINT:
+        points = np.concatenate([points, np.zeros((points.shape[0], N_POINT - points.shape[1]))], axis=1)
     psi, few = azimuths(n), azimuths(n // 2)
     out = np.empty((points.shape[0], K.N_OUT))
     hub = np.empty((points.shape[0], 4))
