@@ -80,6 +80,7 @@ upstream side [N m]."""
 PITT_PETERS = 15.0 * math.pi / 32.0
 _TOL = 1e-7  # the last secant step [rad]
 _MAX = 120
+_MAX_FLAP = 30
 
 
 @inlined
@@ -324,6 +325,39 @@ _ENTRIES = _entries(fingerprint(residual, vecmath, K))
 def azimuths(n: int = AZIMUTHS) -> NDArray[np.float64]:
     """Azimuths of the blades, 0 downstream, (n,) [rad]."""
     return np.asarray(np.arange(n) * (2.0 * math.pi / n), dtype=float)
+
+
+def flap(
+    layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, cone: float, disk: bool = False
+) -> tuple[Array, Array, Array]:
+    """Solve points as :func:`run` with blades that flap about hinges on the shaft, ``cone`` their coning angle [rad].
+
+    With b = cone - back cos(psi) - toward sin(psi), inertia and centrifugal moments of the first harmonic cancel, and
+    the aerodynamic moments about the hinges must vanish: Newton's method with the slopes of the rigid rotor.
+    """
+    P = points.shape[0]
+    at = np.concatenate([points[:, :P_CONE], np.full((P, 1), cone), np.zeros((P, 2))], axis=1)
+    step = np.eye(2) * 0.01
+    found = run(layout, at, st, tab, par, R)
+    slopes = np.empty((P, 2, 2))
+    for i in range(2):
+        moved = at.copy()
+        moved[:, P_BACK:] += step[i]
+        slopes[:, :, i] = (run(layout, moved, st, tab, par, R)[1][:, ROLL:] - found[1][:, ROLL:]) / 0.01
+    slopes[~np.isfinite(np.linalg.cond(slopes))] = np.eye(2)
+    left = np.ones(P, dtype=bool)
+    for _ in range(_MAX_FLAP):
+        change = np.linalg.solve(slopes, found[1][:, ROLL:, None])[..., 0]
+        at[:, P_BACK:] -= np.where(left[:, None], np.clip(change, -0.1, 0.1), 0.0)
+        left = left & (np.abs(change).max(axis=1) > 1e-7)
+        if not np.any(left):
+            break
+        part = run(layout, at[left], st, tab, par, R)
+        for whole, new in zip(found, part, strict=True):
+            whole[left] = new
+    found = run(layout, at, st, tab, par, R, disk=disk)
+    found[0][left, O_STATUS] = np.maximum(found[0][left, O_STATUS], NOT_CONVERGED)
+    return found
 
 
 def run(

@@ -416,6 +416,7 @@ def _check(points: Array) -> None:
 def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side: ArrayLike, radial: bool) -> Solution:
     """Points of which some have in-plane wind: the others go through the axial kernel."""
     from bemt.bem import oblique
+    from bemt.effects.flapping import Flapping
 
     if prep.duct is not None:
         raise ValueError("side: got in-plane wind on a ducted rotor; expected an open rotor")
@@ -429,7 +430,12 @@ def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side:
     points[:, K.P_OMEGA] *= _RAD_PER_RPM
     entry, st, tab, par = prep.kernel
     out, rad = np.empty((n, K.N_OUT)), np.empty((n, 0, K.N_RADIAL))
-    out[skew], hub_, disk_ = oblique.run(prep.layout, points[skew], st, tab, par, prep.rotor.R, disk=radial)
+    given = prep.layout, points[skew], st, tab, par, prep.rotor.R
+    hinged = next((e for e in prep.effects if isinstance(e, Flapping)), None)
+    if hinged is None:
+        out[skew], hub_, disk_ = oblique.run(*given, disk=radial)
+    else:
+        out[skew], hub_, disk_ = oblique.flap(*given, math.radians(hinged.coning_deg), disk=radial)
     if not np.all(skew):
         rest = np.ascontiguousarray(points[~skew, : K.N_POINT])
         part = np.empty((rest.shape[0], K.N_OUT))
