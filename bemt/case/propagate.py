@@ -23,7 +23,7 @@ from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import zero_thrust
-from bemt.rotors.validity import Validity
+from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -40,7 +40,7 @@ Progress = Callable[[int, int, str], None]
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
 """Channels that get a band."""
 
-_UNMEASURED = "oblique flow: the model's own error is that of axial flow at the speed along the shaft"
+_UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +199,9 @@ def propagate(
 ) -> Propagated:  # fmt: skip
     """Solve a case at points [rev/min], [m/s], [kg/m3], by default its own, with bands and flags.
 
-    ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. No measured rotor tells of the
-    solver's error in oblique flow: its band is that of axial flow at the speed along the shaft, and the point flagged.
+    ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. In oblique flow the model's own
+    error is that of axial flow at the speed along the shaft and a share of what the side wind changes
+    (:func:`bemt.rotors.validity.aside`); the point is flagged.
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
@@ -239,7 +240,11 @@ def propagate(
     refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
     moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
     widths = _model_error(case, model, beside, points.conditions(case)[2])
-    narrow, wide = (_loads(found, model.diameter_m, factor * u) for u in widths)
+    more = _aside(case, model, found, beside)
+    narrow, wide = (
+        _loads(found, model.diameter_m, np.hypot(factor * u, times * more))
+        for u, times in zip(widths, (1.0, 2.0), strict=True)
+    )
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
@@ -263,6 +268,17 @@ def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[A
     found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
     return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
+
+
+def _aside(case: Case, model: Model, found: Dataset, axial: Dataset) -> Array:
+    """Standard deviation that wind from the side and descent add, (2, P) of CT and CP."""
+    loads, along = np.array([found.CT, found.CP]), np.array([axial.CT, axial.CP])
+    if case.ducted:
+        return np.zeros_like(loads)
+    area = np.pi * model.rotor.R**2
+    hover = np.sqrt(np.abs(found.thrust_N) / (2.0 * found.density_kg_m3 * area))
+    sink = np.divide(-axial.airspeed_m_s, hover, out=np.zeros_like(hover), where=hover > 0.0)
+    return aside(loads, along, sink)
 
 
 def _zero_thrust_J(case: Case) -> float:
