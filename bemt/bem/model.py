@@ -193,9 +193,10 @@ class Model:
     ) -> Dataset:
         """Solve operating points; ``V`` [m/s] along the shaft, ``side`` [m/s] in the plane of the disk.
 
-        With any ``side``, the airspeed of the result (and J) is that of the wind, ``sideslip_rad`` its angle to the
-        shaft, and the loads of the hub are added: ``H_force_N`` downstream, ``Y_force_N`` to the advancing side,
-        ``roll_moment_Nm`` lifting the advancing side, ``pitch_moment_Nm`` lifting the upstream side.
+        With any ``side``, the airspeed of the result (and J) is that of the wind and ``sideslip_rad`` its angle to the
+        shaft; ``eta`` is T V cos(angle) / P, with the speed along the shaft. The loads of the hub are added:
+        ``H_force_N`` downstream, ``Y_force_N`` to the advancing side, ``roll_moment_Nm`` lifting the advancing side,
+        ``pitch_moment_Nm`` lifting the upstream side.
         """
         air = Air.from_density() if air is None else air
         s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side)
@@ -216,7 +217,7 @@ class Model:
         share = np.divide(T_duct, T, out=np.full_like(T, np.nan), where=T != 0.0)
         values = {
             "rpm": s.rpm, "airspeed_m_s": wind, "density_kg_m3": rho, "thrust_N": T, "torque_Nm": Q,
-            "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(J, CT, CP),
+            "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(s.J, CT, CP),
             "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, wind, rho, mu),
             "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
             "exhaust_speed_m_s": s.V_exit, "mass_flow_kg_s": s.mass_flow, "duct_share": share,

@@ -257,8 +257,8 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
                 out[O_WHERE] = i
             continue
         _, q, W, FM, s, c, grad, _, F, zone = _annulus(
-            lookup, phi, UT, UP, Vy, x, flap, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre, base,
-            tab, g, fx, few_cs, few_sn, few,
+            lookup, phi, UT, UP, Vy, x, flap, st[i, S_BETA], 0.25 * st[i, S_SIGMA], st[i, S_TIP], st[i, S_HUB], lre,
+            base, tab, g, fx, few_cs, few_sn, few,
         )  # fmt: skip
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
         out[O_BRIDGED] += 1.0 if (zone and Vy < abs(UP)) else 0.0

@@ -22,7 +22,7 @@ from bemt.bem.model import HUB_LOADS
 from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
-from bemt.rotors.predict import zero_thrust
+from bemt.rotors.predict import Prediction, zero_thrust
 from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
@@ -31,7 +31,18 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "solve_at", "spread", "validity_of", "vary"]
+__all__ = [
+    "BANDED",
+    "Moved",
+    "Points",
+    "Propagated",
+    "propagate",
+    "solve_at",
+    "solve_known",
+    "spread",
+    "validity_of",
+    "vary",
+]
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
@@ -89,7 +100,8 @@ class Points:
 def solve_at(model: Model, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1) -> Dataset:
     """A model at points (P,) with their angle between wind and shaft [deg].
 
-    With any angle, airspeed and J are those given, and the loads of the hub are there, 0 in axial flow.
+    With any angle, airspeed and J are those given, eta is T V cos(angle) / P, and the loads of the hub are there, 0 in
+    axial flow.
     """
     if not np.any(angle_deg):
         return model.solve(rpm, airspeed_m_s, air, threads)
@@ -97,8 +109,8 @@ def solve_at(model: Model, rpm: Array, airspeed_m_s: Array, angle_deg: Array, ai
     found = model.solve(rpm, along, air, threads, side)
     J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
     none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
-    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(J, found.CT, found.CP),
-           "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
+    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(along / (found.rpm / 60.0) / model.diameter_m,
+           found.CT, found.CP), "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
     return replace(found, values={**none, **found.values, **own})
 
 
@@ -230,19 +242,26 @@ def propagate(
     if np.any(skewed):  # axial flow at the speed along the shaft
         at = points.conditions(case)
         beside = model.solve(at[0], parted(at[1], points.angle_deg)[0], at[2], threads)
+    axial_air = points.conditions(case)[2]
+    shift = taught(case, model, beside, axial_air)
     factor, words = validity_of(case, beside.J, beside.Re75, beside.M_tip)
     turned = (((_UNMEASURED,) if one else ()) for one in skewed)
     flags = tuple((*a, *b, *c) for a, b, c in zip(found.flags, words, turned, strict=True))
+    bare, found = found, moved_by(found, shift, beside.J, model.diameter_m)
     nominal = channels(found)
     if not bands:
         nothing = {key: np.full(len(found), np.nan) for key in nominal}
         return Propagated(replace(found, flags=flags), nominal, (), None, model, nothing)
-    refined = channels(solved(case, "twice the stations", 2 * case.file.model.stations)[1])
-    moved = vary(case, nominal, lambda changed, what: channels(solved(changed, what)[1]), declared)
-    widths = _model_error(case, model, beside, points.conditions(case)[2])
-    more = _aside(case, model, found, beside)
+
+    def answers(changed: Case, what: str, stations: int | None = None) -> dict[str, Array]:
+        return channels(moved_by(solved(changed, what, stations)[1], shift, beside.J, model.diameter_m))
+
+    refined = answers(case, "twice the stations", 2 * case.file.model.stations)
+    moved = vary(case, nominal, answers, declared)
+    widths = _model_error(case, model, beside, axial_air, shift)
+    more = _aside(case, model, bare, beside)
     narrow, wide = (
-        _loads(found, model.diameter_m, np.hypot(factor * u, times * more))
+        _loads(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
         for u, times in zip(widths, (1.0, 2.0), strict=True)
     )
     parts = {
@@ -257,16 +276,62 @@ def propagate(
     return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
 
 
-def _model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
+def _real(case: Case, model: Model, points: Dataset, air: Air) -> Prediction:
+    """What is known of the rotor of a case as built, at axial points."""
+    known = case.as_built()
+    rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
+    mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
+    return rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
+
+
+def taught(case: Case, model: Model, points: Dataset, air: Air) -> Array | None:
+    """What a reference run of the rotor adds to CT and CP at axial points, (2, P) [1]; None without a run.
+
+    The run tells of the latent numbers, with which the case is solved, and of what they leave over.
+    """
+    if case.as_built().reference is None:
+        return None
+    return np.asarray(_real(case, model, points, air).mean - np.array([points.CT, points.CP]))
+
+
+def moved_by(found: Dataset, shift: Array | None, J_axial: Array, D: float) -> Dataset:
+    """Points with CT and CP moved by a shift, (2, P), and all that follows from them."""
+    if shift is None:
+        return found
+    rho, n, V = found.density_kg_m3, found.rpm / 60.0, found.airspeed_m_s
+    CT, CP = found.CT + shift[0], found.CP + shift[1]
+    thrust, power = np.asarray(co.thrust(CT, rho, n, D)), np.asarray(co.power(CP, rho, n, D))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = thrust / found.thrust_N
+        exhaust = found.exhaust_speed_m_s
+        faster = (exhaust - V) / (2.0 * exhaust - V) * exhaust * (grown - 1.0)
+    shares = {key: found[key] * grown for key in ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N") if key in found}
+    own = {
+        "CT": CT, "CP": CP, "thrust_N": thrust, "power_W": power, "torque_Nm": power / (2.0 * np.pi * n),
+        "eta": co.eta(J_axial, CT, CP),
+        "exhaust_speed_m_s": np.where(np.isfinite(faster), exhaust + faster, exhaust),
+    }  # fmt: skip
+    return replace(found, values={**found.values, **shares, **own})
+
+
+def solve_known(
+    case: Case, model: Model, rpm: Array, airspeed_m_s: Array, angle_deg: Array, air: Air, threads: int = 1
+) -> Dataset:
+    """As :func:`solve_at`, with what a reference run of the rotor tells, without bands."""
+    found = solve_at(model, rpm, airspeed_m_s, angle_deg, air, threads)
+    if case.as_built().reference is None:
+        return found
+    axial = model.solve(rpm, parted(airspeed_m_s, angle_deg)[0], air, threads)
+    return moved_by(found, taught(case, model, axial, air), axial.J, model.diameter_m)
+
+
+def _model_error(case: Case, model: Model, points: Dataset, air: Air, shift: Array | None) -> tuple[Array, Array]:
     """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
     What the population expects beside the nominal result counts too, as a root sum of squares.
     """
-    known = case.as_built()
-    rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
-    mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
-    found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
-    off = found.mean - np.array([points.CT, points.CP])
+    found = _real(case, model, points, air)
+    off = found.mean - np.array([points.CT, points.CP]) - (0.0 if shift is None else shift)
     return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
 
 
@@ -307,7 +372,7 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
-def _loads(points: Dataset, D: float, u: Array) -> dict[str, Array]:
+def _loads(points: Dataset, D: float, u: Array, J_axial: Array) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
@@ -319,7 +384,7 @@ def _loads(points: Dataset, D: float, u: Array) -> dict[str, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = power / (2.0 * np.pi * n)
         exhaust = np.abs((exit_speed - V) / (2.0 * exit_speed - V) * exit_speed * thrust / points.thrust_N)
-        eta = np.hypot(points.J * u[0], points.eta * u[1]) / np.abs(points.CP)
+        eta = np.hypot(J_axial * u[0], points.eta * u[1]) / np.abs(points.CP)
     return {
         "thrust_N": thrust, "torque_Nm": torque, "power_W": power, "CT": u[0], "CP": u[1],
         "eta": np.where(np.isfinite(eta), eta, np.nan), "duct_share": np.zeros_like(V),

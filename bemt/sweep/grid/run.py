@@ -24,7 +24,7 @@ from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
-from bemt.case.propagate import solve_at
+from bemt.case.propagate import solve_known
 from bemt.sweep.grid.formats import Block, encode, join
 
 if TYPE_CHECKING:
@@ -141,7 +141,8 @@ class GridSolver:
         distinct, here = np.unique(which, return_inverse=True)
         states = [self._state(flat) for flat in distinct.tolist()]
         air = states[0] if not self._air_names else air_arrays(states, here)
-        found = solve_at(self._ready(geometry, overrides), flow[0], flow[1], flow[2], air, self.threads)
+        model = self._ready(geometry, overrides)
+        found = solve_known(self.case, model, flow[0], flow[1], flow[2], air, self.threads)
         if _turned(self.case) and not np.any(flow[2]):  # axial points of an oblique grid
             return replace(found, values={**found.values, "H_force_N": np.where(found.converged, 0.0, np.nan)})
         return found
