@@ -100,7 +100,7 @@ def _blade(lookup, W, s, c, UT, UP, Vy, grad, flap, beta, cs, sn, lre, base, tab
     W2 = ut * ut + wk * wk
     # Re and Mach number leave out the drag term, as in the axial kernel
     along = (UT + Vy * sn) * ut + UP * wk
-    ref = along * along / (W2 + 1e-30) if along > 0.0 else W2
+    ref = along * along / (W2 + 1e-30)
     cl, cd, _, _, _, _ = lookup(beta - atan2(wk, ut), lre, ref, base, tab, g)
     size = math.sqrt(W2)
     return size * (cl * ut - cd * wk), size * (cl * wk + cd * ut)
