@@ -65,7 +65,7 @@ from bemt.bem.kernel import (
     S_TANG_FACTOR,
     S_TIP,
 )
-from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, flagged, in_bridge, loss, mass_flow
+from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, flagged, loss, mass_flow
 from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     t *= t
     F = 1.0 - (1.0 - F) / (1.0 + t)
     y = w0 / UP if UP != 0.0 else 2.0
-    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and in_bridge(y, UP < 0.0)
+    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6 and (y > -1.0 or UP < 0.0)
     f, _ = mass_flow(y, UP < 0.0)
     M = abs(UP) * f / W0 if zone else sa
     across = Vy / W0

@@ -103,7 +103,7 @@ def loss(u):
 # Induced speed over that of hover at the same thrust, over the sink rate likewise, as measured: Leishman (2006),
 # Principles of Helicopter Aerodynamics, 2nd ed., eq. 2.96 with kappa = 1 (from memory, not checked).
 _DESCENT = (1.0, 1.125, -1.372, 1.718, -0.655)
-_ROWS = 2000
+_S_STEP = 1e-3
 
 
 def _mass_table() -> tuple[Any, float]:
@@ -112,20 +112,14 @@ def _mass_table() -> tuple[Any, float]:
     v = np.polynomial.polynomial.polyval(x, _DESCENT)
     s, share = x / v, v**-2.0
     end = float(np.interp(0.0, (s - 1.0 - share)[20000:], s[20000:]))  # the windmill state has m = abs(UP) - v
-    return np.interp(np.arange(_ROWS + 2) * (end / _ROWS), s, share), end
+    at = np.arange(2503) * _S_STEP
+    return np.where(at < end, np.interp(at, s, share), at - 1.0), end
 
 
 _MASS, _S_SINK = _mass_table()
-_S_INV = _ROWS / _S_SINK
 Y_SINK = 1.0 - 1.0 / _S_SINK
 Y_RING = -2.0
 """At less than 0.45 of the hover's induced speed no vortex ring was seen (Johnson 2005, NASA/TP-2005-213477, p. 24)."""
-
-
-@inlined
-def in_bridge(y, sink):
-    """Whether an empirical curve replaces momentum theory at ``y = w / UP``."""
-    return y < (Y_SINK if sink else 0.6) and (sink or y > -1.0)
 
 
 @inlined
@@ -151,13 +145,13 @@ def mass_flow(y, sink):
     i_a = 1.0 / a
     f = 2.0 / 9.0 * i_a - 1.0 / 9.0 + 7.0 / 18.0 * a if y >= 0.0 else (((t + 1.0) * t + 1.0) * t + 3.0) * (1.0 / 6.0)
     df = 2.0 / 9.0 * i_a * i_a - 7.0 / 18.0 if y >= 0.0 else -((3.0 * t + 2.0) * t + 1.0) * (1.0 / 6.0)
-    x = (i_a if i_a < _S_SINK else _S_SINK) * _S_INV
+    x = i_a * (1.0 / _S_STEP)
     i = np.int32(x)
     k = np.uint64(i)
     g = _MASS[k]
     dg = _MASS[k + np.uint64(1)] - g
     g += (x - i) * dg
-    return (g * a if sink else f), (dg * _S_INV * i_a - g if sink else df)
+    return (g * a if sink else f), (dg * (1.0 / _S_STEP) * i_a - g if sink else df)
 
 
 @inlined
@@ -345,7 +339,7 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
     y = w0 * i_UP
-    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and in_bridge(y, i_UP < 0.0)
+    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6 and (y > -1.0 or i_UP < 0.0)
     f, df = mass_flow(y, i_UP < 0.0)
     m = abs(UP) * (ss * i_w)
     M = f * m if zone else sa
