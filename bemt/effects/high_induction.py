@@ -13,8 +13,10 @@ class HighInduction(Effect):
 
     Notes
     -----
-    Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1, continued to descent by a C1 bridge of
-    our own (see :func:`bemt.bem.residual.mass_flow`). Never acts in normal propeller operation.
+    Wind from the front: Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1. Descent: the induced
+    velocity measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, eq. 2.96 (not
+    checked), from hover through the vortex-ring state to the windmill state (:func:`bemt.bem.residual.mass_flow`).
+    Never acts in normal propeller operation.
     """
 
     id = "high_induction"
