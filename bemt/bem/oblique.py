@@ -116,8 +116,8 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     sa = abs(s)
     ss = s if sa > 1e-9 else (1e-9 if s >= 0.0 else -1e-9)
     w0 = ss * W0
-    # Prandtl's factor, as of the axial rotor
-    turn = 2.0 - UP / w0
+    # Prandtl's factor, as of the axial rotor; speed of the far wake along that at the disk, over the latter
+    turn = ((2.0 * w0 - UP) * w0 + Vy * Vy) / (w0 * w0 + Vy * Vy)
     turn = turn if turn < 3.0 else 3.0
     turn = turn if turn > 0.3 else 0.3
     p = turn * turn * turn * ss * ss if fx[N_FAR] > 0.0 else ss * ss
