@@ -14,10 +14,12 @@ of a blade, 0 downstream and 90 deg on the advancing side.  Per azimuth::
 
 Mass flow: M W = sqrt(m^2 + V_y^2) (Glauert 1926, ARC R&M 1111, the same v for a wing and a rotor; Johnson 1980,
 Helicopter Theory, sec. 4-1.1), with m the axial mass flow: abs(w), or in the turbulent windmill and vortex-ring states
-the curve of :func:`bemt.bem.residual.mass_flow` (Buhl 2005).  Without in-plane wind that is the axial annulus.
+the curve of :func:`bemt.bem.residual.mass_flow`.  Without in-plane wind that is the axial annulus.  The curve of
+descent fades to abs(w) as (1 - (V_y / 0.95 v_h)^2)^2: the end is Johnson's (2005, NASA/TP-2005-213477), the shape own.
 
-Prandtl's factor is that of the mean flow; where a blade meets more wind from the side than from its own rotation there
-are no helices, and 1 - F fades as 1 / (1 + (V_y / W)^4) (own choice).
+Prandtl's factor is that of the mean flow.  The speed of the far wake counts along that at the disk, over the latter:
+((2 w - UP) w + V_y^2) / (w^2 + V_y^2).  Where a blade meets more wind from the side than from its own rotation there
+are no helices, and 1 - F fades as 1 / (1 + (V_y / W)^4) (own choice; no published rule was found).
 
 Gradient: K = 15 pi/32 tan(chi/2) (Pitt and Peters 1981, Vertica 5:21, in the form of Moriarty and Hansen 2005, AeroDyn
 Theory Manual, NREL/EL-500-36881, skewed wake correction; equation numbers not checked), per annulus, with
@@ -77,6 +79,11 @@ AZIMUTHS = 16
 H_FORCE, Y_FORCE, ROLL, PITCH = range(4)
 """Columns of the hub loads: H downstream, Y to the advancing side [N]; roll lifts the advancing side, pitch the
 upstream side [N m]."""
+SHEETS = 0.05
+"""Share of the side wind, squared, in the spacing of the vortex sheets: without any, F rises to 1 and falls again where
+the flow through the disk turns, and the balance has three roots (own choice, the least that leaves one) [1]."""
+RING = 0.95
+"""Side wind over the induced speed of hover at which no vortex ring is left (Johnson 2005, NASA/TP-2005-213477) [1]."""
 PITT_PETERS = 15.0 * math.pi / 32.0
 _TOL = 1e-7  # the last secant step [rad]
 _MAX = 120
@@ -120,7 +127,8 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     turn = ((2.0 * w0 - UP) * w0 + Vy * Vy) / (w0 * w0 + Vy * Vy)
     turn = turn if turn < 3.0 else 3.0
     turn = turn if turn > 0.3 else 0.3
-    p = turn * turn * turn * ss * ss if fx[N_FAR] > 0.0 else ss * ss
+    s2 = ss * ss + SHEETS * Vy * Vy / (W0 * W0)
+    p = turn * turn * turn * s2 if fx[N_FAR] > 0.0 else s2
     whole = c * c + p if fx[N_FAR] > 0.0 else 1.0
     root = math.sqrt(math.sqrt(whole / p))
     Ft, _ = loss(tip * root)
@@ -134,6 +142,13 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6 and (y > -1.0 or UP < 0.0)
     f, _ = mass_flow(y, UP < 0.0)
     M = abs(UP) * f / W0 if zone else sa
+    if UP < 0.0:
+        size = Vy * Vy / (RING * RING * abs(w0 - UP) * math.sqrt(w0 * w0 + Vy * Vy) + 1e-30)
+        ring = 1.0 - size if size < 1.0 else 0.0
+        M = sa + ring * ring * (M - sa)
+        loud = zone and flagged(y, True) and ring > 0.0
+    else:
+        loud = zone and Vy < abs(UP)
     across = Vy / W0
     M = math.sqrt(M * M + across * across)
     FM = F * M
@@ -153,7 +168,7 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     a = an * scale
     b = at * scale
     res = FM * (UT * s - UP * c) - (a * UT + b * UP * swirl)
-    return res, q, W, FM, s, c, grad, FM * W0, F, zone and flagged(y, UP < 0.0)
+    return res, q, W, FM, s, c, grad, FM * W0, F, loud
 
 
 @inlined
@@ -261,7 +276,7 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
             base, tab, g, fx, few_cs, few_sn, few,
         )  # fmt: skip
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
-        out[O_BRIDGED] += 1.0 if (zone and Vy < abs(UP)) else 0.0
+        out[O_BRIDGED] += 1.0 if zone else 0.0
         out[O_STAGNANT] += 1.0 if q * FM > F * math.sqrt(s * s + (Vy / W) ** 2) else 0.0
         if zone:
             last_alpha = math.nan
