@@ -99,8 +99,8 @@ def test_mass_flow_in_descent_is_the_measured_curve() -> None:
         assert f * x * v == pytest.approx(1.0, rel=1e-5)  # m v = v_h^2
         y = 1.0 - v / x
         assert (run(y + 1e-4, True)[0] - run(y - 1e-4, True)[0]) / 2e-4 == pytest.approx(slope, abs=2e-2)
-    assert run(R.Y_SINK, True)[0] == pytest.approx(R.Y_SINK, rel=1e-5)  # the windmill state of momentum theory
-    assert run(-1e7, True)[0] == pytest.approx(1e7, rel=1e-6)  # hover
+    assert run(R.Y_SINK, True)[0] == pytest.approx(R.Y_SINK, rel=1e-4)  # the windmill state of momentum theory
+    assert run(-1e7, True)[0] == pytest.approx(1e7, rel=1e-5)  # hover
 
 
 def compiled_residual(ducted: bool, layout: str) -> Any:

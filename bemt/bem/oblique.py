@@ -278,12 +278,11 @@ def _point(lookup, point, st, tab, par, cs, sn, few_cs, few_sn, R, out, hub, dis
         out[O_MASS] += point[P_RHO] * FM * W * 2.0 * math.pi * r * st[i, S_DR]
         out[O_BRIDGED] += 1.0 if zone else 0.0
         out[O_STAGNANT] += 1.0 if q * FM > F * math.sqrt(s * s + (Vy / W) ** 2) else 0.0
-        if zone:
-            last_alpha = math.nan
-        else:
-            step_alpha = st[i, S_BETA] - phi - last_alpha
-            step_alpha = step_alpha if abs(step_alpha) < 0.1 else 0.0
-            last_alpha = st[i, S_BETA] - phi
+        alpha = st[i, S_BETA] - phi
+        step_alpha = alpha - last_alpha
+        step_alpha = step_alpha if abs(step_alpha) < 0.1 else 0.0
+        # blades that brake or fly in their own wake have several roots: the next station starts afresh
+        last_alpha = alpha if alpha > st[i, S_ALPHA0] and not zone else math.nan
         scale = 0.5 * point[P_RHO] * st[i, S_CHORD] * st[i, S_DR] * B / n
         T = 0.0
         swirl = 0.0
