@@ -67,7 +67,7 @@ from bemt.bem.kernel import (
     S_TANG_FACTOR,
     S_TIP,
 )
-from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, flagged, loss, mass_flow
+from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, Y_BRAKE, Y_RING, loss, mass_flow
 from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
 
 Array = NDArray[np.float64]
@@ -139,16 +139,13 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     t *= t
     F = 1.0 - (1.0 - F) / (1.0 + t)
     y = w0 / UP if UP != 0.0 else 2.0
-    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6 and (y > -1.0 or UP < 0.0)
-    f, _ = mass_flow(y, UP < 0.0)
+    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6
+    f, _ = mass_flow(y)
     M = abs(UP) * f / W0 if zone else sa
-    if UP < 0.0:
-        size = Vy * Vy / (RING * RING * abs(w0 - UP) * math.sqrt(w0 * w0 + Vy * Vy) + 1e-30)
-        ring = 1.0 - size if size < 1.0 else 0.0
-        M = sa + ring * ring * (M - sa)
-        loud = zone and flagged(y, True) and ring > 0.0
-    else:
-        loud = zone and Vy < abs(UP)
+    size = Vy * Vy / (RING * RING * abs(w0 - UP) * math.sqrt(w0 * w0 + Vy * Vy) + 1e-30)
+    ring = 1.0 - size if size < 1.0 else 0.0
+    M = sa + ring * ring * (M - sa)
+    loud = zone and y > Y_RING and y < Y_BRAKE and ring > 0.0
     across = Vy / W0
     M = math.sqrt(M * M + across * across)
     FM = F * M

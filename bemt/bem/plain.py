@@ -8,8 +8,7 @@ References
 .. [1] H. Glauert, "Airplane Propellers", in Durand, Aerodynamic Theory IV, 1935, ch. VII.
 .. [2] S. A. Ning, "A simple solution method for the blade element momentum equations with guaranteed convergence", Wind
        Energy 17:1327, 2014, doi:10.1002/we.1636: one residual in phi; eq. 4-6 for the loss factors.
-.. [3] M. L. Buhl, NREL/TP-500-36834, 2005, eq. 18: the turbulent windmill state.
-.. [4] J. G. Leishman, Principles of Helicopter Aerodynamics, 2nd ed., 2006, eq. 2.96 (not checked): descent.
+.. [3] J. G. Leishman, Principles of Helicopter Aerodynamics, 2nd ed., 2006, eq. 2.96 (not checked): descent.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.bem.residual import Y_SINK
+from bemt.bem.residual import Y_BRAKE
 
 __all__ = ["PlainBlade", "PlainLoads", "solve_plain"]
 
@@ -55,21 +54,15 @@ def prandtl(f: Array) -> Array:
     return np.maximum(2.0 / np.pi * np.arccos(np.exp(-f)), 1e-6)
 
 
-def mass_flow(y: Array, sink: bool) -> Array:
+def mass_flow(y: Array) -> Array:
     """Mass flow per area over ``rho |V|`` for ``y = w / V`` (w: axial speed through the disk).
 
-    Momentum theory gives abs(y). Where it fails: Buhl's line [3] between y = 0.6 and 0, then a cubic that meets abs(y)
-    at -1 (own choice); in descent (``sink``) the measured curve [4] from hover to the windmill state.
+    Momentum theory gives abs(y). Below y = 0.488 it fails: the measured curve [3] from the windmill state to hover.
     """
-    if sink:
-        x = np.linspace(0.0, 2.01, 20101)  # sink rate, v: induced speed, over the induced speed of hover
-        v = np.polynomial.polynomial.polyval(x, [1.0, 1.125, -1.372, 1.718, -0.655])
-        curve = (1.0 - y) * np.interp(1.0 / np.maximum(1.0 - y, 0.4), x / v, v**-2.0)
-        return np.where(y < Y_SINK, curve, np.abs(y))
-    a = np.clip(1.0 - y, 0.4, None)
-    buhl = 2.0 / (9.0 * a) - 1.0 / 9.0 + 7.0 / 18.0 * a
-    bridge = (3.0 - y + y**2 - y**3) / 6.0
-    return np.where((y > -1.0) & (y < 0.6), np.where(y >= 0.0, buhl, bridge), np.abs(y))
+    x = np.linspace(0.0, 2.01, 20101)  # sink rate, v: induced speed, over the induced speed of hover
+    v = np.polynomial.polynomial.polyval(x, [1.0, 1.125, -1.372, 1.718, -0.655])
+    curve = (1.0 - y) * np.interp(1.0 / np.maximum(1.0 - y, 0.4), x / v, v**-2.0)
+    return np.where(y < Y_BRAKE, curve, np.abs(y))
 
 
 def solve_plain(
@@ -104,7 +97,7 @@ def solve_plain(
         q = np.clip(2.0 - V / w, 0.3, 3.0)
         sin_w = np.sqrt(s**2 * q**3 / (co**2 + s**2 * q**3))
         F = prandtl(B * (R - r) / (2.0 * r * sin_w)) * prandtl(B * (r - Rhub) / (2.0 * Rhub * sin_w))
-        M = np.abs(s) if V == 0.0 else mass_flow(w / V, V < 0.0) * abs(V) / W  # mass flow per area over rho W
+        M = np.abs(s) if V == 0.0 else mass_flow(w / V) * abs(V) / W  # mass flow per area over rho W
         cl, cd = section(beta - phi, rho * W * c / mu, W / a_sound)
         cn, ct = cl * co - cd * s, cl * s + cd * co
         # thrust: F M (w - V) = sigma/4 W cn; torque: F M v_t = sigma/4 W ct; W cos(phi) = UT - v_t. W eliminated:

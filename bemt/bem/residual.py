@@ -14,7 +14,7 @@ and elimination of W leaves a residual without a singularity at hover (Ning 2014
     g(phi) = F M (UT sin(phi) - UP cos(phi)) - sigma/4 (cn UT + ct UP),    M = m / W
 
 In the propeller and windmill state M = abs(sin(phi)); from the turbulent windmill state (axial induction factor of a
-turbine above 0.4) through descent near hover, M follows the bridge of :func:`mass_flow`.  With ``U`` and ``phi_in``
+turbine above 0.5) through the vortex-ring state to hover, M follows the measured curve of :func:`mass_flow`.  With ``U`` and ``phi_in``
 the size and direction of the onset flow and ``psi = phi - phi_in``::
 
     g / U = (F M + sigma/4 cd) sin(psi) - sigma/4 cl cos(psi)
@@ -116,42 +116,30 @@ def _mass_table() -> tuple[Any, float]:
     return np.where(at < end, np.interp(at, s, share), at - 1.0), end
 
 
-_MASS, _S_SINK = _mass_table()
-Y_SINK = 1.0 - 1.0 / _S_SINK
+_MASS, _S_BRAKE = _mass_table()
+Y_BRAKE = 1.0 - 1.0 / _S_BRAKE
 Y_RING = -2.0
 """At less than 0.45 of the hover's induced speed no vortex ring was seen (Johnson 2005, NASA/TP-2005-213477, p. 24)."""
 
 
 @inlined
-def flagged(y, sink):
-    """Whether the flow through the disk is one of the states to warn of."""
-    return y < (Y_SINK if sink else 0.6) and y > (Y_RING if sink else -1.0)
-
-
-@inlined
-def mass_flow(y, sink):
+def mass_flow(y):
     """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` up to 0.6, and its derivative.
 
-    Onset from the front: Buhl (2005), NREL/TP-500-36834, eq. 18 with F = 1, CT = 8/9 - 4/9 a + 14/9 a^2 with a = 1 - y,
-    tangent to momentum theory (``y`` itself) at y = 0.6.  ``y < 0``: cubic bridge to ``-y``, which it meets at y = -1
-    (own choice, C1 at both ends).
-
-    Descent (``sink``): the measured curve of helicopter rotors from hover (y at minus infinity) to the windmill state
-    (y = 0.488).  As ``m v`` is the square of the induced speed in hover, ``m = v / x_v^2``, x_v = v over that speed.
+    The measured curve of helicopter rotors in descent, from hover (y at minus infinity) through the vortex-ring state to
+    the windmill state (y = 0.488), and momentum theory from there on.  As ``m v`` is the square of the induced speed in
+    hover, ``m = v / x_v^2``, with ``v = w - UP`` and x_v = v over that speed.  A propeller that brakes in wind from the
+    front is the mirror image of a rotor in descent.
     """
     a = 1.0 - y
-    a = a if a > 0.4 else 0.4
-    t = -y
-    i_a = 1.0 / a
-    f = 2.0 / 9.0 * i_a - 1.0 / 9.0 + 7.0 / 18.0 * a if y >= 0.0 else (((t + 1.0) * t + 1.0) * t + 3.0) * (1.0 / 6.0)
-    df = 2.0 / 9.0 * i_a * i_a - 7.0 / 18.0 if y >= 0.0 else -((3.0 * t + 2.0) * t + 1.0) * (1.0 / 6.0)
+    i_a = 1.0 / (a if a > 0.4 else 0.4)
     x = i_a * (1.0 / _S_STEP)
     i = np.int32(x)
     k = np.uint64(i)
     g = _MASS[k]
     dg = _MASS[k + np.uint64(1)] - g
     g += (x - i) * dg
-    return (g * a if sink else f), (dg * (1.0 / _S_STEP) * i_a - g if sink else df)
+    return g * a, dg * (1.0 / _S_STEP) * i_a - g
 
 
 @inlined
@@ -339,8 +327,8 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
     y = w0 * i_UP
-    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6 and (y > -1.0 or i_UP < 0.0)
-    f, df = mass_flow(y, i_UP < 0.0)
+    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6
+    f, df = mass_flow(y)
     m = abs(UP) * (ss * i_w)
     M = f * m if zone else sa
     dM = m * (df * dw0 * i_UP - f * dlnW) if zone else (c if s >= 0.0 else -c)
