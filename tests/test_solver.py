@@ -69,21 +69,20 @@ def test_prandtl_table_is_the_formula() -> None:
 
 
 def test_mass_flow_is_the_measured_curve_of_descent() -> None:
-    """Induced speed v over that of hover at sink rate x, x 0 to 2: the quartic of Leishman (2006), eq. 2.96."""
+    """Induced speed v over that of hover at sink rate x, x 1 to 2: the quartic of Leishman (2006), eq. 2.96."""
 
     @njit
     def run(y: float) -> tuple[float, float]:
         return R.mass_flow(y)
 
-    for x in (0.1, 0.5, 1.0, 1.5, 1.7, 1.9, 1.99):
+    for x in (1.0, 1.5, 1.7, 1.9, 1.99):
         v = 1 + 1.125 * x - 1.372 * x**2 + 1.718 * x**3 - 0.655 * x**4
         y = 1.0 - v / x
         f, slope = run(y)
         assert f * x * v == pytest.approx(1.0, rel=1e-4)  # m v = v_h^2
         assert (run(y + 1e-4)[0] - run(y - 1e-4)[0]) / 2e-4 == pytest.approx(slope, abs=2e-2)
-    for y in (R.Y_BRAKE, 0.55, 0.599):  # the windmill state of momentum theory
-        assert run(y)[0] == pytest.approx(y, rel=1e-4)
-    assert run(-1e7)[0] == pytest.approx(1e7, rel=1e-5)  # hover
+    for y in (R.Y_BRAKE, 0.55, 0.599, R.Y_RING, -3.0, -1e7):  # momentum theory: windmill state, slow descent, hover
+        assert run(y)[0] == pytest.approx(abs(y), rel=1e-4)
 
 
 def compiled_residual(ducted: bool, layout: str) -> Any:
@@ -142,8 +141,9 @@ def test_slope_of_the_residual(rotor: Rotor, ducted: bool, layout: str, off: str
         if abs((right - g0) - (g0 - left)) > 1e-3 * h * (abs(slope) + UT):
             continue
         scale = 1.0 if ducted else UT + abs(V)
-        assert (right - left) / (2 * h) == pytest.approx(slope, rel=2e-5, abs=2e-5 * scale), (k, Omega, V, phi)
         y = math.sin(phi) * (UT * math.cos(phi) + V * math.sin(phi)) / V if V else math.inf
+        close = 2e-5 if ducted or y > 0.6 else 2e-4  # the curve of descent is a table, linear between its rows
+        assert (right - left) / (2 * h) == pytest.approx(slope, rel=close, abs=close * scale), (k, Omega, V, phi)
         zones.add((y > 0.6) + 2 * (y < -1))
     assert zones == {0, 1, 2}
 

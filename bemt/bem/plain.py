@@ -57,11 +57,16 @@ def prandtl(f: Array) -> Array:
 def mass_flow(y: Array) -> Array:
     """Mass flow per area over ``rho |V|`` for ``y = w / V`` (w: axial speed through the disk).
 
-    Momentum theory gives abs(y). Below y = 0.488 it fails: the measured curve [3] from the windmill state to hover.
+    Momentum theory gives abs(y). It fails between the vortex-ring state and the windmill state (y = 0.488), where the
+    measured curve [3] takes over, from a sink rate of 0.45 to 1 times the induced speed of hover step by step.
     """
     x = np.linspace(0.0, 2.01, 20101)  # sink rate, v: induced speed, over the induced speed of hover
     v = np.polynomial.polynomial.polyval(x, [1.0, 1.125, -1.372, 1.718, -0.655])
-    curve = (1.0 - y) * np.interp(1.0 / np.maximum(1.0 - y, 0.4), x / v, v**-2.0)
+    s = 1.0 / np.maximum(1.0 - y, 0.4)
+    first, last = 0.45 / (0.225 + np.sqrt(0.225**2 + 1.0)), 1.0 / v[10000]
+    b = np.clip((s - first) / (last - first), 0.0, 1.0)
+    b = b**2 * (3.0 - 2.0 * b)
+    curve = (1.0 - y) * ((1.0 - b) * np.abs(s - 1.0) + b * np.interp(s, x / v, v**-2.0))
     return np.where(y < Y_BRAKE, curve, np.abs(y))
 
 

@@ -14,8 +14,8 @@ and elimination of W leaves a residual without a singularity at hover (Ning 2014
     g(phi) = F M (UT sin(phi) - UP cos(phi)) - sigma/4 (cn UT + ct UP),    M = m / W
 
 In the propeller and windmill state M = abs(sin(phi)); from the turbulent windmill state (axial induction factor of a
-turbine above 0.5) through the vortex-ring state to hover, M follows the measured curve of :func:`mass_flow`.  With ``U`` and ``phi_in``
-the size and direction of the onset flow and ``psi = phi - phi_in``::
+turbine above 0.5) through the vortex-ring state, M follows the measured curve of :func:`mass_flow`.  With ``U`` and
+``phi_in`` the size and direction of the onset flow and ``psi = phi - phi_in``::
 
     g / U = (F M + sigma/4 cd) sin(psi) - sigma/4 cl cos(psi)
     W     = U cos(psi) / (1 + sigma cd / (4 F M))
@@ -104,6 +104,9 @@ def loss(u):
 # Principles of Helicopter Aerodynamics, 2nd ed., eq. 2.96 with kappa = 1 (from memory, not checked).
 _DESCENT = (1.0, 1.125, -1.372, 1.718, -0.655)
 _S_STEP = 1e-3
+# Momentum theory holds to a sink rate of x = 0.45, where the vortex ring begins (Johnson 2005, NASA/TP-2005-213477,
+# p. 24); from there to x = 1 it passes to the curve (own choice). A wall below acts as such a slow descent.
+_S_RING = 0.45 / (0.225 + math.sqrt(0.225**2 + 1.0))
 
 
 def _mass_table() -> tuple[Any, float]:
@@ -113,23 +116,25 @@ def _mass_table() -> tuple[Any, float]:
     s, share = x / v, v**-2.0
     end = float(np.interp(0.0, (s - 1.0 - share)[20000:], s[20000:]))  # the windmill state has m = abs(UP) - v
     at = np.arange(2503) * _S_STEP
-    return np.where(at < end, np.interp(at, s, share), at - 1.0), end
+    b = np.clip((at - _S_RING) / (float(np.interp(1.0, x, s)) - _S_RING), 0.0, 1.0)
+    b = b * b * (3.0 - 2.0 * b)
+    ring = (1.0 - b) * np.abs(at - 1.0) + b * np.interp(at, s, share)
+    return np.where(at < end, ring, at - 1.0), end
 
 
 _MASS, _S_BRAKE = _mass_table()
 Y_BRAKE = 1.0 - 1.0 / _S_BRAKE
-Y_RING = -2.0
-"""At less than 0.45 of the hover's induced speed no vortex ring was seen (Johnson 2005, NASA/TP-2005-213477, p. 24)."""
+Y_RING = 1.0 - 1.0 / _S_RING
 
 
 @inlined
 def mass_flow(y):
     """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` up to 0.6, and its derivative.
 
-    The measured curve of helicopter rotors in descent, from hover (y at minus infinity) through the vortex-ring state to
-    the windmill state (y = 0.488), and momentum theory from there on.  As ``m v`` is the square of the induced speed in
-    hover, ``m = v / x_v^2``, with ``v = w - UP`` and x_v = v over that speed.  A propeller that brakes in wind from the
-    front is the mirror image of a rotor in descent.
+    The measured curve of helicopter rotors in descent, from the vortex-ring state (y = -1.8) to the windmill state
+    (y = 0.488), and momentum theory on both sides, hover being y at minus infinity.  As ``m v`` is the square of the
+    induced speed in hover, ``m = v / x_v^2``, with ``v = w - UP`` and x_v = v over that speed.  A propeller that brakes
+    in wind from the front is the mirror image of a rotor in descent.
     """
     a = 1.0 - y
     i_a = 1.0 / (a if a > 0.4 else 0.4)

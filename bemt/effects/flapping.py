@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Parameter
+from bemt.effects.base import Baking, Effect, Parameter
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class Flapping(Effect):
     id = "flapping"
     title = "blades on flapping hinges"
     sign = "in wind from the side the disk tilts back: more H, no hub moments; no change in axial flow"
-    parameters = (Parameter("coning_deg", "deg", 0.0, 15.0, "0 teetering to heavily loaded light blades", 4, 0.0),)
+    parameters = (Parameter("coning_deg", "deg", 0.0, 15.0, "0 teetering to heavily loaded light blades", 4),)
     on_by_default = False
     diagnosed = False
+
+    def momentum(self, bake: Baking) -> None:
+        """Hinge the blades."""
+        bake.num.cone = math.radians(self.coning_deg)

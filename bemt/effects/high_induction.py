@@ -13,8 +13,8 @@ class HighInduction(Effect):
 
     Notes
     -----
-    From hover through the vortex-ring state to the windmill state of a rotor in descent the disk follows the induced
-    velocity measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, eq. 2.96 (not
+    From the vortex-ring state to the windmill state of a rotor in descent the disk follows the induced velocity
+    measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, eq. 2.96 (not
     checked; :func:`bemt.bem.residual.mass_flow`), and so does its mirror image, a propeller that brakes in wind from
     the front. Never acts in normal propeller operation.
     """
