@@ -16,8 +16,8 @@ from the data, each departure adding its own part, with no step at the edge:
   (PCA-2, NACA Report 515, pitch 1.9 deg, advance ratio 0.14 to 0.55): thrust is off by 12 % of that change rms,
   and torque by half of it, as far as friction is not known. Two stiff blades are not four hinged ones: thrust counts
   twice. Not a factor: a part of its own.
-* descent: 12 % of the thrust from the induced speed of hover on, less before; Castles and Gray (NACA TN 2474,
-  constant chord) are 3 % rms off up to 0.45 of that speed, 11 % from there to 1.6 and 12 % beyond.
+* descent: an eighth of the thrust from the induced speed of hover on, less before; Castles and Gray (NACA TN 2474,
+  constant chord) are 8 % rms off up to 0.45 of that speed, 13 % from there to 1.6 and 12 % beyond.
 * a duct: a factor of 1.5. X-22A is within 7 % in CT and 10 % in CP, nozzle 19A within 3 and 48 %, a 76 mm fan 18 %.
 """
 
@@ -44,7 +44,7 @@ LENGTH_X = 0.34
 7 deg of today's, over the angle of attack, are the same on a usual blade [1]."""
 SIDE = (0.25, 0.5)
 """Error of CT and CP over what wind from the side changes [1]."""
-SINK = 0.12
+SINK = 0.125
 """Error of CT and CP in descent over their size [1]."""
 SAID = 1.01
 """Smallest factor that a single departure is named for [1]."""
