@@ -24,7 +24,7 @@ are no helices, and 1 - F fades as 1 / (1 + (V_y / W)^4) (own choice; no publish
 Gradient: K = 15 pi/32 tan(chi/2) (Pitt and Peters 1981, Vertica 5:21, in the form of Moriarty and Hansen 2005, AeroDyn
 Theory Manual, NREL/EL-500-36881, skewed wake correction; equation numbers not checked), per annulus, with
 tan(chi/2) = V_y / (sqrt(w^2 + V_y^2) + abs(w)).  Left out: the gradient that hub moments induce themselves (moments
-come out too large on a stiff rotor), radial flow along the blade, flapping.
+come out too large on a stiff rotor), radial flow along the blade.  Blades on hinges: :func:`flap`.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, disable-error-code="attr-defined"
@@ -374,7 +374,10 @@ def flap(
 def run(
     layout: str, points: Array, st: Array, tab: Array, par: Array, R: float, n: int = AZIMUTHS, disk: bool = False
 ) -> tuple[Array, Array, Array]:
-    """Solve points (P, 6): columns of the kernel's (P, N_OUT), hub loads (P, 4), disk loading (P, N, n) [N/m2]."""
+    """Solve points (P, 6), or (P, 9) with flapping angles.
+
+    Returns columns of the kernel (P, N_OUT), hub loads (P, 4), disk loading (P, N, n) [N/m2].
+    """
     if points.shape[1] < N_POINT:
         points = np.concatenate([points, np.zeros((points.shape[0], N_POINT - points.shape[1]))], axis=1)
     psi, few = azimuths(n), azimuths(n // 2)
