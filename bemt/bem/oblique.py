@@ -139,13 +139,13 @@ def _annulus(lookup, phi, UT, UP, Vy, x, flap, beta, sg4, tip, hub, lre, base, t
     t *= t
     F = 1.0 - (1.0 - F) / (1.0 + t)
     y = w0 / UP if UP != 0.0 else 2.0
-    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6
+    zone = fx[N_BRIDGE] > 0.0 and UP != 0.0 and y < 0.6 and y > Y_RING
     f, _ = mass_flow(y)
     M = abs(UP) * f / W0 if zone else sa
     size = Vy * Vy / (RING * RING * abs(w0 - UP) * math.sqrt(w0 * w0 + Vy * Vy) + 1e-30)
     ring = 1.0 - size if size < 1.0 else 0.0
     M = sa + ring * ring * (M - sa)
-    loud = zone and y > Y_RING and y < Y_BRAKE and ring > 0.0
+    loud = zone and y < Y_BRAKE and ring > 0.0
     across = Vy / W0
     M = math.sqrt(M * M + across * across)
     FM = F * M

@@ -332,7 +332,7 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
     y = w0 * i_UP
-    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6
+    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6 and y > Y_RING
     f, df = mass_flow(y)
     m = abs(UP) * (ss * i_w)
     M = f * m if zone else sa
