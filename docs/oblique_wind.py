@@ -14,6 +14,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy.signal import resample
 
 import bemt
 from bemt.bem import oblique, solver
@@ -37,14 +38,15 @@ def main() -> None:
     prep = p._model.prep
     found = solver.solve(prep, RPM, SPEED * 0.5, p.case.air(), side=SPEED * np.sqrt(0.75), radial=True)
     assert found.disk is not None
-    psi = np.append(oblique.azimuths(), 2.0 * np.pi)
-    load = np.concatenate([found.disk[0], found.disk[0][:, :1]], axis=1)
+    psi = np.append(oblique.azimuths(96), 2.0 * np.pi)
+    load = resample(found.disk[0], 96, axis=1)  # as a Fourier series
+    load = np.concatenate([load, load[:, :1]], axis=1)
     drawn = left.contourf(psi, prep.stations.r / prep.rotor.R, load, levels=24, cmap="viridis")
     left.set_title(f"Thrust per area, wind 60 deg from the shaft\n{RPM:g} rev/min, {SPEED:g} m/s")
     left.set_xticks(np.radians([0, 90, 180, 270]), ["downstream", "advancing", "upstream", "retreating"])
     left.set_yticks([])
     left.grid(False)
-    left.tick_params(axis="x", pad=12)
+    left.tick_params(axis="x", pad=22)
     fig.colorbar(drawn, ax=left, label="N/m2", shrink=0.8)
     angle = np.linspace(0.0, 180.0, 37)
     for speed, color in ((5.0, "C0"), (10.0, "C1")):
@@ -58,7 +60,7 @@ def main() -> None:
             at_rpm = np.interp(RPM, rows[:, 0], rows[:, 2])
             right.plot(at, at_rpm, "o", color=color, mec="k", label=f"measured, {speed:g} m/s" if at == 0 else None)
     right.set(xlabel="angle between wind and shaft [deg]", ylabel="thrust [N]", xlim=(0, 180))
-    right.set_title(f"APC 8x4.5MR, {RPM:g} rev/min; band: 1 standard deviation")
+    right.set_title(f"APC 8x4.5MR as drawn, {RPM:g} rev/min\nBand: one standard deviation")
     right.legend(fontsize=8)
     fig.savefig(HERE / "img" / "oblique.png", dpi=110)
 

@@ -15,6 +15,7 @@ from bemt.__main__ import main
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
+from bemt.case.propagate import propagate, solve_known
 from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, Rotors, with_families
 from bemt.rotors.latents import NAMES, Prior, Sensed
@@ -443,6 +444,30 @@ def test_calibrate_rotor_finds_a_turned_blade_and_narrows_what_follows(
         row = json.loads(capsys.readouterr().out)["cases"][0]["rows"][0]
         u[name] = row["u_model"] / row["thrust_N"]
     assert u["known"] < 0.5 * u["drawn"]
+
+
+def test_a_calibrated_rotor_is_solved_with_all_that_its_run_tells(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Thrust in flight that no angle, camber or factor of the blade explains: at the run's own points it is met."""
+    drawn = _case(tmp_path / "drawn")
+    rpm = np.linspace(4000.0, 7000.0, 8)
+    V = np.repeat([0.0, 0.35], 4) * rpm / 60 * 0.254
+    before = propagate(load_case(drawn), rpm, V, bands=False).points
+    thrust = before.thrust_N * np.where(V > 0.0, 0.85, 1.05)
+    run = tmp_path / "run.csv"
+    rows = [f"{n:.0f},{v:.6f},{t:.6f},{q:.6f}" for n, v, t, q in zip(rpm, V, thrust, before.torque_Nm, strict=True)]
+    run.write_text("\n".join(["rpm,airspeed_m_s,thrust_N,torque_Nm", *rows]) + "\n")
+    args = ["calibrate-rotor", str(run), "--case", str(drawn), "--out", str(tmp_path / "known"), "--quiet"]
+    assert main(args) == 0
+    capsys.readouterr()
+    case = load_case(tmp_path / "known")
+    known, banded = (propagate(case, rpm, V, bands=bands).points for bands in (False, True))
+    np.testing.assert_allclose(known.thrust_N, thrust, rtol=0.025)
+    np.testing.assert_array_equal(known.thrust_N, banded.thrust_N)
+    np.testing.assert_allclose(known.power_W, known.torque_Nm * rpm * np.pi / 30.0, rtol=1e-12)
+    grid = solve_known(case, prepare_case(case), rpm, V, np.zeros(8), case.air())
+    np.testing.assert_allclose(grid.thrust_N, known.thrust_N, rtol=1e-9)
 
 
 def test_calibrate_rotor_refuses_a_run_of_another_rotor_or_unit(

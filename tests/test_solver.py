@@ -68,21 +68,21 @@ def test_prandtl_table_is_the_formula() -> None:
     assert np.all(out[-2:, 0] == 1.0)  # off, and not a number, count as far from the edge
 
 
-def test_mass_flow_joins_its_neighbours_smoothly() -> None:
+def test_mass_flow_is_the_measured_curve_of_descent() -> None:
+    """Induced speed v over that of hover at sink rate x, x 1 to 2: the quartic of Leishman (2006), eq. 2.96."""
+
     @njit
     def run(y: float) -> tuple[float, float]:
         return R.mass_flow(y)
 
-    tiny = 1e-12
-    # momentum theory y for windmills, -y for helicopters in descent; one value and one slope where the pieces meet
-    assert run(0.6 - tiny) == pytest.approx((0.6, 1.0), abs=1e-11)
-    assert run(-1.0 + tiny) == pytest.approx((1.0, -1.0), abs=1e-11)
-    assert run(-tiny) == pytest.approx(run(0.0), abs=1e-11)
-    for y in (-0.9, -0.3, 0.1, 0.5):
-        assert (run(y + 1e-6)[0] - run(y - 1e-6)[0]) / 2e-6 == pytest.approx(run(y)[1], abs=1e-8)
-        a = 1.0 - y
-        if y > 0:  # Buhl's thrust coefficient 4 a (1 - a) in place of momentum theory's
-            assert 4.0 * run(y)[0] * a == pytest.approx(8 / 9 - 4 / 9 * a + 14 / 9 * a * a)
+    for x in (1.0, 1.5, 1.7, 1.9, 1.99):
+        v = 1 + 1.125 * x - 1.372 * x**2 + 1.718 * x**3 - 0.655 * x**4
+        y = 1.0 - v / x
+        f, slope = run(y)
+        assert f * x * v == pytest.approx(1.0, rel=1e-4)  # m v = v_h^2
+        assert (run(y + 1e-4)[0] - run(y - 1e-4)[0]) / 2e-4 == pytest.approx(slope, abs=2e-2)
+    for y in (R.Y_BRAKE, 0.55, 0.599, R.Y_RING, -3.0, -1e7):  # momentum theory: windmill state, slow descent, hover
+        assert run(y)[0] == pytest.approx(abs(y), rel=1e-4)
 
 
 def compiled_residual(ducted: bool, layout: str) -> Any:
@@ -142,8 +142,9 @@ def test_slope_of_the_residual(rotor: Rotor, ducted: bool, layout: str, off: str
         if abs((right - g0) - (g0 - left)) > 1e-3 * h * (abs(slope) + UT):
             continue
         scale = 1.0 if ducted else UT + abs(V)
-        assert (right - left) / (2 * h) == pytest.approx(slope, rel=2e-5, abs=2e-5 * scale), (k, Omega, V, phi)
         y = math.sin(phi) * (UT * math.cos(phi) + V * math.sin(phi)) / V if V else math.inf
+        close = 2e-5 if ducted or y > 0.6 else 2e-4  # the curve of descent is a table, linear between its rows
+        assert (right - left) / (2 * h) == pytest.approx(slope, rel=close, abs=close * scale), (k, Omega, V, phi)
         zones.add((y > 0.6) + 2 * (y < -1))
     assert zones == {0, 1, 2}
 
@@ -249,7 +250,7 @@ def test_momentum_and_blade_agree_at_every_station(rotor: Rotor, polar: Polar, s
     s = solver.solve(prep, 6000.0, V, AIR, radial=True)
     r, dr = s.radial, prep.st[:, 1]
     y = r["w"] / np.where(s.V == 0.0, 1e-9, s.V)[:, None]
-    momentum = (y > 0.62) | (y < -1.05)
+    momentum = y > 0.62
     assert momentum.mean() > 0.8
     ring = 2.0 * AIR.rho * 2.0 * np.pi * r["r"] * dr * r["F"] * np.abs(r["w"])
     size = np.abs(r["dT"]).max()

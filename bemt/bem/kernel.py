@@ -35,6 +35,8 @@ from bemt.bem.residual import (
     N_STREAM,
     N_SWIRL,
     N_WAKE,
+    Y_BRAKE,
+    Y_RING,
     ducted_rotor,
     jet_speed,
     lookup_factored,
@@ -322,7 +324,7 @@ def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
                     reversed_ += 1 if axial < 0.0 else 0
                 elif fx[N_BRIDGE] > 0.0 and UP != 0.0:
                     y = s * (UT * c + UP * s) / UP
-                    bridged += 1 if -1.0 < y < 0.6 else 0
+                    bridged += 1 if Y_RING < y < Y_BRAKE else 0
                 # the drag term of W's denominator exceeds the rest of it
                 stagnant += 1 if swirl and w[_SG4 + k] * cd > F * abs(s) else 0
             if radial.shape[0] == n:

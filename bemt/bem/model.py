@@ -197,15 +197,16 @@ class Model:
     ) -> Dataset:
         """Solve operating points; ``V`` [m/s] along the shaft, ``side`` [m/s] in the plane of the disk.
 
-        With any ``side``, the airspeed of the result (and J) is that of the wind, ``sideslip_rad`` its angle to the
-        shaft, and the loads of the hub are added: ``H_force_N`` downstream, ``Y_force_N`` to the advancing side,
-        ``roll_moment_Nm`` lifting the advancing side, ``pitch_moment_Nm`` lifting the upstream side.
+        With any ``side``, the airspeed of the result (and J) is that of the wind and ``sideslip_rad`` its angle to the
+        shaft; ``eta`` is T V cos(angle) / P, with the speed along the shaft. The loads of the hub are added:
+        ``H_force_N`` downstream, ``Y_force_N`` to the advancing side, ``roll_moment_Nm`` lifting the advancing side,
+        ``pitch_moment_Nm`` lifting the upstream side.
         """
         air = Air.from_density() if air is None else air
         s = solver.solve(self.prep, rpm, V, air, threads=threads, side=side)
         n, D = s.rpm / 60.0, self.diameter_m
         rho, mu, a = (np.broadcast_to(np.asarray(getattr(air, k), float), n.shape) for k in ("rho", "mu", "a_sound"))
-        T, Q, T_duct, T_rotor, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.flags
+        T, Q, T_duct, T_rotor, T_stator, V_exit, flags = s.T, s.Q, s.T_duct, s.T_rotor, s.T_stator, s.V_exit, s.flags
         if self._on_points:
             base = self.prepared([e for e in self.effects if not acts_on_points(e)])
             loads, _, ok = respond(self.prepared, self.effects, flow_of(base, s.rpm, s.V, air, side=s.side))
@@ -216,19 +217,24 @@ class Model:
             flags = tuple((*f, *more[int(not good)]) for f, good in zip(s.flags, ok, strict=True))
         if self.learned is not None:
             change = self.learned(s.J, np.asarray(co.Re75(self.chord75_m, n, D, 0.0, rho, mu)))
-            more_T = np.asarray(co.thrust(change[0], rho, n, D))
-            T, T_rotor = T + more_T, T_rotor + more_T
+            T, drawn = T + np.asarray(co.thrust(change[0], rho, n, D)), T
             Q = Q + np.asarray(co.power(change[1], rho, n, D)) / (2.0 * np.pi * n)
+            # rotor, duct and stator share it, and the jet by momentum
+            with np.errstate(divide="ignore", invalid="ignore"):
+                grown = T / drawn
+                faster = (V_exit - s.V) / (2.0 * V_exit - s.V) * V_exit * (grown - 1.0)
+            T_rotor, T_duct, T_stator = (v * grown for v in (T_rotor, T_duct, T_stator))
+            V_exit = np.where(np.isfinite(faster), V_exit + faster, V_exit)
         wind = s.V if s.side is None else np.hypot(s.V, s.side)
         CT, CQ, J = co.CT(T, rho, n, D), co.CQ(Q, rho, n, D), s.J if s.side is None else wind / (n * D)
         CP = 2.0 * np.pi * np.asarray(CQ)
         share = np.divide(T_duct, T, out=np.full_like(T, np.nan), where=T != 0.0)
         values = {
             "rpm": s.rpm, "airspeed_m_s": wind, "density_kg_m3": rho, "thrust_N": T, "torque_Nm": Q,
-            "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(J, CT, CP),
+            "power_W": Q * (s.rpm * (math.pi / 30.0)), "CT": CT, "CP": CP, "J": J, "eta": co.eta(s.J, CT, CP),
             "M_tip": co.M_tip(n, D, a), "Re75": co.Re75(self.chord75_m, n, D, wind, rho, mu),
-            "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": s.T_stator,
-            "exhaust_speed_m_s": s.V_exit, "mass_flow_kg_s": s.mass_flow, "duct_share": share,
+            "rotor_thrust_N": T_rotor, "duct_thrust_N": T_duct, "stator_thrust_N": T_stator,
+            "exhaust_speed_m_s": V_exit, "mass_flow_kg_s": s.mass_flow, "duct_share": share,
         }  # fmt: skip
         if s.side is not None and s.hub is not None:
             values["sideslip_rad"] = np.arctan2(s.side, s.V)

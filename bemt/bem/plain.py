@@ -8,7 +8,7 @@ References
 .. [1] H. Glauert, "Airplane Propellers", in Durand, Aerodynamic Theory IV, 1935, ch. VII.
 .. [2] S. A. Ning, "A simple solution method for the blade element momentum equations with guaranteed convergence", Wind
        Energy 17:1327, 2014, doi:10.1002/we.1636: one residual in phi; eq. 4-6 for the loss factors.
-.. [3] M. L. Buhl, NREL/TP-500-36834, 2005, eq. 18: the turbulent windmill state.
+.. [3] J. G. Leishman, Principles of Helicopter Aerodynamics, 2nd ed., 2006, eq. 2.96 (not checked): descent.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bemt.bem.residual import Y_BRAKE
 
 __all__ = ["PlainBlade", "PlainLoads", "solve_plain"]
 
@@ -55,13 +57,17 @@ def prandtl(f: Array) -> Array:
 def mass_flow(y: Array) -> Array:
     """Mass flow per area over ``rho |V|`` for ``y = w / V`` (w: axial speed through the disk).
 
-    Momentum theory gives abs(y). Where it fails, between y = 0.6 and -1: Buhl's line [3] down to 0, then a cubic that
-    meets the helicopter branch (own choice).
+    Momentum theory gives abs(y). It fails between the vortex-ring state and the windmill state (y = 0.488), where the
+    measured curve [3] takes over, from a sink rate of 0.45 to 1 times the induced speed of hover step by step.
     """
-    a = np.clip(1.0 - y, 0.4, None)
-    buhl = 2.0 / (9.0 * a) - 1.0 / 9.0 + 7.0 / 18.0 * a
-    bridge = (3.0 - y + y**2 - y**3) / 6.0
-    return np.where((y > -1.0) & (y < 0.6), np.where(y >= 0.0, buhl, bridge), np.abs(y))
+    x = np.linspace(0.0, 2.01, 20101)  # sink rate, v: induced speed, over the induced speed of hover
+    v = np.polynomial.polynomial.polyval(x, [1.0, 1.125, -1.372, 1.718, -0.655])
+    s = 1.0 / np.maximum(1.0 - y, 0.4)
+    first, last = 0.45 / (0.225 + np.sqrt(0.225**2 + 1.0)), 1.0 / v[10000]
+    b = np.clip((s - first) / (last - first), 0.0, 1.0)
+    b = b**2 * (3.0 - 2.0 * b)
+    curve = (1.0 - y) * ((1.0 - b) * np.abs(s - 1.0) + b * np.interp(s, x / v, v**-2.0))
+    return np.where(y < Y_BRAKE, curve, np.abs(y))
 
 
 def solve_plain(

@@ -14,8 +14,8 @@ and elimination of W leaves a residual without a singularity at hover (Ning 2014
     g(phi) = F M (UT sin(phi) - UP cos(phi)) - sigma/4 (cn UT + ct UP),    M = m / W
 
 In the propeller and windmill state M = abs(sin(phi)); from the turbulent windmill state (axial induction factor of a
-turbine above 0.4) through descent near hover, M follows the bridge of :func:`mass_flow`.  With ``U`` and ``phi_in``
-the size and direction of the onset flow and ``psi = phi - phi_in``::
+turbine above 0.5) through the vortex-ring state, M follows the measured curve of :func:`mass_flow`.  With ``U`` and
+``phi_in`` the size and direction of the onset flow and ``psi = phi - phi_in``::
 
     g / U = (F M + sigma/4 cd) sin(psi) - sigma/4 cl cos(psi)
     W     = U cos(psi) / (1 + sigma cd / (4 F M))
@@ -101,21 +101,51 @@ def loss(u):
     return ((a * t + b) * t + m0) * t + f0, ((3.0 * a * t + 2.0 * b) * t + m0) * _U_INV
 
 
+# Induced speed over that of hover at the same thrust, over the sink rate likewise, as measured: Leishman (2006),
+# Principles of Helicopter Aerodynamics, 2nd ed., eq. 2.96 with kappa = 1 (from memory, not checked).
+_DESCENT = (1.0, 1.125, -1.372, 1.718, -0.655)
+_S_STEP = 1e-3
+# Momentum theory holds to a sink rate of x = 0.45, where the vortex ring begins (Johnson 2005, NASA/TP-2005-213477,
+# p. 24); from there to x = 1 it passes to the curve (own choice). A wall below acts as such a slow descent.
+_S_RING = 0.45 / (0.225 + math.sqrt(0.225**2 + 1.0))
+
+
+def _mass_table() -> tuple[Any, float]:
+    """Mass flow in descent over the induced speed, over s = abs(UP) / v, and the s where momentum theory takes over."""
+    x = np.linspace(0.0, 2.01, 20101)
+    v = np.polynomial.polynomial.polyval(x, _DESCENT)
+    s, share = x / v, v**-2.0
+    end = float(np.interp(0.0, (s - 1.0 - share)[20000:], s[20000:]))  # the windmill state has m = abs(UP) - v
+    at = np.arange(2503) * _S_STEP
+    b = np.clip((at - _S_RING) / (float(np.interp(1.0, x, s)) - _S_RING), 0.0, 1.0)
+    b = b * b * (3.0 - 2.0 * b)
+    ring = (1.0 - b) * np.abs(at - 1.0) + b * np.interp(at, s, share)
+    return np.where(at < end, ring, at - 1.0), end
+
+
+_MASS, _S_BRAKE = _mass_table()
+Y_BRAKE = 1.0 - 1.0 / _S_BRAKE
+Y_RING = 1.0 - 1.0 / _S_RING
+
+
 @inlined
 def mass_flow(y):
-    """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` between -1 and 0.6, and its derivative.
+    """Mass flow per area over ``rho |UP|`` for ``y = w / UP`` up to 0.6, and its derivative.
 
-    ``y >= 0``: Buhl (2005), NREL/TP-500-36834, eq. 18 with F = 1, CT = 8/9 - 4/9 a + 14/9 a^2 with a = 1 - y, tangent
-    to momentum theory (``y`` itself) at y = 0.6.  ``y < 0``: cubic bridge to the helicopter branch ``-y``, which it
-    meets at y = -1 (own choice, C1 at both ends; vortex-ring state, flagged by the solver).
+    The measured curve of helicopter rotors in descent, from the vortex-ring state (y = -1.8) to the windmill state
+    (y = 0.488), and momentum theory on both sides, hover being y at minus infinity.  As ``m v`` is the square of the
+    induced speed in hover, ``m = v / x_v^2``, with ``v = w - UP`` and x_v = v over that speed.  A propeller that brakes
+    in wind from the front is the mirror image of a rotor in descent.
     """
     a = 1.0 - y
-    a = a if a > 0.4 else 0.4
-    t = -y
-    i_a = 1.0 / a
-    f = 2.0 / 9.0 * i_a - 1.0 / 9.0 + 7.0 / 18.0 * a if y >= 0.0 else (((t + 1.0) * t + 1.0) * t + 3.0) * (1.0 / 6.0)
-    df = 2.0 / 9.0 * i_a * i_a - 7.0 / 18.0 if y >= 0.0 else -((3.0 * t + 2.0) * t + 1.0) * (1.0 / 6.0)
-    return f, df
+    i_a = 1.0 / (a if a > 0.4 else 0.4)
+    x = i_a * (1.0 / _S_STEP)
+    i = np.int32(x)
+    k = np.uint64(i)
+    g = _MASS[k]
+    dg = _MASS[k + np.uint64(1)] - g
+    g += (x - i) * dg
+    return g * a, dg * (1.0 / _S_STEP) * i_a - g
 
 
 @inlined
@@ -318,7 +348,7 @@ def open_rotor(lookup, phi, UT, UP, i_UP, beta, sg4, tip, hub, lre0, base, tab, 
     F = Ft * Fh
     dF = dFt * Fh + Ft * dFh
     y = w0 * i_UP
-    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y > -1.0 and y < 0.6
+    zone = fx[N_BRIDGE] > 0.0 and i_UP != 0.0 and y < 0.6 and y > Y_RING
     f, df = mass_flow(y)
     m = abs(UP) * (ss * i_w)
     M = f * m if zone else sa

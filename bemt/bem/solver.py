@@ -77,6 +77,8 @@ class Prepared:
     num, grid : (13,), (17,) float
         Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and
         :mod:`bemt.bem.kernel` [SI units].
+    cone : float or None
+        Coning angle of blades on flapping hinges; None: stiff blades [rad].
     """
 
     rotor: Rotor
@@ -88,6 +90,7 @@ class Prepared:
     axes: tuple[int, int]
     num: Array
     grid: Array
+    cone: float | None = None
 
     @property
     def D(self) -> float:
@@ -278,7 +281,8 @@ def prepare(
         bake.spread()  # nothing to save
     num = _numbers(bake, duct)
     st, tab, grid = arrays.pack_stations(bake, num), arrays.pack_tables(bake), arrays.pack_grid(bake)
-    return Prepared(rotor, s, eff, duct, st, tab, (M2.size, Re.size), num, grid)
+    cone = None if math.isnan(bake.num.cone) else bake.num.cone
+    return Prepared(rotor, s, eff, duct, st, tab, (M2.size, Re.size), num, grid, cone)
 
 
 def _blended(w: Array, tables: Array) -> Array:
@@ -430,7 +434,11 @@ def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side:
     points[:, K.P_OMEGA] *= _RAD_PER_RPM
     entry, st, tab, par = prep.kernel
     out, rad = np.empty((n, K.N_OUT)), np.empty((n, 0, K.N_RADIAL))
-    out[skew], hub_, disk_ = oblique.run(prep.layout, points[skew], st, tab, par, prep.rotor.R, disk=radial)
+    given = prep.layout, points[skew], st, tab, par, prep.rotor.R
+    if prep.cone is None:
+        out[skew], hub_, disk_ = oblique.run(*given, disk=radial)
+    else:
+        out[skew], hub_, disk_ = oblique.flap(*given, prep.cone, disk=radial)
     if not np.all(skew):
         rest = np.ascontiguousarray(points[~skew, : K.N_POINT])
         part = np.empty((rest.shape[0], K.N_OUT))

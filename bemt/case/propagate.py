@@ -26,7 +26,7 @@ from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import zero_thrust
-from bemt.rotors.validity import Validity
+from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -34,7 +34,17 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = ["BANDED", "Moved", "Points", "Propagated", "propagate", "solve_at", "spread", "validity_of", "vary"]
+__all__ = [
+    "BANDED",
+    "Moved",
+    "Points",
+    "Propagated",
+    "propagate",
+    "solve_at",
+    "spread",
+    "validity_of",
+    "vary",
+]
 
 Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
@@ -45,7 +55,7 @@ BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_
 
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
-_UNMEASURED = "oblique flow: the model's own error is that of axial flow at the speed along the shaft"
+_UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +106,8 @@ def solve_at(
 ) -> Dataset:
     """A model at points (P,) with their angle between wind and shaft [deg].
 
-    With any angle, airspeed and J are those given, and the loads of the hub are there, 0 in axial flow.
+    With any angle, airspeed and J are those given, eta is T V cos(angle) / P, and the loads of the hub are there, 0 in
+    axial flow.
     """
     if not np.any(angle_deg):
         return model.solve(rpm, airspeed_m_s, air, threads)
@@ -104,8 +115,8 @@ def solve_at(
     found = model.solve(rpm, along, air, threads, side)
     J = np.asarray(co.J(airspeed_m_s, found.rpm / 60.0, model.diameter_m))
     none = dict.fromkeys(HUB_LOADS, np.where(found.converged, 0.0, np.nan))
-    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(J, found.CT, found.CP),
-           "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
+    own = {"airspeed_m_s": airspeed_m_s, "J": J, "eta": co.eta(along / (found.rpm / 60.0) / model.diameter_m,
+           found.CT, found.CP), "sideslip_rad": np.arctan2(side, along)}  # fmt: skip
     return replace(found, values={**none, **found.values, **own})
 
 
@@ -223,8 +234,9 @@ def propagate(
 ) -> Propagated:  # fmt: skip
     """Solve a case at points [rev/min], [m/s], [kg/m3], by default its own, with bands and flags.
 
-    ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. No measured rotor tells of the
-    solver's error in oblique flow: its band is that of axial flow at the speed along the shaft, and the point flagged.
+    ``angle_deg`` is that between wind and shaft, 0 to 180; ducted rotors know 0 only. In oblique flow the model's own
+    error is that of axial flow at the speed along the shaft and a share of what the side wind changes
+    (:func:`bemt.rotors.validity.aside`); the point is flagged.
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
@@ -280,7 +292,11 @@ def propagate(
         narrow, wide = error.widths()
     else:
         widths = model_error(case, model, beside, points.conditions(case)[2])
-        narrow, wide = (loads_of(found, model.diameter_m, factor * u) for u in widths)
+        more = _aside(case, model, found, beside)
+        narrow, wide = (
+            loads_of(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
+            for u, times in zip(widths, (1.0, 2.0), strict=True)
+        )
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
@@ -304,6 +320,17 @@ def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Ar
     found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
     return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
+
+
+def _aside(case: Case, model: Model, found: Dataset, axial: Dataset) -> Array:
+    """Standard deviation that wind from the side and descent add, (2, P) of CT and CP."""
+    loads, along = np.array([found.CT, found.CP]), np.array([axial.CT, axial.CP])
+    if case.ducted:
+        return np.zeros_like(loads)
+    area = np.pi * model.rotor.R**2
+    hover = np.sqrt(np.abs(found.thrust_N) / (2.0 * found.density_kg_m3 * area))
+    sink = np.divide(-axial.airspeed_m_s, hover, out=np.zeros_like(hover), where=hover > 0.0)
+    return aside(loads, along, sink)
 
 
 def _zero_thrust_J(case: Case) -> float:
@@ -334,7 +361,7 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
     return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
 
 
-def loads_of(points: Dataset, D: float, u: Array) -> dict[str, Array]:
+def loads_of(points: Dataset, D: float, u: Array, J_axial: Array | None = None) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
@@ -346,7 +373,7 @@ def loads_of(points: Dataset, D: float, u: Array) -> dict[str, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = power / (2.0 * np.pi * n)
         exhaust = np.abs((exit_speed - V) / (2.0 * exit_speed - V) * exit_speed * thrust / points.thrust_N)
-        eta = np.hypot(points.J * u[0], points.eta * u[1]) / np.abs(points.CP)
+        eta = np.hypot((points.J if J_axial is None else J_axial) * u[0], points.eta * u[1]) / np.abs(points.CP)
     return {
         "thrust_N": thrust, "torque_Nm": torque, "power_W": power, "CT": u[0], "CP": u[1],
         "eta": np.where(np.isfinite(eta), eta, np.nan), "duct_share": np.zeros_like(V),

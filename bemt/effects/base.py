@@ -104,6 +104,8 @@ class KernelNumbers:
         Ducted rotor: share of the open tip loss, 0 (sealed) to 1 [1].
     gap_loss : float
         Ducted rotor: share of the blade force lost through the gap [1].
+    cone : float
+        Coning angle of blades on flapping hinges, NaN: stiff blades [rad].
     """
 
     tip: float = 0.0
@@ -113,6 +115,7 @@ class KernelNumbers:
     bridge: float = 0.0
     gap_share: float = 0.0
     gap_loss: float = 0.0
+    cone: float = float("nan")
 
 
 @dataclass(slots=True)

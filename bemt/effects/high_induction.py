@@ -13,8 +13,10 @@ class HighInduction(Effect):
 
     Notes
     -----
-    Buhl (2005), NREL/TP-500-36834, eq. 18 between turbine induction 0.4 and 1, continued to descent by a C1 bridge of
-    our own (see :func:`bemt.bem.residual.mass_flow`). Never acts in normal propeller operation.
+    From the vortex-ring state to the windmill state of a rotor in descent the disk follows the induced velocity
+    measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, eq. 2.96 (not
+    checked; :func:`bemt.bem.residual.mass_flow`), and so does its mirror image, a propeller that brakes in wind from
+    the front. Never acts in normal propeller operation.
     """
 
     id = "high_induction"

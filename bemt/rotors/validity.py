@@ -12,6 +12,12 @@ from the data, each departure adding its own part, with no step at the edge:
 * tip Mach number: standard deviation linear from `FREE_MACH`, twice as large at the speed of sound. From tip Mach 0.43
   to 0.88 the solver drifts from the CT of Caradonna and Tung (NASA TM 81232) by 3 to 14 %; next to 6 % that is a factor
   of 1.7, and this rule gives 1.76.
+* wind from the side: a share of what it changes, by analogy with the one rotor measured in it whose blades are known
+  (PCA-2, NACA Report 515, pitch 1.9 deg, advance ratio 0.14 to 0.55): thrust is off by 12 % of that change rms,
+  and torque by half of it, as far as friction is not known. Two stiff blades are not four hinged ones: thrust counts
+  twice. Not a factor: a part of its own.
+* descent: an eighth of the thrust from the induced speed of hover on, less before; Castles and Gray (NACA TN 2474,
+  constant chord) are 8 % rms off up to 0.45 of that speed, 13 % from there to 1.6 and 12 % beyond.
 * a duct: a factor of 1.5. X-22A is within 7 % in CT and 10 % in CP, nozzle 19A within 3 and 48 %, a 76 mm fan 18 %.
 """
 
@@ -36,6 +42,10 @@ where the Prandtl-Glauert factor is 8 % and in the solver [1]."""
 LENGTH_X = 0.34
 """Length over J/J0 on which the residual forgets itself: fitted to 89 propellers with the residual written over it; the
 7 deg of today's, over the angle of attack, are the same on a usual blade [1]."""
+SIDE = (0.25, 0.5)
+"""Error of CT and CP over what wind from the side changes [1]."""
+SINK = 0.125
+"""Error of CT and CP in descent over their size [1]."""
 SAID = 1.01
 """Smallest factor that a single departure is named for [1]."""
 DOUBTFUL = 2.5
@@ -173,6 +183,15 @@ class Validity:
             words = f"{OUTSIDE}: {', '.join(why)}: model error times {factor[i]:.3g}{doubt}"
             said[i] = (words,)
         return np.asarray(factor, dtype=float), tuple(said)
+
+
+def aside(loads: Array, axial: Array, sink: Array) -> Array:
+    """Standard deviation that wind from the side and descent add to the model's own, (2, P) of CT and CP [1].
+
+    ``axial`` (2, P) are the coefficients without the wind from the side, ``sink`` (P,) is the speed of descent over
+    the induced speed of hover at this thrust, 0 in climb [1].
+    """
+    return np.asarray(np.hypot(np.array(SIDE)[:, None] * (loads - axial), SINK * np.clip(sink, 0.0, 1.0) * loads))
 
 
 def _folds(value: ArrayLike, known: tuple[float, float]) -> Array:
