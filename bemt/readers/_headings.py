@@ -360,7 +360,8 @@ def _unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
     return (found, "") if isinstance(found, units.Unit) and found.dimension == dimension else None
 
 
-_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?\W*(?:c ?[tpq])?\W*|(adv(?:ance|\.)? ratio)(?:\W*j)?\W*")
+_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
+_LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 
 
 def _by_words(text: str) -> Heading | None:
@@ -368,14 +369,20 @@ def _by_words(text: str) -> Heading | None:
     bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
     if not re.search(r"[\s_(\[/]", bare):
         bare = re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", bare)  # thrustGrams
-    if found := _COEFFICIENT.fullmatch(re.sub(r"[(\[] ?-? ?[)\]]", "", plain(bare))):
-        return Heading(text, "J" if found[2] else f"C{ {'thrust': 'T', 'power': 'P', 'torque': 'Q'}[found[1]] }", units.Unit("", "none", 1.0))
+    words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
+    if found := _COEFFICIENT.fullmatch(" ".join(words)):
+        return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
+    if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(unit := unit_of(bare[1:].strip(" ()[]")), units.Unit):
+        if unit.dimension == "time":
+            return Heading(text, "time_s", unit)
     for base, unit in _splits(bare):
         words = english(base)
         for name, dimension in quantities(words):
             if not unit:
                 if name == "rpm" and "rpm" in words:
                     return Heading(text, "rpm", units.UNITS["rpm"])
+                if set(words) == {"throttle"}:
+                    return Heading(text, "throttle", units.Unit("", "none", 1.0))
                 continue
             if (goes := _unit_for(dimension, unit)) is None:
                 continue

@@ -17,6 +17,7 @@ from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
+from bemt.readers._words import english, quantities
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
@@ -30,6 +31,14 @@ MISFIT_SHARE = 0.05
 """Share of lines of another length from which a file is refused."""
 _COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:([,. '\u2019\u00a0\u202f])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+"""Digits in groups of three."""
+_SUMMARY = re.compile(
+    r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe|moyenne"
+    r"|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
+    re.IGNORECASE,
+)
+"""First cells of rows that sum up the others."""
 _EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -74,6 +83,8 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
     empty = 0
     for i, cell in enumerate(cells):
         value = number(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
+        if value is None and cell:
+            value = _ungrouped(cell, decimal)
         if value is not None:
             values[i] = value
         elif cell.lower() in NO_VALUE:
@@ -81,6 +92,20 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
         else:
             bad.append(i)
     return values, bad, empty
+
+
+def _ungrouped(cell: str, decimal: str) -> float | None:
+    """Number whose digits are in groups of three, where the marks leave one reading.
+
+    >>> _ungrouped("1 234,5", ","), _ungrouped("1,234.5", "."), _ungrouped("1,234", ".")
+    (1234.5, 1234.5, None)
+    """
+    grouped = _GROUPED.fullmatch(cell)
+    if not grouped or grouped[1] == decimal:
+        return None
+    bare = cell.replace(grouped[1], "")
+    alone = grouped[1] in ",." and bare.lstrip("+-").isdigit() and cell.count(grouped[1]) == 1
+    return None if alone and decimal == "." else number(bare.replace(",", "."))
 
 
 def split_line(line: str, mark: str) -> list[str]:
@@ -145,7 +170,49 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
         rows = all(len(cells) == width and any(number(c) is not None for c in cells) for cells in body)
         if said and rows and not _is_units(names):
             return start, mark
-    return 0, find_delimiter(lines[:5])
+    usual = find_delimiter(lines[:5])
+    return _below_a_block(lines, usual) or (0, usual)
+
+
+def _reads(cell: str) -> bool:
+    """Whether a cell is a number, in whatever way it is written."""
+    return number(cell) is not None or bool(cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell)))
+
+
+def with_unit(cell: str) -> tuple[str, str] | None:
+    """Number and unit of a cell that holds both, such as ``50 %`` or ``11.0V``."""
+    found = re.fullmatch(r"([+-]?\d[\d.,]*)\s*([^\W\d_][^\s\d]{0,7}|%|\u00b0[CF])", cell)
+    return (found[1], found[2]) if found and unit_of(found[2]) != "" else None
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    numbers, full = sum(map(_reads, cells)), sum(map(bool, cells))
+    return numbers >= 2 and 2 * numbers >= full
+
+
+def _named(cells: Sequence[str]) -> float:
+    """Share of headings that are words of a quantity."""
+    full = [cell for cell in cells if cell]
+    return sum(bool(quantities(english(re.split(r"[(\[]", cell)[0]))) for cell in full) / max(len(full), 1)
+
+
+def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
+    """Headings right above the first two rows of numbers, below titles that are as wide as the table; None: as usual."""
+    for mark in dict.fromkeys((usual, *DELIMITERS)):
+        split = [split_line(line, mark) for line in lines]
+        first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
+        if not first:
+            continue
+        wide = max(2.0, 0.6 * sum(map(bool, split[first])))
+        top = first
+        while top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4:
+            top -= 1
+        told = [k for k in range(top, first) if not _is_units(split[k])]
+        while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
+            del told[0]
+        if told:
+            return told[0], mark
+    return None
 
 
 def decimal_mark(table: SplitTable) -> str:
@@ -157,6 +224,36 @@ def decimal_mark(table: SplitTable) -> str:
     pointed = any("." in cell and number(cell) is not None for cell in cells)
     plain = all(_COMMA.fullmatch(cell) for cell in commas)
     return "," if plain and not pointed and any(not _THOUSANDS.fullmatch(cell) for cell in commas) else "."
+
+
+def _in_a_comment(lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str) -> tuple[int, list[str]] | None:
+    """Headings in the comment right above the first row of numbers."""
+    at, cells = split[0]
+    above = lines[at - 2] if at > 1 else ""
+    if not _is_row(cells) or not above.lstrip().startswith(("#", "%")):
+        return None
+    names = split_line(re.sub(r"^\s*[#%]+[ \t]*(?=\w)|^\s*[#%]", "", above), mark)
+    return (at - 1, names) if len(names) == len(cells) and not any(map(_reads, names)) else None
+
+
+def _without_ends(
+    body: list[tuple[int, list[str]]], names: Sequence[str], notes: list[str]
+) -> list[tuple[int, list[str]]]:
+    """Rows without headings that come again, sums of the rows above, and remarks at the end; each is named in a note."""
+    again = [i for i, cells in body if cells == list(names)]
+    sums = [(i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))]
+    out = {*again, *(i for i, _ in sums)}
+    kept = [(i, cells) for i, cells in body if i not in out]
+    ends: list[tuple[int, list[str]]] = []
+    while len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3):
+        ends.append(kept.pop())
+    if again:
+        notes.append(f"the headings again in line {some(again)}: left out")
+    if sums:
+        notes.append(f"rows that sum up others left out: {some((f'{word!r} in line {i}' for i, word in sums), 3)}")
+    if ends:
+        notes.append(f"remarks at the end left out: {some((repr(' '.join(filter(None, c))[:60]) for _, c in ends[::-1]), 3)}")
+    return kept
 
 
 def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
@@ -179,20 +276,37 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     if any(len(t) > 100_000 for _, t in used):
         raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
     split = [(i, split_line(t, mark)) for i, t in used]
+    if header is None and (said := _in_a_comment(lines, split, mark)):
+        split.insert(0, said)
+        notes[0] = f"{comments - 1} comment lines left out" if comments > 1 else f"the headings are the comment in line {said[0]}"
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)
+    if header and mark == " " and len(split) > 1 and len(first) != len(split[1][1]):
+        apart = re.split(r"\s{2,}|\t", next(t for i, t in used if i == split[0][0]).strip())
+        first = apart if len(apart) == len(split[1][1]) else first
     width = len(first)
     while header and width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
         width -= 1
     if not header:
         width = max((len(c) for _, c in split[:2]), default=width)
-    if header and len(split) > 2 and _is_units(split[1][1]):
-        stated = [*split[1][1], *[""] * width]
-        stated = [unit.strip("-()[]") for unit in stated]
-        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
-        notes.append(f"line {split[1][0]} holds units")
+    while header and len(split) > 2:
+        below = split[1][1]
+        if _is_units(below):
+            stated = [unit.strip("-()[]") for unit in [*below, *[""] * width]]
+            first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
+            notes.append(f"line {split[1][0]} holds units")
+        elif not any(map(_reads, below)) and sum(map(bool, below)) >= max(2.0, 0.6 * width) and _named(below) >= 0.5:
+            first = [" ".join(filter(None, pair)) for pair in zip(first, [*below, *[""] * width], strict=False)]
+            notes.append(f"line {split[1][0]} holds more headings")
+        else:
+            break
         del split[1]
+    if header:
+        split = [split[0], *_without_ends(split[1:], split[0][1], notes)]
+        usual = {len(c) for _, c in split[1:]}
+        if len(usual) == 1 and (most := usual.pop()) < width and len(split) > 2:  # columns that no row fills
+            split = [split[0], *((i, [*c, *[""] * (width - most)]) for i, c in split[1:])]
     rows: list[tuple[str, ...]] = []
     faults: list[Fault] = []
     misfits: list[int] = []

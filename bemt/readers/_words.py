@@ -53,7 +53,8 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "propeller": "luftschraube helice elica propulseur 螺旋桨 桨 prop props",
     "motor": "moteur 电机 电机 馬達 двигатель engine",
     "battery": "akku batterie bateria batteria 电池 batt bat vbat pack",
-    "battery voltage": "akkuspannung batteriespannung vbatt",
+    "battery voltage": "akkuspannung batteriespannung vbatt vbat vin v~in v~bat v~batt u~bat",
+    "battery current": "ibat i~bat i~in i~batt akkustrom batteriestrom",
     "motor rotation speed": "motordrehzahl",
     "propeller rotation speed": "propellerdrehzahl luftschraubendrehzahl rotordrehzahl",
     "static": "statisch statique estatico estatica statico statica 静态",
@@ -61,19 +62,28 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "ambient": "umgebung ambiant ambiante ambiente ambientale 环境 環境 室 room lab laboratory outside outdoor amb "
     "atmospheric atmosphere atm atmospherique atmosferica atmosferico barometric environment environmental inf",
     "air": "luft aire aria 空气 空氣 大气",
+    "thrust coefficient": "schubbeiwert schubkoeffizient coefficient~de~poussee coefficient~de~traction coeficiente~de~empuje "
+    "coeficiente~de~traccion coefficiente~di~spinta 推力系数 拉力系数",
+    "power coefficient": "leistungsbeiwert leistungskoeffizient coefficient~de~puissance coeficiente~de~potencia "
+    "coefficiente~di~potenza 功率系数",
+    "torque coefficient": "drehmomentbeiwert momentenbeiwert coefficient~de~couple coeficiente~de~par 扭矩系数",
+    "advance ratio": "rapport~d~avancement parametre~d~avancement parametre~avancement rapport~avancement parametro~de~avance "
+    "rapporto~di~avanzamento 前进比 进速系数",
     "of": "de des du del della dell la le di da en do der die das the",
 }  # fmt: skip
 _PLAIN: dict[str, str] = {}
 for _english, _others in _ABROAD.items():
     _PLAIN.update(dict.fromkeys((word.replace("~", " ") for word in _others.split()), _english))
 _ASIAN = sorted((w for w in _PLAIN if not re.search(r"[a-zA-Zа-яρ∞]", w)), key=len, reverse=True)
+FOREIGN = frozenset(w for w in _PLAIN if len(w) > 1 and re.search(r"[а-я\u3000-\u9fff]", w) and w not in {"om", "ток"})
+"""Words that tell a code of characters."""
 _LONGEST = max(len(word.split()) for word in _PLAIN)
 
 _NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "value", "actual", "raw", "reading"}
 _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, its own words, words that change nothing
     "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
     "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
-    "voltage": ("voltage", {"voltage"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
+    "voltage": ("voltage", {"voltage", "v"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
     "current": ("current", {"current"}, {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
     "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"}),
     "mechanical power": ("power", {"power"}, {"mechanical", "shaft", "output", "propeller", "rotor"}),
@@ -81,7 +91,7 @@ _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, it
     "time": ("time", {"time"}, {"elapsed", "test", "since", "start", "boot", "t"}),
     "throttle": ("fraction", {"throttle", "command", "setting", "duty", "pwm"}, {"motor", "power", "cycle", "esc", "input", "position", "signal"}),
     "pulse width": ("time", {"pulse", "pwm", "esc", "signal", "throttle"}, {"width", "servo", "input", "command", "motor"}),
-    "rpm": ("angular_speed", {"rotation", "rpm"}, {"speed", "propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
+    "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"}, {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
     "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream"},
                  {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"}),
     "temperature": ("temperature", {"temperature"}, {"ambient", "air", "tunnel", "inlet"}),
@@ -105,7 +115,7 @@ def english(text: str) -> list[str]:
     >>> english("Velocidad del viento"), english("环境温度"), english("Schub / Thrust")
     (['airspeed'], ['ambient', 'temperature'], ['thrust', 'thrust'])
     """
-    text = re.sub(r"\b[dl]['\u2019]", "", unicodedata.normalize("NFC", plain(text)))
+    text = re.sub(r"\b(a )?[dl]['\u2019]", "", unicodedata.normalize("NFC", plain(text)))
     for word in _ASIAN:
         if word in text:
             text = text.replace(word, f" {_PLAIN[word]} ")
