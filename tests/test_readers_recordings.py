@@ -453,9 +453,12 @@ def test_a_line_of_units_below_the_headings_counts(write: Write) -> None:
     assert np.allclose(got["thrust_N"], units.KGF * np.arange(9)) and said(got, "line 2 holds units")
 
 
-def test_units_inside_cells_are_not_stripped(write: Write) -> None:
-    got = importers.read(write("time_s,U\n" + "".join(f"{k},{11 + k / 10} V\n" for k in range(5))))
-    assert "U" in got.texts and said(got, "has units in its cells ('11.0 V')")
+def test_units_inside_cells_count_where_all_are_the_same(write: Write) -> None:
+    got = importers.read(write("time_s,U,Gas\n" + "".join(f"{k},{11 + k / 10} V,{10 * k}%\n" for k in range(5))))
+    assert named(got)["voltage_V"][2] == 11.2 and said(got, "its cells say the unit, V")
+    assert got["throttle"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+    got = importers.read(write("time_s,U\n" + "".join(f"{k},{11 + k / 10} {'V' if k % 2 else 'mV'}\n" for k in range(5))))
+    assert "U" in got.texts and said(got, "has units in its cells ('11.0 mV')")
 
 
 def test_decimal_commas_are_read_where_they_can_be_nothing_else(write: Write) -> None:
@@ -610,6 +613,9 @@ def unexplained(imported: Dataset, raw: bytes) -> list[str]:
     expected = used if without_heading else used[1:]
     if any("holds units" in t for t in imported.notes):
         del expected[0]
+    out = sum(int(n) for t in imported.notes for n in re.findall(r"(\d+) lines left out", t))
+    if out and len(imported.lines) == len(expected) - out:
+        expected = [k for k in expected if k in set(imported.lines)]
     if list(imported.lines) != expected:
         lost.append(f"lines {expected} became rows {list(imported.lines)}")
     comments = sum(t.lstrip().startswith(("#", "%")) for t in lines)
@@ -777,7 +783,7 @@ def test_a_bare_speed_is_offered_as_the_one_that_is_missing(more: str, lines: tu
 
 @pytest.mark.parametrize(("heading", "cell", "words"), [
     ("speed", "{}", "a speed without a unit"), ("n (1/s)", "{}", "a speed without a unit"),
-    ("speed", "{} rad/s", "a speed as text"), ("rpm_12_magnets", "{}", "a speed under a name of its own"),
+    ("speed", "{} wibble", "a speed as text"), ("rpm_12_magnets", "{}", "a speed under a name of its own"),
 ])  # fmt: skip
 def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
     heading: str, cell: str, words: str, write: Write, project: Path

@@ -381,7 +381,7 @@ def _by_words(text: str) -> Heading | None:
             if not unit:
                 if name == "rpm" and "rpm" in words:
                     return Heading(text, "rpm", units.UNITS["rpm"])
-                if set(words) == {"throttle"}:
+                if set(words) == {"throttle"} and not re.search(r"[\s_]", bare):
                     return Heading(text, "throttle", units.Unit("", "none", 1.0))
                 continue
             if (goes := _unit_for(dimension, unit)) is None:

@@ -210,7 +210,7 @@ def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
         told = [k for k in range(top, first) if not _is_units(split[k])]
         while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
             del told[0]
-        if told:
+        if told and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
             return told[0], mark
     return None
 
@@ -248,11 +248,13 @@ def _without_ends(
     while len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3):
         ends.append(kept.pop())
     if again:
-        notes.append(f"the headings again in line {some(again)}: left out")
+        notes.append(f"{len(again)} lines left out: the headings again (line {some(again)})")
     if sums:
-        notes.append(f"rows that sum up others left out: {some((f'{word!r} in line {i}' for i, word in sums), 3)}")
+        words = some((f"{word!r} in line {i}" for i, word in sums), 3)
+        notes.append(f"{len(sums)} lines left out: sums of others ({words})")
     if ends:
-        notes.append(f"remarks at the end left out: {some((repr(' '.join(filter(None, c))[:60]) for _, c in ends[::-1]), 3)}")
+        words = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
+        notes.append(f"{len(ends)} lines left out: remarks at the end ({words})")
     return kept
 
 
@@ -303,7 +305,8 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
             break
         del split[1]
     if header:
-        split = [split[0], *_without_ends(split[1:], split[0][1], notes)]
+        cut = [split.pop()] if lines[-1] and len(split) > 2 else []  # the end of the file cut it off: no remark
+        split = [split[0], *_without_ends(split[1:], split[0][1], notes), *cut]
         usual = {len(c) for _, c in split[1:]}
         if len(usual) == 1 and (most := usual.pop()) < width and len(split) > 2:  # columns that no row fills
             split = [split[0], *((i, [*c, *[""] * (width - most)]) for i, c in split[1:])]
