@@ -1036,7 +1036,9 @@ def test_a_clock_is_the_time_of_a_log_that_has_no_other(write: Write) -> None:
 
 def test_a_comma_between_thousands_is_not_taken_for_a_decimal_one(write: Write) -> None:
     with pytest.raises(InputError, match="A comma between thousands"):
-        import_file(write('rpm,thrust_N\n"1,000",1.5\n"2,000",4.5\n"3,000",9.5\n'))
+        import_file(write('rpm,thrust_N\n"1,000",1\n"2,000",4\n"3,000",9\n'))
+    got = import_file(write('rpm,thrust_N\n"1,000",1.5\n"2,000",4.5\n"3,000",9.5\n'))  # points are there for decimals
+    assert got["rpm"].tolist() == [1000.0, 2000.0, 3000.0] and said(got, "thousands")
 
 
 def test_cp_beside_ct_is_that_of_the_power(write: Write) -> None:

@@ -291,6 +291,8 @@ def heading(text: str) -> Heading:
     ('temperature_K', 'rpm', 'rpm')
     """
     text = " ".join(text.split())
+    if re.fullmatch(r"[a-z]{2,}[A-Z]\w*", text):  # thrustGrams
+        return replace(heading(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)), text=text)
     if thousands := _THOUSANDS.fullmatch(text):
         found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
         told = f"{text!r} is read as thousands of revolutions per minute"
@@ -346,9 +348,11 @@ _ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kg
 """Units that capitals do not change where the quantity is known."""
 
 
-def _unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
-    """Unit of a quantity of known dimension, and what was taken for granted."""
+def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
+    """Unit of a quantity of known dimension ("": any), and what was taken for granted."""
     found = unit_of(text)
+    if not dimension:
+        return (found, "") if isinstance(found, units.Unit) else None
     if dimension == "force" and (weight := _WEIGHTS.get(unicodedata.normalize("NFKC", text))):
         return units.UNITS[weight], f"{_FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
     if dimension == "torque" and isinstance(found, str) and (weight := _weight(text)):
@@ -367,8 +371,6 @@ _LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 def _by_words(text: str) -> Heading | None:
     """Heading whose words are one quantity, in any of the languages, with a unit that goes with it; None: another."""
     bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
-    if not re.search(r"[\s_(\[/]", bare):
-        bare = re.sub(r"(?<=[a-z]{2})(?=[A-Z])", " ", bare)  # thrustGrams
     words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
     if found := _COEFFICIENT.fullmatch(" ".join(words)):
         return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
@@ -384,7 +386,7 @@ def _by_words(text: str) -> Heading | None:
                 if set(words) == {"throttle"} and not re.search(r"[\s_]", bare):
                     return Heading(text, "throttle", units.Unit("", "none", 1.0))
                 continue
-            if (goes := _unit_for(dimension, unit)) is None:
+            if (goes := unit_for(dimension, unit)) is None:
                 continue
             made, told = goes
             if dimension == "angular_speed":

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import difflib
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading, may_be_shaft_speed, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
 from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, with_unit
-from bemt.readers._words import english
+from bemt.readers._words import english, quantities
 
 Array = NDArray[np.float64]
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
@@ -98,6 +100,7 @@ class Builder:
     words: list[str] = field(default_factory=list)
     clocks: list[str] = field(default_factory=list)
     units_stated: set[str] = field(default_factory=set)
+    asks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
@@ -286,6 +289,12 @@ class Builder:
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
+        asks = [*self.asks, *_asked(self.unitless, self.channels)]
+        if asks and self.format == "table":
+            file = Path(self.table.source.name)
+            out = shlex.quote(file.with_name("recording.toml").as_posix())
+            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
+            self.warnings.append(f"in one step, with your units in place of UNIT: {step}" if "UNIT" in step else step)
         said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
@@ -319,6 +328,19 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
              "temperature", "density", "humidity")  # fmt: skip
 
 
+def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
+    """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
+    out = {}
+    for label in headings:
+        name = label[1:].rsplit("'", 1)[0].split("' (")[0]
+        found = {q.replace(" ", "_") for q, _ in quantities(english(re.split(r"[(\[]", name)[0]))}
+        found -= {"pulse_width"} if "throttle" in found else set()
+        quantity = "power" if found == {"mechanical_power"} else found.pop() if len(found) == 1 else ""
+        if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
+            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
+    return list(out.values())
+
+
 def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
@@ -335,7 +357,8 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
         word = re.split(r"[\s_(\[]", name.strip().lower())[0]
         found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
         if found is None:
-            found = difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+            known = [q for q, _ in quantities(english(name)) if q in _MEANINGS]
+            found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
         if found:
             near[name] = found
     if not near:

@@ -39,6 +39,8 @@ _SUMMARY = re.compile(
     re.IGNORECASE,
 )
 """First cells of rows that sum up the others."""
+_LABVIEW = "***End_of_Header***"
+_COMMENT = re.compile(r"\s*[#%](?!\s*[,;\t|])")
 _EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -82,7 +84,11 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
     bad: list[int] = []
     empty = 0
     for i, cell in enumerate(cells):
-        value = number(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
+        if decimal == ",":
+            value = _ungrouped(cell, ",") if "." in cell else None
+            value = number(cell.replace(",", ".") if "." not in cell else cell) if value is None else value
+        else:
+            value = number(cell)
         if value is None and cell:
             value = _ungrouped(cell, decimal)
         if value is not None:
@@ -101,7 +107,7 @@ def _ungrouped(cell: str, decimal: str) -> float | None:
     (1234.5, 1234.5, None)
     """
     grouped = _GROUPED.fullmatch(cell)
-    if not grouped or grouped[1] == decimal:
+    if not grouped or grouped[1] == decimal[0]:
         return None
     bare = cell.replace(grouped[1], "")
     alone = grouped[1] in ",." and bare.lstrip("+-").isdigit() and cell.count(grouped[1]) == 1
@@ -117,10 +123,26 @@ def split_line(line: str, mark: str) -> list[str]:
     return [c.strip() for c in line.split(mark)]
 
 
+def heading_cells(line: str, mark: str, width: int) -> list[str]:
+    """Cells of a line of headings; between blanks, those that two or more part, if that makes as many as the rows have."""
+    cells = split_line(line, mark)
+    apart = re.split(r"\s{2,}", line.strip()) if mark == " " and len(cells) != width else cells
+    return apart if len(apart) == width else cells
+
+
 def _is_units(cells: Sequence[str]) -> bool:
     """Whether a line below the headings holds nothing but units."""
     stated = [unit_of(c.strip("()[]")) for c in cells if c.strip("-()[]")]
     return bool(stated) and all(isinstance(u, units.Unit) or u for u in stated)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment; ``%,A,V`` holds units.
+
+    >>> is_comment("# day 2"), is_comment("%;1/min;N")
+    (True, False)
+    """
+    return bool(_COMMENT.match(line))
 
 
 def some(items: Iterable[object], limit: int = 5) -> str:
@@ -154,6 +176,9 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
     >>> find_start(["Run 7", "rpm;T_N", "1;2", "3;4"]), find_start(["sep=;", "rpm;T_N", "1;2"])
     ((1, ';'), (1, ';'))
     """
+    ends = [k for k, line in enumerate(lines) if line.startswith(_LABVIEW)]
+    if ends and ends[-1] + 2 < len(lines):
+        return ends[-1] + 1, find_delimiter(lines[ends[-1] + 1 : ends[-1] + 4])
     excel = _EXCEL.fullmatch(lines[0]) if lines else None
     if excel:
         return 1, excel[1]
@@ -198,8 +223,11 @@ def _named(cells: Sequence[str]) -> float:
 
 def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
     """Headings right above the first two rows of numbers, below titles that are as wide as the table; None: as usual."""
-    for mark in dict.fromkeys((usual, *DELIMITERS)):
+    for mark in dict.fromkeys((usual, *DELIMITERS, " ")):
         split = [split_line(line, mark) for line in lines]
+        if mark == " ":
+            rows = [_is_row(cells) for cells in split]
+            split = [cells if row else re.split(r"\s{2,}", line.strip()) for cells, row, line in zip(split, rows, lines, strict=True)]
         first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
         if not first:
             continue
@@ -216,21 +244,25 @@ def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
 
 
 def decimal_mark(table: SplitTable) -> str:
-    """Decimal mark of a table: a comma only where it can be nothing else."""
+    """Decimal mark of a table: a comma only where it can be nothing else; ``.,`` if commas stand between thousands."""
+    cells = {cell for row in table.rows for cell in row}
+    commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
+    points = [cell for cell in cells if "." in cell and number(cell) is not None]
+    thousands = all(_THOUSANDS.fullmatch(cell) for cell in commas)
+    if commas and thousands and any(not re.fullmatch(r"[+-]?\d{1,3}\.\d{3}", cell) for cell in points):
+        return ".,"
     if table.delimiter == "," or not table.headings:
         return "."
-    cells = [cell for row in table.rows for cell in row]
-    commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
-    pointed = any("." in cell and number(cell) is not None for cell in cells)
+    grouped = all(_GROUPED.fullmatch(cell) for cell in points)
     plain = all(_COMMA.fullmatch(cell) for cell in commas)
-    return "," if plain and not pointed and any(not _THOUSANDS.fullmatch(cell) for cell in commas) else "."
+    return "," if plain and grouped and not thousands else "."
 
 
 def _in_a_comment(lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str) -> tuple[int, list[str]] | None:
     """Headings in the comment right above the first row of numbers."""
     at, cells = split[0]
     above = lines[at - 2] if at > 1 else ""
-    if not _is_row(cells) or not above.lstrip().startswith(("#", "%")):
+    if not _is_row(cells) or not is_comment(above):
         return None
     names = split_line(re.sub(r"^\s*[#%]+[ \t]*(?=\w)|^\s*[#%]", "", above), mark)
     return (at - 1, names) if len(names) == len(cells) and not any(map(_reads, names)) else None
@@ -261,8 +293,8 @@ def _without_ends(
 def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
     """Split a file into rows of equal length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
-    comments = sum(1 for t in lines if t.lstrip().startswith(("#", "%")))
+    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
+    comments = sum(map(is_comment, lines))
     bare = [i for i, t in used if not t.strip(" \t;,|")]
     used = [(i, t) for i, t in used if t.strip(" \t;,|")]
     if not used:
@@ -271,6 +303,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     notes += [f"{len(bare)} lines of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
+    stated = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
     if start:
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
         notes += [] if _EXCEL.fullmatch(used[0][1]) else [f"{start} lines above the headings left out: {above}"]
@@ -284,9 +317,12 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)
-    if header and mark == " " and len(split) > 1 and len(first) != len(split[1][1]):
-        apart = re.split(r"\s{2,}|\t", next(t for i, t in used if i == split[0][0]).strip())
-        first = apart if len(apart) == len(split[1][1]) else first
+    if header and len(split) > 1 and split[0][0] == used[0][0]:
+        first = heading_cells(used[0][1], mark, len(split[1][1]))
+    if stated:  # LabVIEW: of the channels, which stand behind the time
+        more = [*["s"][: len(first)], *stated[1:], *[""] * len(first)]
+        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, more, strict=False)]
+        first[0] = first[0].replace("X_Value", "Time")
     width = len(first)
     while header and width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
         width -= 1

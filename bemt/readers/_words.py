@@ -79,7 +79,7 @@ FOREIGN = frozenset(w for w in _PLAIN if len(w) > 1 and re.search(r"[а-я\u3000
 """Words that tell a code of characters."""
 _LONGEST = max(len(word.split()) for word in _PLAIN)
 
-_NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "value", "actual", "raw", "reading"}
+NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "value", "actual", "raw", "reading"}
 _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, its own words, words that change nothing
     "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
     "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
@@ -115,6 +115,7 @@ def english(text: str) -> list[str]:
     >>> english("Velocidad del viento"), english("环境温度"), english("Schub / Thrust")
     (['airspeed'], ['ambient', 'temperature'], ['thrust', 'thrust'])
     """
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)  # batteryVoltage
     text = re.sub(r"\b(a )?[dl]['\u2019]", "", unicodedata.normalize("NFC", plain(text)))
     for word in _ASIAN:
         if word in text:
@@ -138,7 +139,7 @@ def quantities(words: Iterable[str]) -> list[tuple[str, str]]:
     >>> quantities(["static", "thrust"]), quantities(["motor", "thrust", "error"])
     ([('thrust', 'force')], [])
     """
-    said = set(words) - _NEUTRAL
+    said = set(words) - NEUTRAL
     out = []
     for name, (dimension, heads, harmless) in _HEADS.items():
         if said & heads and said <= heads | harmless and (name not in _NEEDS or said & _NEEDS[name]):

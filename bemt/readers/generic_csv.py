@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,10 +23,12 @@ from bemt.readers import head_text, load_text, number
 from bemt.readers._headings import Heading, heading
 from bemt.readers._large import NumberTable, large_table
 from bemt.readers._recording import Builder, spikes
-from bemt.readers._split import SplitTable, decimal_mark, find_start, split_line, split_table
+from bemt.readers._split import SplitTable, decimal_mark, find_start, heading_cells, is_comment, split_line, split_table
+from bemt.readers._words import NEUTRAL, english
 
 KIND = "table"
 FALLBACK = True
+_NUMBERS = frozenset("0123456789gn") | {"kgf", "gf", "lbf", "nm", "kg", "lb", "oz", "mnm", "ncm", "cm", "mm", "kn", "1", "2"}
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
 SIZE = re.compile(r"(prop(eller)?_?)?(d|dia|diam|diameter|pitch)_m$", re.IGNORECASE)
@@ -41,7 +44,7 @@ def sniff(head: bytes | str) -> bool:
     (True, False)
     """
     text = head_text(head)
-    lines = [t for t in text.splitlines() if t.strip() and not t.lstrip().startswith(("#", "%"))]
+    lines = [t for t in text.splitlines() if t.strip() and not is_comment(t)]
     if len(text) >= 4096 and len(lines) > 2:
         lines = lines[:-1]  # the head may end in the middle of a line
     if len(lines) < 2 or lines[0].lstrip().startswith(("[", "{", "<", "!", "/*", "//")):
@@ -54,6 +57,7 @@ def sniff(head: bytes | str) -> bool:
     if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
         return False
     split = [split_line(t, mark) for t in lines[:50]]
+    split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
     if width < 2:
         return False
@@ -97,6 +101,8 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         build.add(k, head, decimal)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
+    if decimal == ".,":
+        build.warnings.append("commas between thousands left out")
     if decimal == ",":
         build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
@@ -110,7 +116,8 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         for name, channel in build.channels.items():
             if name != "time_s" and channel.unit not in ("", "-"):
                 build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
-    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm"):
+    _only_ones(build)
+    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
         build.warnings.append(
@@ -123,6 +130,39 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
         build.kind = "bench"
     return build.finish()
+
+
+_ONLY = {  # channel: words that a heading of it may have, and those of which it needs one ("": a letter with its axis)
+    "thrust_N": "thrust force load cell loadcell lift pull axial total f fx fy fz x y z reading scale balance weight",
+    "torque_Nm": "torque m mx my mz q x y z total motor reading reaction balance",
+    "voltage_V": "voltage u v motor main power mean",
+    "current_A": "current i motor main power mean",
+}  # fmt: skip
+
+
+_SHORT = {"thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"), "torque_Nm": ("Q_Nm", "M_Nm"), "voltage_V": ("U_V",), "current_A": ("I_A",)}
+"""Names that recordings know for the quantity."""
+
+
+def _only_ones(build: Builder) -> None:
+    """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
+    for name, words in _ONLY.items():
+        unit = name.rsplit("_", 1)[1]
+        same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
+        ours = [k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _NUMBERS]
+        if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
+            continue
+        if len(same) == 1:
+            label = build.headings.pop(ours[0])
+            build.channels = {name if k == ours[0] else k: c for k, c in build.channels.items()}
+            build.headings[name] = label
+            build.warnings.append(f"{label!r} is taken for the {name.rsplit('_', 1)[0]}: the only column in {unit}")
+        else:
+            quantity = name.rsplit("_", 1)[0]
+            shown = ", ".join(repr(build.headings[k]) for k in ours[:6])
+            most = max(ours, key=lambda k: np.nanmax(np.abs(build.channels[k].values), initial=0.0))
+            build.warnings.append(f"which of {shown} is the {quantity}? {build.headings[most]!r} is the largest")
+            build.asks.append(f"--column {quantity}={shlex.quote(build.headings[most])}")
 
 
 def _electrical(build: Builder) -> None:
