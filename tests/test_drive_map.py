@@ -292,7 +292,9 @@ def test_results_never_replace_a_recording(tmp_path: Path, capsys: pytest.Captur
     assert main(["map", str(path), "--name", "fan", "--out", str(tmp_path)]) == 0
 
 
-@pytest.mark.parametrize(("head", "full", "code"), [("throttle", 100, 0), ("throttle (%)", 100, 0), ("throttle", 1000, 2)])
+@pytest.mark.parametrize(
+    ("head", "full", "code"), [("throttle", 100, 0), ("throttle (%)", 100, 0), ("throttle", 1000, 2)]
+)
 def test_a_throttle_without_its_unit_is_percent_where_it_can_be_nothing_else(
     head: str, full: float, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

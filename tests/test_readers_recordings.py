@@ -457,7 +457,9 @@ def test_units_inside_cells_count_where_all_are_the_same(write: Write) -> None:
     got = importers.read(write("time_s,U,Gas\n" + "".join(f"{k},{11 + k / 10} V,{10 * k}%\n" for k in range(5))))
     assert named(got)["voltage_V"][2] == 11.2 and said(got, "its cells say the unit, V")
     assert got["throttle"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
-    got = importers.read(write("time_s,U\n" + "".join(f"{k},{11 + k / 10} {'V' if k % 2 else 'mV'}\n" for k in range(5))))
+    got = importers.read(
+        write("time_s,U\n" + "".join(f"{k},{11 + k / 10} {'V' if k % 2 else 'mV'}\n" for k in range(5)))
+    )
     assert "U" in got.texts and said(got, "has units in its cells ('11.0 mV')")
 
 

@@ -51,9 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
     )
     run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
-    run.add_argument(
-        "--out", metavar="RUN.TOML", help="write it here; every command takes it in place of the files"
-    )
+    run.add_argument("--out", metavar="RUN.TOML", help="write it here; every command takes it in place of the files")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -79,7 +79,8 @@ def decode(raw: bytes) -> str:
     Parameters
     ----------
     raw : bytes
-        UTF-8, UTF-16 with its mark, Windows-1252, or another code in which a known heading shows; the last character of UTF-8 that has others beyond ASCII may be cut.
+        UTF-8, UTF-16 with its mark, Windows-1252, or another code in which a known heading shows; the last character
+        of UTF-8 that has others beyond ASCII may be cut.
 
     Returns
     -------

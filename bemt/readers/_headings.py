@@ -29,11 +29,11 @@ _SAME = {
     "t/min": "rpm", "rad/seg": "rad_s", "vueltas/min": "rpm", "umdr/min": "rpm", "upm": "rpm", "tr mn": "rpm",
     "rev/minute": "rpm", "revs/min": "rpm", "k rpm": "krpm", "krpm": "krpm", "in hg": "inHg", "inhg": "inHg",
     "mm hg": "mmHg", "mmhg": "mmHg", "torr": "mmHg", "millibar": "mbar", "mb": "mbar",
-    "giri/min": "rpm", "giri/1'": "rpm", "\u043e\u0431/\u043c\u0438\u043d": "rpm", "\u8f6c/\u5206": "rpm", "\u8f49/\u5206": "rpm", "r/m": "rpm", "omw/min": "rpm",
+    "giri/min": "rpm", "giri/1'": "rpm", "об/мин": "rpm", "转/分": "rpm", "轉/分": "rpm", "r/m": "rpm", "omw/min": "rpm",
     "obr/min": "rpm", "ot/min": "rpm", "tours/min": "rpm", "trs/min": "rpm", "rpm/min": "rpm", "rot/min": "rpm",
     "min -1": "rpm", "kts": "kt", "fps": "ft_s", "kph": "km_h", "kmh": "km_h", "kilowatt": "kW", "millivolt": "mV",
-    "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "\u79d2": "s", "\u0441": "s",
-    "\u0432": "V", "\u0430": "A", "\u0432\u0442": "W", "\u043d": "N", "\u043d\u043c": "Nm", "\u043d \u043c": "Nm", "\u5b89": "A", "\u4f0f": "V", "\u74e6": "W", "\u725b": "N",
+    "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "秒": "s", "с": "s",
+    "в": "V", "а": "A", "вт": "W", "н": "N", "нм": "Nm", "н м": "Nm", "安": "A", "伏": "V", "瓦": "W", "牛": "N",
     "pct.": "pct", "prozent": "pct", "kg/cubic metre": "kg_m3", "kp cm": "kgf_cm", "kpcm": "kgf_cm", "kgcm": "kgf_cm",
 }  # fmt: skip
 _TWO_MEANINGS = {
@@ -57,7 +57,8 @@ _COMPOUND = {
     "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
     "m/s2": units.Unit("m_s2", "acceleration", 1.0), "m/s^2": units.Unit("m_s2", "acceleration", 1.0),
     "daN": units.Unit("", "force", 10.0), "cN": units.Unit("", "force", 0.01), "kp": units.UNITS["kgf"],
-    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF), "ch": units.Unit("", "power", 75.0 * units.KGF),
+    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF), "ch": units.Unit("",
+    "power", 75.0 * units.KGF),
 }  # fmt: skip
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
@@ -90,7 +91,7 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
 _WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
     "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
-    "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "\u0433": "gf", "\u0433\u0440": "gf", "\u514b": "gf", "\u043a\u0433": "kgf",
+    "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
     "\u516c\u65a4": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
 }  # fmt: skip
 """Units of mass in which stands state a force: that which the mass weighs."""
@@ -302,8 +303,8 @@ def heading(text: str) -> Heading:
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
-    if (found := _by_words(text)) is not None:
-        return found
+    if (by_words := _by_words(text)) is not None:
+        return by_words
     unit = _WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
@@ -374,7 +375,9 @@ def _by_words(text: str) -> Heading | None:
     words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
     if found := _COEFFICIENT.fullmatch(" ".join(words)):
         return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
-    if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(unit := unit_of(bare[1:].strip(" ()[]")), units.Unit):
+    if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(
+        unit := unit_of(bare[1:].strip(" ()[]")), units.Unit
+    ):
         if unit.dimension == "time":
             return Heading(text, "time_s", unit)
     for base, unit in _splits(bare):
@@ -391,7 +394,11 @@ def _by_words(text: str) -> Heading | None:
             made, told = goes
             if dimension == "angular_speed":
                 if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
-                    return None if words != ["rotation", "speed"] else Heading(text, "rpm", units.Unit("", "angular_speed", 1.0 / units.RPM))
+                    return (
+                        None
+                        if words != ["rotation", "speed"]
+                        else Heading(text, "rpm", units.Unit("", "angular_speed", 1.0 / units.RPM))
+                    )
                 made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
                 return Heading(text, "rpm", made)
             si = _si_name(made)

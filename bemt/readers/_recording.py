@@ -223,7 +223,9 @@ class Builder:
             name = self.free("part_temperature_K")
             self.channels = {name if k == "temperature_K" else k: c for k, c in self.channels.items()}
             self.headings[name] = label
-            told = f"{label!r} goes from {np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C: a part's, not the air's"
+            told = (
+                f"{label!r} goes from {np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C: a part's, not the air's"
+            )
             self.warnings.append(told + "; head that of the air Ambient temperature (C)")
 
     def check_magnitudes(self) -> None:
@@ -330,7 +332,7 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
 
 def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
     """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
-    out = {}
+    out: dict[str, str] = {}
     for label in headings:
         name = label[1:].rsplit("'", 1)[0].split("' (")[0]
         found = {q.replace(" ", "_") for q, _ in quantities(english(re.split(r"[(\[]", name)[0]))}

@@ -34,8 +34,8 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:([,. '\u2019\u00a0\u202f])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
 """Digits in groups of three."""
 _SUMMARY = re.compile(
-    r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe|moyenne"
-    r"|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
+    r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe"
+    r"|moyenne|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
     re.IGNORECASE,
 )
 """First cells of rows that sum up the others."""
@@ -124,7 +124,7 @@ def split_line(line: str, mark: str) -> list[str]:
 
 
 def heading_cells(line: str, mark: str, width: int) -> list[str]:
-    """Cells of a line of headings; between blanks, those that two or more part, if that makes as many as the rows have."""
+    """Cells of a line of headings; between blanks, parted by two or more if that makes as many as the rows have."""
     cells = split_line(line, mark)
     apart = re.split(r"\s{2,}", line.strip()) if mark == " " and len(cells) != width else cells
     return apart if len(apart) == width else cells
@@ -201,7 +201,9 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
 
 def _reads(cell: str) -> bool:
     """Whether a cell is a number, in whatever way it is written."""
-    return number(cell) is not None or bool(cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell)))
+    return number(cell) is not None or bool(
+        cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell))
+    )
 
 
 def with_unit(cell: str) -> tuple[str, str] | None:
@@ -222,18 +224,23 @@ def _named(cells: Sequence[str]) -> float:
 
 
 def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
-    """Headings right above the first two rows of numbers, below titles that are as wide as the table; None: as usual."""
+    """Headings right above the first two rows of numbers, below titles as wide as the table; None: as usual."""
     for mark in dict.fromkeys((usual, *DELIMITERS, " ")):
         split = [split_line(line, mark) for line in lines]
         if mark == " ":
             rows = [_is_row(cells) for cells in split]
-            split = [cells if row else re.split(r"\s{2,}", line.strip()) for cells, row, line in zip(split, rows, lines, strict=True)]
+            split = [
+                cells if row else re.split(r"\s{2,}", line.strip())
+                for cells, row, line in zip(split, rows, lines, strict=True)
+            ]
         first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
         if not first:
             continue
         wide = max(2.0, 0.6 * sum(map(bool, split[first])))
         top = first
-        while top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4:
+        while (
+            top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4
+        ):
             top -= 1
         told = [k for k in range(top, first) if not _is_units(split[k])]
         while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
@@ -258,7 +265,9 @@ def decimal_mark(table: SplitTable) -> str:
     return "," if plain and grouped and not thousands else "."
 
 
-def _in_a_comment(lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str) -> tuple[int, list[str]] | None:
+def _in_a_comment(
+    lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str
+) -> tuple[int, list[str]] | None:
     """Headings in the comment right above the first row of numbers."""
     at, cells = split[0]
     above = lines[at - 2] if at > 1 else ""
@@ -271,13 +280,17 @@ def _in_a_comment(lines: Sequence[str], split: Sequence[tuple[int, list[str]]], 
 def _without_ends(
     body: list[tuple[int, list[str]]], names: Sequence[str], notes: list[str]
 ) -> list[tuple[int, list[str]]]:
-    """Rows without headings that come again, sums of the rows above, and remarks at the end; each is named in a note."""
+    """Rows without headings that come again, sums of the rows above, and remarks at the end, all named in notes."""
     again = [i for i, cells in body if cells == list(names)]
-    sums = [(i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))]
+    sums = [
+        (i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))
+    ]
     out = {*again, *(i for i, _ in sums)}
     kept = [(i, cells) for i, cells in body if i not in out]
     ends: list[tuple[int, list[str]]] = []
-    while len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3):
+    while (
+        len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3)
+    ):
         ends.append(kept.pop())
     if again:
         notes.append(f"{len(again)} lines left out: the headings again (line {some(again)})")
@@ -313,7 +326,11 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
-        notes[0] = f"{comments - 1} comment lines left out" if comments > 1 else f"the headings are the comment in line {said[0]}"
+        notes[0] = (
+            f"{comments - 1} comment lines left out"
+            if comments > 1
+            else f"the headings are the comment in line {said[0]}"
+        )
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)
@@ -341,8 +358,8 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
             break
         del split[1]
     if header:
-        cut = [split.pop()] if lines[-1] and len(split) > 2 else []  # the end of the file cut it off: no remark
-        split = [split[0], *_without_ends(split[1:], split[0][1], notes), *cut]
+        last = [split.pop()] if lines[-1] and len(split) > 2 else []  # the end of the file cut it off: no remark
+        split = [split[0], *_without_ends(split[1:], split[0][1], notes), *last]
         usual = {len(c) for _, c in split[1:]}
         if len(usual) == 1 and (most := usual.pop()) < width and len(split) > 2:  # columns that no row fills
             split = [split[0], *((i, [*c, *[""] * (width - most)]) for i, c in split[1:])]

@@ -33,7 +33,8 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "风速 風速 来流速度 空速 vinf uinf v~inf u~inf v∞ u∞ tas",
     "speed": "geschwindigkeit vitesse velocidad velocita velocidade snelheid velocity скорость 速度",
     "temperature": "temperatur temperatura temperatuur температура 温度 溫度 온도",
-    "pressure": "druck pression presion pressione pressao druk давление 压力 气压 氣壓 大气压 大气压力 気圧 barometer baro",
+    "pressure": "druck pression presion pressione pressao druk давление 压力 气压 氣壓 大气压 大气压力 気圧 barometer "
+    "baro",
     "air pressure": "luftdruck luchtdruck luchtdruk",
     "density": "dichte densite densidad densita densidade masse~volumique плотность 密度 rho ρ",
     "air density": "luftdichte",
@@ -62,12 +63,12 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "ambient": "umgebung ambiant ambiante ambiente ambientale 环境 環境 室 room lab laboratory outside outdoor amb "
     "atmospheric atmosphere atm atmospherique atmosferica atmosferico barometric environment environmental inf",
     "air": "luft aire aria 空气 空氣 大气",
-    "thrust coefficient": "schubbeiwert schubkoeffizient coefficient~de~poussee coefficient~de~traction coeficiente~de~empuje "
-    "coeficiente~de~traccion coefficiente~di~spinta 推力系数 拉力系数",
+    "thrust coefficient": "schubbeiwert schubkoeffizient coefficient~de~poussee coefficient~de~traction "
+    "coeficiente~de~empuje coeficiente~de~traccion coefficiente~di~spinta 推力系数 拉力系数",
     "power coefficient": "leistungsbeiwert leistungskoeffizient coefficient~de~puissance coeficiente~de~potencia "
     "coefficiente~di~potenza 功率系数",
     "torque coefficient": "drehmomentbeiwert momentenbeiwert coefficient~de~couple coeficiente~de~par 扭矩系数",
-    "advance ratio": "rapport~d~avancement parametre~d~avancement parametre~avancement rapport~avancement parametro~de~avance "
+    "advance ratio": "parametre~avancement rapport~avancement parametro~de~avance "
     "rapporto~di~avanzamento 前进比 进速系数",
     "of": "de des du del della dell la le di da en do der die das the",
 }  # fmt: skip
@@ -84,14 +85,18 @@ _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, it
     "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
     "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
     "voltage": ("voltage", {"voltage", "v"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
-    "current": ("current", {"current"}, {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
+    "current": ("current", {"current"},
+                {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
     "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"}),
     "mechanical power": ("power", {"power"}, {"mechanical", "shaft", "output", "propeller", "rotor"}),
     "power": ("power", {"power"}, set()),
     "time": ("time", {"time"}, {"elapsed", "test", "since", "start", "boot", "t"}),
-    "throttle": ("fraction", {"throttle", "command", "setting", "duty", "pwm"}, {"motor", "power", "cycle", "esc", "input", "position", "signal"}),
-    "pulse width": ("time", {"pulse", "pwm", "esc", "signal", "throttle"}, {"width", "servo", "input", "command", "motor"}),
-    "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"}, {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
+    "throttle": ("fraction", {"throttle", "command", "setting", "duty", "pwm"},
+                 {"motor", "power", "cycle", "esc", "input", "position", "signal"}),
+    "pulse width": ("time", {"pulse", "pwm", "esc", "signal", "throttle"},
+                    {"width", "servo", "input", "command", "motor"}),
+    "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"},
+            {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
     "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream"},
                  {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"}),
     "temperature": ("temperature", {"temperature"}, {"ambient", "air", "tunnel", "inlet"}),

@@ -28,7 +28,22 @@ from bemt.readers._words import NEUTRAL, english
 
 KIND = "table"
 FALLBACK = True
-_NUMBERS = frozenset("0123456789gn") | {"kgf", "gf", "lbf", "nm", "kg", "lb", "oz", "mnm", "ncm", "cm", "mm", "kn", "1", "2"}
+_NUMBERS = frozenset("0123456789gn") | {
+    "kgf",
+    "gf",
+    "lbf",
+    "nm",
+    "kg",
+    "lb",
+    "oz",
+    "mnm",
+    "ncm",
+    "cm",
+    "mm",
+    "kn",
+    "1",
+    "2",
+}
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
 SIZE = re.compile(r"(prop(eller)?_?)?(d|dia|diam|diameter|pitch)_m$", re.IGNORECASE)
@@ -140,7 +155,12 @@ _ONLY = {  # channel: words that a heading of it may have, and those of which it
 }  # fmt: skip
 
 
-_SHORT = {"thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"), "torque_Nm": ("Q_Nm", "M_Nm"), "voltage_V": ("U_V",), "current_A": ("I_A",)}
+_SHORT = {
+    "thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"),
+    "torque_Nm": ("Q_Nm", "M_Nm"),
+    "voltage_V": ("U_V",),
+    "current_A": ("I_A",),
+}
 """Names that recordings know for the quantity."""
 
 
@@ -149,7 +169,11 @@ def _only_ones(build: Builder) -> None:
     for name, words in _ONLY.items():
         unit = name.rsplit("_", 1)[1]
         same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
-        ours = [k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _NUMBERS]
+        ours = [
+            k
+            for k in same
+            if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _NUMBERS
+        ]
         if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
             continue
         if len(same) == 1:

@@ -308,8 +308,8 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     if faults:
         raise InputError(faults)
     build = Builder(table, KIND)
-    stated = "decimal" in head.model_fields_set or not isinstance(table, SplitTable)
-    decimal = head.decimal if stated else decimal_mark(table)
+    stated = "decimal" in head.model_fields_set
+    decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:

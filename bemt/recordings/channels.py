@@ -170,7 +170,9 @@ def named(d: Dataset) -> Dataset:
 def _angular(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
     """Speed of rotation from an angular speed, where the file has no other."""
     found = [
-        k for k in d.values if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed|[nωΩ]_)", k, re.I)
+        k
+        for k in d.values
+        if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed|[nωΩ]_)", k, re.I)
     ]
     if len(found) == 1 and not {"rpm", *_SPEEDS} & values.keys():
         values["rpm"], names["rpm"] = d[found[0]] / units.RPM, found[0]
