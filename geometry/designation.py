@@ -148,7 +148,14 @@ def _sized(diameter: str, pitch: str, where: str, blades: int | None) -> tuple[f
     faults = Faults()
     D, p = float(diameter), float(pitch)
     lost = "." not in diameter and D > 120
-    faults.number(where, D, 0.5, 120.0, "in", f"Meant {D / 10:g}? In millimetres: {diameter}x{pitch}mm" if lost else "")
+    faults.number(
+        where,
+        D,
+        0.5,
+        120.0,
+        "in",
+        f"Meant {D / 10:g}? Millimetres need division by 25.4, or write {diameter}x{pitch}mm" if lost else "",
+    )
     low, high = _RATIO
     ratio = p / D if D > 0 else math.inf
     tenths = "." not in pitch and low <= ratio / 10 <= high

@@ -55,6 +55,7 @@ class SplitTable:
     lines: tuple[int, ...]
     warnings: tuple[str, ...] = ()
     cut: int | None = None  # index of a row that the end of the file cut off
+    headings_line: int = 1
     misfits: tuple[int, ...] = ()  # rows of another number of cells: kept, without values
 
     def __len__(self) -> int:
@@ -303,8 +304,10 @@ def _without_ends(
     return kept
 
 
-def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
-    """Split a file into rows of equal length."""
+def split_table(
+    source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
+) -> SplitTable:
+    """Split a file into rows of equal length; refused where more lines than a share of them have another length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
     comments = sum(map(is_comment, lines))
@@ -385,7 +388,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
             rows.append(("",) * width)
         else:
             rows.append(tuple(cells[:width]))
-    if len(faults) > MISFIT_SHARE * len(body):
+    if len(faults) > most_misfits * len(body):
         extra = len(faults) - MAX_FAULTS
         faults = faults[:MAX_FAULTS]
         if extra > 0:
@@ -395,4 +398,4 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
         raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
     names = tuple(first[:width]) if header else ()
     return SplitTable(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
-                 tuple(notes), cut, tuple(misfits))  # fmt: skip
+                 tuple(notes), cut, split[0][0], tuple(misfits))  # fmt: skip

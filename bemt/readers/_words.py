@@ -58,6 +58,8 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "battery current": "ibat i~bat i~in i~batt akkustrom batteriestrom",
     "motor rotation speed": "motordrehzahl",
     "propeller rotation speed": "propellerdrehzahl luftschraubendrehzahl rotordrehzahl",
+    "radius": "半径",
+    "chord": "弦长",
     "static": "statisch statique estatico estatica statico statica 静态",
     "mean": "mittlerer mittlere mittelwert moyen moyenne medio media 平均 average avg",
     "ambient": "umgebung ambiant ambiante ambiente ambientale 环境 環境 室 room lab laboratory outside outdoor amb "
