@@ -23,14 +23,13 @@ EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, suc
 WIDEST = 0.8
 """Largest chord over the tip radius that a blade has: that of the Kaplan propeller Ka 4-70 is 0.78 [1]."""
 _WORDS = {  # in English, German, French, Italian, Spanish, Chinese
-    "r": "r radius radial position|radial station|station|x|rayon|raggio|radio|\u534a\u5f84|radial position",
-    "chord": "c|chord|chord length|width|blade width|sehne|profiltiefe|blatttiefe|tiefe|corde|corda|cuerda|\u5f26\u957f",
+    "r": "r|radius|radial position|radial station|station|x|rayon|raggio|radio|半径",
+    "chord": "c|chord|chord length|width|blade width|sehne|profiltiefe|blatttiefe|corde|corda|cuerda|弦长",
     "beta": "beta|b|blade angle|pitch angle|theta|einstellwinkel|blattwinkel|steigungswinkel|calage|angle de calage"
-    "|calettamento|angolo di calettamento|angulo de paso|\u6868\u53f6\u89d2|\u5b89\u88c5\u89d2",
+    "|calettamento|angolo di calettamento|angulo de paso|桨叶角|安装角",
     "pitch": "pitch|local pitch|steigung|pas|passo|paso|p",
 }
 _NAMES = {word: name for name, words in _WORDS.items() for word in words.split("|")}
-_NAMES |= {"r": "r", "radius": "r"}
 _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
 """What lengths are shares of, in tip radii."""
 _TWIST = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
@@ -106,7 +105,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
     columns = []
     for place in places:
         values, bad, _ = table.numbers(place.at, decimal)
-        empty = [i for i in np.flatnonzero(np.isnan(values)) if i not in (*bad, *table.misfits)]
+        empty = [int(i) for i in np.flatnonzero(np.isnan(values)) if i not in (*bad, *table.misfits)]
         faults += [
             Fault(file, f"{table.lines[i]}:{place.at + 1}", repr(table.cell(i, place.at)), "a number")
             for i in sorted([*bad, *empty])
