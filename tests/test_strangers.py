@@ -1,3 +1,4 @@
+# ruff: noqa: E501
 """Tables, labels and blades as strangers write them: each is read right, or refused with a hint that leads there."""
 
 from __future__ import annotations

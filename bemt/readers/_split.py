@@ -40,7 +40,7 @@ _SUMMARY = re.compile(
 )
 """First cells of rows that sum up the others."""
 _LABVIEW = "***End_of_Header***"
-_COMMENT = re.compile(r"\s*[#%](?!\s*[,;\t|])")
+_COMMENT = re.compile(r"\s*[#%](?!\s*[,;|])")
 _EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -354,6 +354,8 @@ def split_table(
             stated = [unit.strip("-()[]") for unit in [*below, *[""] * width]]
             first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
             notes.append(f"line {split[1][0]} holds units")
+        elif sum(a == b for a, b in zip(first, below, strict=False)) > 0.5 * width:
+            notes.append(f"1 lines left out: the headings again (line {split[1][0]})")
         elif not any(map(_reads, below)) and sum(map(bool, below)) >= max(2.0, 0.6 * width) and _named(below) >= 0.5:
             first = [" ".join(filter(None, pair)) for pair in zip(first, [*below, *[""] * width], strict=False)]
             notes.append(f"line {split[1][0]} holds more headings")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
-from bemt.readers._headings import Heading, heading
+from bemt.readers._headings import Heading, heading, slug
 from bemt.readers._large import NumberTable, large_table
 from bemt.readers._recording import Builder, spikes
 from bemt.readers._split import SplitTable, decimal_mark, find_start, heading_cells, is_comment, split_line, split_table
@@ -112,6 +112,7 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
     if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
         heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    heads = _apart(heads)
     for k, head in enumerate(heads):
         build.add(k, head, decimal)
     if not table.headings:
@@ -147,9 +148,22 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     return build.finish()
 
 
+def _apart(heads: list[Heading]) -> list[Heading]:
+    """Headings of one quantity in one table: the shortest is it, others with more words keep them in their names."""
+    words = [frozenset(english(re.split(r"[(\[]", head.text)[0])) for head in heads]
+    out = []
+    for head, own in zip(heads, words, strict=True):
+        shorter = any(o.name == head.name and w < own for o, w in zip(heads, words, strict=True))
+        if shorter and head.unit is not None and head.unit_name not in ("rpm", "-", ""):
+            base = re.sub(r"[(\[].*", "", head.text)
+            head = replace(head, name=f"{slug(base.lower())}_{head.unit_name.replace('/', '_')}")
+        out.append(head)
+    return out
+
+
 _ONLY = {  # channel: words that a heading of it may have, and those of which it needs one ("": a letter with its axis)
-    "thrust_N": "thrust force load cell loadcell lift pull axial total f fx fy fz x y z reading scale balance weight",
-    "torque_Nm": "torque m mx my mz q x y z total motor reading reaction balance",
+    "thrust_N": "thrust force load cell loadcell lift pull axial f fx fy fz x y z reading scale balance weight",
+    "torque_Nm": "torque m mx my mz q x y z motor reading reaction balance",
     "voltage_V": "voltage u v motor main power mean",
     "current_A": "current i motor main power mean",
 }  # fmt: skip
