@@ -111,6 +111,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
             for i in sorted([*bad, *empty])
         ]
         columns.append(values * place.scale)
+    faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
     if not faults and len(table) < 2:
         faults.append(Fault(file, "", f"{len(table)} stations", "two or more"))
     if faults:
