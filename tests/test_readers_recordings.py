@@ -611,7 +611,8 @@ def unexplained(imported: Dataset, raw: bytes) -> list[str]:
     if any("lines above the headings" in t for t in imported.notes):  # they have fewer cells than the rows
         first = next(k for k in used if lines[k - 1].count(",") >= lines[imported.lines[0] - 1].count(","))
         used = [k for k in used if k >= first]
-    without_heading = any("no heading line" in t for t in imported.notes)
+    in_a_comment = any("headings are the comment" in t for t in imported.notes)
+    without_heading = in_a_comment or any("no heading line" in t for t in imported.notes)
     expected = used if without_heading else used[1:]
     if any("holds units" in t for t in imported.notes):
         del expected[0]
@@ -620,7 +621,7 @@ def unexplained(imported: Dataset, raw: bytes) -> list[str]:
         expected = [k for k in expected if k in set(imported.lines)]
     if list(imported.lines) != expected:
         lost.append(f"lines {expected} became rows {list(imported.lines)}")
-    comments = sum(t.lstrip().startswith(("#", "%")) for t in lines)
+    comments = sum(t.lstrip().startswith(("#", "%")) for t in lines) - in_a_comment
     if comments and not any(f"{comments} comment lines" in text for text in imported.notes):
         lost.append("comments")
     for name, values in imported.values.items():

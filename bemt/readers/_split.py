@@ -329,11 +329,8 @@ def split_table(
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
-        notes[0] = (
-            f"{comments - 1} comment lines left out"
-            if comments > 1
-            else f"the headings are the comment in line {said[0]}"
-        )
+        notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
+        notes.append(f"the headings are the comment in line {said[0]}")
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)

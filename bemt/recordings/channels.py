@@ -110,6 +110,12 @@ def stated(d: Dataset) -> dict[str, Array]:
     return {key: u for key, u in d.u.items() if np.isfinite(u).any()}
 
 
+def in_one_step(d: Dataset) -> str:
+    """Command that states what the headings of a table leave open, as a sentence to append; "" where none is known."""
+    step = next((note for note in d.notes if "bemt import " in note), "")
+    return f"; {step}" if step else ""
+
+
 def runs_of(d: Dataset) -> Array:
     """Run of each row, (N,), from 1; 0 where the file has a gap."""
     return np.nan_to_num(d["run"]) if "run" in d else np.ones(len(d))
