@@ -58,8 +58,8 @@ _COMPOUND = {
     "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
     "m/s2": units.Unit("m_s2", "acceleration", 1.0), "m/s^2": units.Unit("m_s2", "acceleration", 1.0),
     "daN": units.Unit("", "force", 10.0), "cN": units.Unit("", "force", 0.01), "kp": units.UNITS["kgf"],
-    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF), "ch": units.Unit("",
-    "power", 75.0 * units.KGF),
+    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF),
+    "ch": units.Unit("", "power", 75.0 * units.KGF),
 }  # fmt: skip
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
@@ -93,7 +93,7 @@ _WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
     "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
     "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
-    "\u516c\u65a4": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
+    "公斤": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
 }  # fmt: skip
 """Units of mass in which stands state a force: that which the mass weighs."""
 _FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
@@ -395,11 +395,8 @@ def _by_words(text: str) -> Heading | None:
             made, told = goes
             if dimension == "angular_speed":
                 if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
-                    return (
-                        None
-                        if words != ["rotation", "speed"]
-                        else Heading(text, "rpm", units.Unit("", "angular_speed", 1.0 / units.RPM))
-                    )
+                    turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
+                    return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
                 made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
                 return Heading(text, "rpm", made)
             si = _si_name(made)

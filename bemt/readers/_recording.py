@@ -215,7 +215,11 @@ class Builder:
     def check_air(self) -> None:
         """A temperature that only a part reaches is not that of the air, whatever its heading leaves open."""
         channel = self.channels.get("temperature_K")
-        if channel is None or set(english(self.headings["temperature_K"])) & {"ambient", "air"}:
+        stated = self.format == "recording" or set(english(self.headings.get("temperature_K", "air"))) & {
+            "ambient",
+            "air",
+        }
+        if channel is None or stated:
             return
         v = channel.values[np.isfinite(channel.values)]
         if v.size and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):

@@ -28,22 +28,8 @@ from bemt.readers._words import NEUTRAL, english
 
 KIND = "table"
 FALLBACK = True
-_NUMBERS = frozenset("0123456789gn") | {
-    "kgf",
-    "gf",
-    "lbf",
-    "nm",
-    "kg",
-    "lb",
-    "oz",
-    "mnm",
-    "ncm",
-    "cm",
-    "mm",
-    "kn",
-    "1",
-    "2",
-}
+_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm mnm ncm cm mm kg lb oz".split())
+"""Numbers of a sensor, and units, that a heading may have beside its words."""
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
 SIZE = re.compile(r"(prop(eller)?_?)?(d|dia|diam|diameter|pitch)_m$", re.IGNORECASE)
@@ -161,8 +147,8 @@ def _apart(heads: list[Heading]) -> list[Heading]:
     return out
 
 
-_ONLY = {  # channel: words that a heading of it may have, and those of which it needs one ("": a letter with its axis)
-    "thrust_N": "thrust force load cell loadcell lift pull axial f fx fy fz x y z reading scale balance weight",
+_ONLY = {  # channel: words that the heading of the only column in its unit may have
+    "thrust_N": "thrust force load cell loadcell lift pull axial f fx fy fz x y z reading scale balance",
     "torque_Nm": "torque m mx my mz q x y z motor reading reaction balance",
     "voltage_V": "voltage u v motor main power mean",
     "current_A": "current i motor main power mean",
@@ -184,9 +170,7 @@ def _only_ones(build: Builder) -> None:
         unit = name.rsplit("_", 1)[1]
         same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
         ours = [
-            k
-            for k in same
-            if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _NUMBERS
+            k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
         ]
         if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
             continue
