@@ -595,6 +595,9 @@ def mutate(text: str, rng: random.Random) -> bytes:
     return raw
 
 
+COMMENT = re.compile(r"\s*[#%](?!\s*[,;|])")  # "%;1/min;N" holds units
+
+
 def unexplained(imported: Dataset, raw: bytes) -> list[str]:
     """What a table lost without a word: lines that are no row, and cells that are neither number, text nor flag."""
     try:
@@ -602,7 +605,7 @@ def unexplained(imported: Dataset, raw: bytes) -> list[str]:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [k for k, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
+    used = [k for k, t in enumerate(lines, 1) if t.strip() and not COMMENT.match(t)]
     lost = []
     bare = [k for k in used if not lines[k - 1].strip(" \t;,|")]
     if bare and not any(f"{len(bare)} lines of empty cells" in t for t in imported.notes):
@@ -621,7 +624,7 @@ def unexplained(imported: Dataset, raw: bytes) -> list[str]:
         expected = [k for k in expected if k in set(imported.lines)]
     if list(imported.lines) != expected:
         lost.append(f"lines {expected} became rows {list(imported.lines)}")
-    comments = sum(t.lstrip().startswith(("#", "%")) for t in lines) - in_a_comment
+    comments = sum(bool(COMMENT.match(t)) for t in lines) - in_a_comment
     if comments and not any(f"{comments} comment lines" in text for text in imported.notes):
         lost.append("comments")
     for name, values in imported.values.items():

@@ -189,7 +189,7 @@ def lines_below_the_heading(raw: bytes) -> set[int]:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return {k for k, line in enumerate(lines, 1) if line.strip(" \t;,|") and not line.lstrip().startswith(("#", "%"))}
+    return {k for k, line in enumerate(lines, 1) if line.strip(" \t;,|") and not re.match(r"\s*[#%](?!\s*[,;|])", line)}
 
 
 def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> Counter[str]:
