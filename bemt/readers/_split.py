@@ -246,7 +246,8 @@ def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
         told = [k for k in range(top, first) if not _is_units(split[k])]
         while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
             del told[0]
-        if told and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
+        whole = told and all(len(split[k]) >= len(split[first]) for k in told)  # a cut line of headings is none
+        if whole and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
             return told[0], mark
     return None
 
