@@ -16,7 +16,9 @@ _SUFFIXES: dict[str, tuple[str | None, bool]] = {
     "": (None, False), "e": ("electric", False), "ep": ("electric", True), "sf": ("slow_flyer", False),
     "sfp": ("slow_flyer", True), "mr": ("multirotor", False), "mrp": ("multirotor", True), "f": ("folding", False),
     "p": (None, True), "r": (None, True), "cw": (None, False), "ccw": (None, False), "bn": ("fpv", False),
-    "s": (None, False), "c": (None, False), "w": (None, False), "n": (None, False),
+    "s": (None, False), "c": (None, False), "w": (None, False), "n": (None, False), "pusher": (None, True),
+    "tractor": (None, False), "cf": (None, False), "carbon": (None, False), "wood": (None, False),
+    "nylon": (None, False), "pair": (None, False),
 }  # fmt: skip
 # Words before or behind the size; the first that matches.
 _WORDS: tuple[tuple[str, str], ...] = (
@@ -29,6 +31,10 @@ _FPV_LARGEST = 7.0  # diameter of FPV propellers; more blades than two on one th
 _RATIO = (0.1, 2.5)  # pitch over diameter of any propeller
 _USUAL_RATIO = (0.2, 1.6)  # of those whose label has no point
 _EXPECTED = "diameter x pitch in inches, such as 8x5, 10x4.7SF, 8x5x3 or 5045"
+_INCHES = re.compile(r"(?<=[\d.])\s*(?:\"|\u201d|\u2033|''|in(?:ch(?:es)?)?\b\.?)(?=\s|[x\u00d7*]|$)", re.IGNORECASE)
+_MILLIMETRES = re.compile(r"(?P<D>\d+(?:\.\d+)?)\s*(?:mm)?\s*[x\u00d7*]\s*(?P<p>\d+(?:\.\d+)?)\s*mm\b", re.IGNORECASE)
+_BLADES = re.compile(r"[\s(,-]*\b(\d)\s*-?\s*(?:b|blades?|blatt|bl\u00e4tter|pales?|palas?)\b\)?", re.IGNORECASE)
+"""Number of blades in words, before or behind the size."""
 _NUMBER = r"(\d+(?:\.\d*)?|\.\d+)"
 _SIZE = re.compile(
     rf"(?P<before>(?:[^\d\s.,-][^\d,]*)?){_NUMBER}\s*[x×*]\s*{_NUMBER}(?:\s*[x×*-]\s*B?(?P<blades>\d+))?"
@@ -104,19 +110,25 @@ def parse_designation(text: str) -> Designation:
         ...
     geometry.common.GeometryError: '10x100': got pitch/diameter 10; expected a ratio from 0.1 to 2.5. Meant 10x10?
     """
-    plain, where = text.strip(), repr(text)
+    where = repr(text)
+    plain = _INCHES.sub("", re.sub(r"(?<=\d)\s+by\s+(?=\d)", "x", text.strip(), flags=re.IGNORECASE)).strip()
+    plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
+    in_words = _BLADES.search(plain)
+    plain = _BLADES.sub(" ", plain, 1).strip() if in_words else plain
     digits, sized = _DIGITS.fullmatch(plain), _SIZE.fullmatch(plain)
     match = digits or sized
     if match is None:
-        hint = "Decimal point, not comma" if "," in text else ""
-        raise GeometryError([(where, "unreadable text", _EXPECTED, hint)])
+        raise GeometryError([(where, "unreadable text", _EXPECTED, _meant(plain))])
     before, after = match["before"].strip(" -_"), (match["after"] or "").strip(" -_")
     count = re.search(r"-\s*B?(\d)$", after, re.IGNORECASE)  # 5152S-3
     after = after[: count.start()] if count else after
-    told = match["blades"] or (count[1] if count else None)
+    told = match["blades"] or (count[1] if count else None) or (in_words[1] if in_words else None)
     blades = int(told) if told else None
     if digits:
-        D, pitch = _from_digits(digits["digits"], where)
+        small = bool(blades or blade_class(f"{before} {after}") == "fpv")
+        D, pitch = _from_digits(digits["digits"], where, small)
+        if blades is None and D <= _FPV_LARGEST and (glued := re.search(r"(?:^|[\s-])([TQ])-?$", before)):
+            blades = {"T": 3, "Q": 4}[glued[1]]  # T5143S: makers' mark of three blades
         blades = 3 if blades is None and len(digits["digits"]) == 5 and D <= _FPV_LARGEST else blades
     else:
         D, pitch = _sized(match[2], match[3], where, blades)
@@ -136,14 +148,23 @@ def _sized(diameter: str, pitch: str, where: str, blades: int | None) -> tuple[f
     faults = Faults()
     D, p = float(diameter), float(pitch)
     lost = "." not in diameter and D > 120
-    faults.number(where, D, 0.5, 120.0, "in", f"Meant {D / 10:g}? Millimetres need division by 25.4" if lost else "")
+    faults.number(
+        where,
+        D,
+        0.5,
+        120.0,
+        "in",
+        f"Meant {D / 10:g}? Millimetres need division by 25.4, or write {diameter}x{pitch}mm" if lost else "",
+    )
     low, high = _RATIO
     ratio = p / D if D > 0 else math.inf
     tenths = "." not in pitch and low <= ratio / 10 <= high
     if ratio > high and tenths and len(pitch) == 2 and not pitch.endswith("0"):
         p /= 10.0
     elif not low <= ratio <= high:
+        first = blades is not None and 1 <= D <= 6 and low <= blades / p <= high  # 3x10x5
         hint = f"Meant {D:g}x{p / 10:g}?" if tenths else "Diameter comes first"
+        hint = f"Meant {p:g}x{blades}x{D:g}? The number of blades comes last" if first else hint
         faults.add(where, f"pitch/diameter {ratio:.3g}", f"a ratio from {low:g} to {high:g}", hint)
     if blades is not None:
         faults.number(where, blades, 1, 16, "blades")
@@ -151,16 +172,31 @@ def _sized(diameter: str, pitch: str, where: str, blades: int | None) -> tuple[f
     return D, p
 
 
-def _from_digits(digits: str, where: str) -> tuple[float, float]:
-    """Diameter and pitch of ``5045`` or ``51466``: the one reading that is a propeller. [in]"""
+def _meant(text: str) -> str:
+    """What a text that is no label may mean, as a label."""
+    if sizes := re.search(r"(?<!\d)(\d{1,2}(?:[.,]\d+)?)\s*[x\u00d7*/ -]\s*(\d{1,2}(?:[.,]\d+)?)(?!\d)", text):
+        comma = "Decimal point, not comma. " if "," in text else ""
+        return f"{comma}Meant {sizes[1].replace(',', '.')}x{sizes[2].replace(',', '.')}?"
+    if re.fullmatch(r"\d+(?:\.\d+)?(?:\s*mm)?", text):
+        return "A diameter alone: give the pitch too"
+    return ""
+
+
+def _from_digits(digits: str, where: str, fpv: bool) -> tuple[float, float]:
+    """Diameter and pitch of ``5045`` or ``51466``: the one reading that is a propeller. [in]
+
+    Of four digits, ``2211`` is 2.2x1.1 of a racer, `fpv`, or 22x11 of a lifter: only words tell.
+    """
     a, b = float(digits[:2]), float(digits[2:])
     small, large = (a / 10.0, b / 10.0 ** (len(digits) - 3)), (a, b / 10.0)
     if len(digits) == 5:
         large = (float(digits[:3]) / 10.0, float(digits[3:]) / 10.0)
     low, high = _USUAL_RATIO
     found = [(D, p) for D, p in (small, large) if 1.5 <= D <= 40.0 and low <= p / D <= high]
-    if len(found) != 1:
-        got = "digits that fit no propeller" if not found else "digits that fit two propellers"
-        names = " or ".join(f"{D:g}x{p:g}" for D, p in (small, large))
-        raise GeometryError([(where, got, _EXPECTED, f"Write {names}")])
+    whole = [(a, b)] if len(digits) == 4 and 8.0 <= a <= 40.0 and low <= b / a <= 1.0 else []
+    if len(found) != 1 or (whole and not fpv):
+        found = list(dict.fromkeys([*found, *whole]))
+        got = f"digits that fit {('no propeller', 'only whole inches', 'several propellers')[min(len(found), 2)]}"
+        names = " or ".join(f"{D:g}x{p:g}" for D, p in found)
+        raise GeometryError([(where, got, _EXPECTED, f"Write {names}" if names else "Write diameter x pitch")])
     return found[0]

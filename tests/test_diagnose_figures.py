@@ -240,7 +240,7 @@ def test_a_leading_effect_too_faint_at_usual_strength_is_shown_as_found_or_said(
         monkeypatch.setattr(confusion, "confusion", lambda found, at, known=known: known)
         drawn = figures_effects.matrix(faint)
         assert drawn is not None
-        shown, said = LEFT_OUT in rows_of(drawn), LEFT_OUT in drawn.axes[0].get_title()
+        shown, said = LEFT_OUT in rows_of(drawn), LEFT_OUT in drawn.get_suptitle()
         assert (shown, said) == ((True, False) if strength > confusion.ALIKE else (False, True))
 
 

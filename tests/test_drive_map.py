@@ -292,12 +292,15 @@ def test_results_never_replace_a_recording(tmp_path: Path, capsys: pytest.Captur
     assert main(["map", str(path), "--name", "fan", "--out", str(tmp_path)]) == 0
 
 
-def test_a_throttle_in_percent_without_its_unit_is_refused_and_the_suggestion_is_right(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("head", "full", "code"), [("throttle", 100, 0), ("throttle (%)", 100, 0), ("throttle", 1000, 2)]
+)
+def test_a_throttle_without_its_unit_is_percent_where_it_can_be_nothing_else(
+    head: str, full: float, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = "".join(f"{20 * k},{2000 + 2000 * k},{0.2 + 0.7 * k**1.6:.3f}\n" for k in range(1, 6))
-    for head, code in (("throttle", 2), ("throttle (%)", 0)):
-        (tmp_path / "log.csv").write_text(f"{head},rpm,thrust_N\n{rows}")
-        assert main(["map", str(tmp_path / "log.csv"), "--out", str(tmp_path / f"map{code}")]) == code
-    first = next(line for line in capsys.readouterr().out.splitlines() if line.strip()[:1].isdigit())
-    assert float(first.split()[0]) == pytest.approx(1200.0)
+    rows = "".join(f"{full * k / 5:g},{2000 + 2000 * k},{0.2 + 0.7 * k**1.6:.3f}\n" for k in range(1, 6))
+    (tmp_path / "log.csv").write_text(f"{head},rpm,thrust_N\n{rows}")
+    assert main(["map", str(tmp_path / "log.csv"), "--out", str(tmp_path / "map")]) == code
+    if code == 0:
+        first = next(line for line in capsys.readouterr().out.splitlines() if line.strip()[:1].isdigit())
+        assert float(first.split()[0]) == pytest.approx(1200.0)

@@ -276,7 +276,7 @@ def test_a_pusher_and_its_maker() -> None:
 @pytest.mark.parametrize(
     ("text", "got"),
     [
-        ("8", "unreadable text"), ("10x4,7", "Decimal point"), ("-8x5", "unreadable text"), ("10 by 5", "unreadable"),
+        ("8", "unreadable text"), ("10x4,7", "Decimal point"), ("-8x5", "unreadable text"), ("10 on 5", "unreadable"),
         ("10x5Q", "a suffix 'Q'"), ("5x50", "Meant 5x5?"), ("10x100", "Meant 10x10?"), ("8x5x40", "40 blades"),
         ("134x135", "Millimetres need division by 25.4"), ("254x127", "254 in"), ("0x5", "0 in"),
         ("12005", "digits that fit no propeller"),

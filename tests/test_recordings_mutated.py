@@ -189,7 +189,7 @@ def lines_below_the_heading(raw: bytes) -> set[int]:
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return {k for k, line in enumerate(lines, 1) if line.strip(" \t;,|") and not line.lstrip().startswith(("#", "%"))}
+    return {k for k, line in enumerate(lines, 1) if line.strip(" \t;,|") and not re.match(r"\s*[#%](?!\s*[,;|])", line)}
 
 
 def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> Counter[str]:
@@ -212,8 +212,8 @@ def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             outcome["other format"] += 1
             continue
         notes = " ".join(record.notes)
-        head = ("no heading line" not in notes) + ("holds units" in notes)
-        head += sum(int(n) for n in re.findall(r"(\d+) lines above the headings", notes))
+        head = ("no heading line" not in notes and "headings are the comment" not in notes) + ("holds units" in notes)
+        head += sum(int(n) for n in re.findall(r"(\d+) lines (?:above the headings|left out)", notes))
         below = lines_below_the_heading(raw)
         assert len(record.lines) == len(record) == len(below) - head and set(record.lines) <= below, case
         found = findings(record)

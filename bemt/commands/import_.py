@@ -30,7 +30,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     beside = parser.add_argument_group("beside a case")
     beside.add_argument("--case", metavar="CASE", help="say how the recordings lie in the prediction band of this case")
     beside.add_argument("--picture", metavar="FILE.png", help="with --case: draw the recordings inside the band")
-    run = parser.add_argument_group("one CFD run", "what its files do not say; with --out it is kept in a run.toml")
+    what = "with --out it is kept in a run.toml, or in a recording.toml for a table of measurements"
+    run = parser.add_argument_group("what the files do not say", what)
     run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N, report-def-0='N m'",
                      **_options.REPEATABLE)  # fmt: skip
     run.add_argument("--column", metavar="NAME=COLUMN", help="column of a quantity: thrust=fz", **_options.REPEATABLE)
@@ -50,9 +51,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
     )
     run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
-    run.add_argument(
-        "--out", metavar="RUN.TOML", help="write the run here; every command takes it in place of the files"
-    )
+    run.add_argument("--out", metavar="RUN.TOML", help="write it here; every command takes it in place of the files")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -68,6 +67,15 @@ def run(args: argparse.Namespace) -> int:
     load.check_format(args.format)
     names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup", "out")
     insist = any(getattr(args, name) for name in names)
+    if insist and (table := _table(args)):
+        from bemt.recordings.stated import write_recording
+
+        if not args.out:
+            hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
+            raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
+        wrote = write_recording(table, args.out, args.unit, args.column, args.sign).as_posix()
+        print(f"{wrote} written\n\n", end="")
+        args.files, args.unit, args.column, args.sign, args.out, insist = [wrote], [], [], [], None, False
     made = cfd_options.run_from(
         args.files, rpm=None if choice.period is None else 60.0 / choice.period, revolutions=args.revolutions,
         airspeed_m_s=args.airspeed, density_kg_m3=args.density, sector=args.sector, axis=args.axis, zones=args.zones,
@@ -84,6 +92,23 @@ def run(args: argparse.Namespace) -> int:
     first = f"{view.sentence}\n\n" if view is not None else ""
     print(json_text(found) if args.json else first + load.text(found, wrote), end="")
     return load.exit_code(found)
+
+
+def _table(args: argparse.Namespace) -> str | None:
+    """The one table of measurements whose columns the options are about; None where they are about a CFD run."""
+    from bemt import readers
+    from bemt.base.errors import InputError
+    from bemt.readers.cfd_run import KIND as RUN
+    from bemt.recordings.cfd_run import PROGRAMS
+
+    others = ("sector", "zones", "axis", "airspeed", "density", "reference", "setup")
+    if len(args.files) != 1 or any(getattr(args, name) for name in others) or Path(args.files[0]).is_dir():
+        return None
+    try:
+        kind = readers.detect(args.files[0])
+    except InputError:
+        return None
+    return None if kind in PROGRAMS or kind == RUN else str(args.files[0])
 
 
 def _beside(args: argparse.Namespace, run_toml: str) -> PredictionView | None:

@@ -11,7 +11,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.compare.selection import NUMBERED, ROTOR, rotors_of
 from bemt.dataset import Dataset
 from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
-from bemt.recordings.channels import named
+from bemt.recordings.channels import in_one_step, named
 from bemt.recordings.windmilling import zero_thrust_speed
 
 LOAD_CHANNELS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")
@@ -71,6 +71,8 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
                 hint = "Head it " + " or ".join(f"{heading} ({unit})" for unit in units)
                 got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
                 faults.append(Fault(path, f"column {heading}", got, expected, hint))
+    if faults and (step := in_one_step(imported)):
+        faults[-1] = replace(faults[-1], hint=f"{faults[-1].hint}{step}")
     beside = Path(path).with_name("recording.toml")
     if faults and any("names this file" in note for note in imported.notes):
         faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]

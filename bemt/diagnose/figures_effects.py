@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
+from bemt.base.canvas import BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.bem import model as bem
 from bemt.bem import solver
 from bemt.diagnose import confusion
@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 __all__ = ["blade_loads", "matrix", "radius", "ranking"]
 
 Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
-_MOST_EFFECTS, _MOST_BARS = 15, 8
+_MOST_EFFECTS, _MOST_BARS = 10, 8
+# Probability below which an explanation is summed up with others.
+_LEAST_BAR = 0.01
 # Probability of an explanation from which its effects lead the ranking.
 _LEADING = 0.05
 
@@ -120,94 +121,81 @@ def _as_found(answer: Diagnosis) -> confusion.Confusion:
 
 
 def matrix(answer: Diagnosis) -> Figure | None:
-    """Draw which effects look alike in this plan: the likely ones first, at the strength that was found."""
-    from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
-    from matplotlib.patches import Rectangle
-
+    """Draw what this plan cannot tell from each effect: the likely ones first, at the strength that was found."""
     alike, share = _as_found(answer), _likely(answer)
     seen = np.flatnonzero(alike.size >= confusion.ALIKE)
     if seen.size < 2:
         return None
-    strongest = sorted(seen, key=lambda i: (-round(share.get(alike.ids[i], 0.0), 3), -alike.size[i]))[:_MOST_EFFECTS]
+    D = np.where(np.eye(len(alike.ids), dtype=bool), np.inf, np.minimum(alike.distance, alike.distance.T))
+    near = D[np.ix_(seen, seen)].min(axis=1)
+    order = sorted(range(seen.size), key=lambda k: (-round(share.get(alike.ids[seen[k]], 0.0), 3), near[k]))
+    rows = [int(seen[k]) for k in order][:_MOST_EFFECTS]
     drawn = {alike.ids[i] for i in seen}
     hidden = [i for i, p in share.items() if p >= _LEADING and i not in drawn]
     usual = dict(zip(answer.alike.ids, answer.alike.size, strict=True))
-    rows = _neighbours(alike.distance, np.array(sorted(strongest)))
-    D = alike.distance[np.ix_(rows, rows)]
-    names, n = [alike.ids[i] for i in rows], rows.size
-    figure, axes = blank(max(1.9 + 0.32 * n, 3.6), 1, 1)
-    axis: Axes = axes[0, 0]
     top = 4.0 * confusion.ALIKE
-    colours = LinearSegmentedColormap.from_list("alike", [ORANGE, "#fff4da", "#ffffff", "#d7ecf9", SKY])
-    norm = TwoSlopeNorm(confusion.ALIKE, 0.0, top)
-    shown = np.ma.masked_array(np.minimum(D, top), np.eye(n, dtype=bool))
-    axis.set_facecolor("#e4e4e4")
-    image = axis.imshow(shown, cmap=colours, norm=norm, aspect="auto")
-    for i in range(n):
-        for j in range(n):
-            if i == j:
-                continue
-            text = f"{D[i, j]:.1f}" if D[i, j] < 9.95 else f"{D[i, j]:.0f}" if D[i, j] < 999.5 else ">999"
-            axis.text(j, i, text, ha="center", va="center", fontsize=7)
-            if D[i, j] < confusion.ALIKE:
-                axis.add_patch(Rectangle((j - 0.47, i - 0.46), 0.94, 0.92, fill=False, linewidth=1.1))
-    axis.set_xticks(range(n), names, rotation=40, ha="right", rotation_mode="anchor")
-    axis.set_yticks(range(n), [f"{i}, as found" if usual[i] < confusion.ALIKE else i for i in names])
-    axis.tick_params(length=0)
-    axis.spines[:].set_visible(False)
-    axis.set(xlabel="from the nearest setting of", ylabel="distance of")
-    left = "" if seen.size <= n else f"; {n} of {seen.size} visible effects"
+    figure, axes = blank(1.7 + 0.34 * len(rows), 1, 1)
+    axis: Axes = axes[0, 0]
+    axis.axvspan(0.0, confusion.ALIKE, facecolor=ORANGE, alpha=0.25, edgecolor="none")
+    alone = 0
+    for y, i in enumerate(rows):
+        others = np.array([j for j in seen if j != i])
+        d = D[i, others]
+        twins = [alike.ids[j] for j in others[np.argsort(d, kind="stable")] if D[i, j] < confusion.ALIKE]
+        alone += not twins
+        axis.plot(np.minimum(d, top), np.full(d.size, y), "o", color=GREY, markersize=4, alpha=0.5)
+        axis.plot(d[d < confusion.ALIKE], np.full(len(twins), y), "o", color=RED, markersize=7)
+        more = f" and {len(twins) - 2} more" if len(twins) > 2 else ""
+        words = ", ".join(twins[:2]) + more if twins else "told from all others"
+        axis.text(1.02, y, words, transform=axis.get_yaxis_transform(), va="center", color=RED if twins else GREY)
+    axis.set(xlim=(0.0, top * 1.02), xlabel="distance to every other effect [standard deviations]")
+    axis.set_xticks([0.0, confusion.ALIKE, 6.0, 9.0, top], ["0", f"{confusion.ALIKE:g}", "6", "9", f"{top:g} or more"])
+    names = [alike.ids[i] for i in rows]
+    axis.set_yticks(range(len(rows)), [f"{i}, as found" if usual[i] < confusion.ALIKE else i for i in names])
+    axis.set_ylim(len(rows) - 0.5, -0.5)
+    axis.tick_params(axis="y", length=0)
+    axis.text(1.02, -0.75, "looks like", transform=axis.get_yaxis_transform(), va="bottom", weight="bold")
+    left = "" if seen.size <= len(rows) else f"{len(rows)} of {seen.size} effects are shown"
+    told = f"In this plan {len(rows) - alone} of {len(rows)} effects look like another"
+    told = told if alone < len(rows) else "This plan tells all these effects apart"
     faint = f"\nLikely, but too faint in this plan to be told from nothing: {', '.join(hidden)}" if hidden else ""
-    axis.set_title(f"Framed: closer than {confusion.ALIKE:g} standard deviations, alike in this plan{left}{faint}")
-    bar = figure.colorbar(image, ax=axis, label="distance [standard deviations]", extend="max", pad=0.02)
-    bar.set_ticks([0.0, 1.0, 2.0, confusion.ALIKE, 6.0, 9.0, top])
-    bar.ax.axhline(confusion.ALIKE, color=BLACK, linewidth=1.6)
+    red = f"red: closer than {confusion.ALIKE:g} standard deviations" if alone < len(rows) else ""
+    more = "\n" + "; ".join(filter(None, (red, left))) if red or left else ""
+    figure.suptitle(f"{told}{more}{faint}", x=0.01, ha="left", fontsize=11)
     return figure
 
 
-def _neighbours(distance: Array, rows: Index) -> Index:
-    """Order that puts alike effects side by side."""
-    from scipy.cluster.hierarchy import leaves_list, linkage
-    from scipy.spatial.distance import squareform
-
-    if rows.size < 3:
-        return rows
-    D = distance[np.ix_(rows, rows)]
-    near = np.minimum(np.minimum(D, D.T), 100.0)
-    np.fill_diagonal(near, 0.0)
-    return np.asarray(rows[leaves_list(linkage(squareform(near, checks=False), "average"))])
-
-
 def ranking(answer: Diagnosis) -> Figure:
-    """Draw the explanations by their probability."""
+    """Draw the explanations by their probability; they add up to 100 %."""
     found = answer.found
-    names = sorted(found.probability, key=lambda k: -found.probability[k])[:_MOST_BARS]
-    odds = [0.0 if k == NONE else found.log_bayes(k) for k in names]
+    order = sorted(found.probability, key=lambda k: -found.probability[k])
     chosen = set(answer.decision.effects)
+    names = [k for k in order[:_MOST_BARS] if found.probability[k] >= _LEAST_BAR]
+    rest = [k for k in order if k not in names]
 
     def colour(what: Explanation) -> str:
         if not what:
             return GREY if what == NONE else PURPLE
         return BLUE if chosen & what.ids else SKY
 
-    figure, axes = blank(1.1 + 0.3 * len(names), 1, 2, sharey=True)
-    left, right = axes[0]
-    rows = np.arange(len(names))
-    shares = [found.probability[k] for k in names]
+    labels = [" + ".join(k) or {NONE: "nothing"}.get(k, "none of the known") for k in names]
+    shares = [100.0 * found.probability[k] for k in names]
     tint = [colour(k) for k in names]
-    for axis, sizes, digits in ((left, shares, 3), (right, odds, 1)):
-        bars = axis.barh(rows, sizes, color=tint)
-        axis.bar_label(bars, fmt=f"%.{digits}f", padding=3, fontsize=8)
-    left.set(
-        xlim=(0, 1.15), xlabel="probability [1]", yticks=rows, yticklabels=[" + ".join(k) or str(k) for k in names]
-    )
-    left.set_xticks([0, 0.25, 0.5, 0.75, 1])
-    left.invert_yaxis()
-    right.axvline(0.0, color=BLACK, linewidth=0.8)
-    right.set(xlabel="ln odds of the readings over none [1]")
-    right.margins(x=0.15)
-    right.locator_params(axis="x", nbins=6)  # beyond that, labels with two digits run into each other
-    words = " ".join(["verdict:", answer.decision.verdict, ", ".join(answer.decision.effects)]).strip()
-    words += f"; p = {answer.p_value:.2g}"
-    figure.suptitle(words, fontsize=9)
+    if rest:
+        labels.append(f"{len(rest)} other{'s' if len(rest) > 1 else ''}, together")
+        shares.append(100.0 * sum(found.probability[k] for k in rest))
+        tint.append("#d9d9d9")
+    figure, axes = blank(1.6 + 0.36 * len(labels), 1, 1)
+    axis: Axes = axes[0, 0]
+    bars = axis.barh(np.arange(len(labels)), shares, color=tint)
+    axis.bar_label(bars, [f"{v:.0f} %" if v >= 0.95 else f"{v:.1f} %" for v in shares], padding=4, fontsize=11)
+    axis.set(xlim=(0.0, 112.0), xlabel="probability that it explains the recording [%]")
+    axis.set_yticks(np.arange(len(labels)), labels, fontsize=11)
+    axis.set_xticks([0, 25, 50, 75, 100])
+    axis.tick_params(axis="y", length=0)
+    axis.invert_yaxis()
+    first = f"{labels[0]} {shares[0]:.0f} %"
+    next_one = f", then {labels[1]} {shares[1]:.0f} %" if len(names) > 1 else ""
+    words = " ".join(["Verdict:", answer.decision.verdict, ", ".join(answer.decision.effects)]).strip()
+    figure.suptitle(f"{words}\nMost probable: {first}{next_one}", x=0.01, ha="left", fontsize=11)
     return figure

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset, concat
+from bemt.readers._recording import FULL_THROTTLE
 from bemt.recordings import plateaus
+from bemt.recordings.channels import THROTTLE_IS_PULSE, pulse_of
 
 Array = NDArray[np.float64]
 CHANNELS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "electrical_power_W"}
@@ -41,9 +43,6 @@ def _channel(got: Dataset, *names: str) -> Array | None:
     return None
 
 
-_FULL = 1.05  # throttle beyond which it is no fraction
-
-
 def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     pulse = _channel(got, "pulse_width_s")
     if pulse is not None:
@@ -51,11 +50,11 @@ def _command(got: Dataset, name: str, notes: list[str]) -> Array:
     throttle = _channel(got, "throttle")
     if throttle is not None:
         full = float(np.nanmax(throttle, initial=0.0))
-        if full > _FULL:
+        if full > FULL_THROTTLE:
             told = f"throttle up to {full:g} without a unit"
             raise InputError(Fault(name, "throttle", told, "a fraction of 0 to 1", "In percent? Head it throttle (%)"))
-        notes.append("throttle read as 1000 us at 0 % and 2000 us at 100 %, which the file does not say")
-        return 1000.0 + 1000.0 * throttle
+        notes.append(THROTTLE_IS_PULSE)
+        return 1e6 * pulse_of(throttle)
     hint = "Log the ESC signal, or name its column as pulse_width or throttle in a recording.toml"
     raise InputError(Fault(name, "pulse_width_s", "no pulse width and no throttle", "a command per row", hint))
 

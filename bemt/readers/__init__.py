@@ -50,7 +50,7 @@ class SourceText:
     name : str
         Path as given by the user; appears in faults.
     text : str
-        Decoded content (UTF-8, UTF-16 with its mark, else Latin-1), without a byte order mark.
+        Decoded content (see `decode`), without a byte order mark.
     sha256 : str
         Hash of the bytes of the file, hexadecimal.
     """
@@ -79,7 +79,8 @@ def decode(raw: bytes) -> str:
     Parameters
     ----------
     raw : bytes
-        UTF-8, UTF-16 with its mark, or Latin-1; the last character of UTF-8 that has others beyond ASCII may be cut.
+        UTF-8, UTF-16 with its mark, Windows-1252, or another code in which a known heading shows; the last character
+        of UTF-8 that has others beyond ASCII may be cut.
 
     Returns
     -------
@@ -99,6 +100,23 @@ def decode(raw: bytes) -> str:
         cut = error.start > len(raw) - 4 and "unexpected end" in error.reason
         if cut and not raw[: error.start].isascii():
             return raw[: error.start].decode("utf-8-sig")
+        return _other_code(raw)
+
+
+_CODES = ("gb18030", "shift_jis", "big5", "cp1251")
+"""Codes of spreadsheets in China, Japan, Taiwan and Russia: taken where they show a word of a heading."""
+
+
+def _other_code(raw: bytes) -> str:
+    """Text of bytes that are no UTF-8, in the code in which a heading shows words that are known."""
+    from bemt.readers._words import FOREIGN
+
+    for code in _CODES:
+        if any(word in raw[:HEAD_BYTES].decode(code, errors="ignore").lower() for word in FOREIGN):
+            return raw.decode(code, errors="replace")
+    try:
+        return raw.decode("cp1252")
+    except UnicodeDecodeError:
         return raw.decode("latin-1")
 
 

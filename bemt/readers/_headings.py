@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from bemt.base import units
+from bemt.readers._words import english, plain, quantities
 
 _SAME = {
     "sec": "s", "seconds": "s", "msec": "ms", "rev/min": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
@@ -27,6 +29,13 @@ _SAME = {
     "t/min": "rpm", "rad/seg": "rad_s", "vueltas/min": "rpm", "umdr/min": "rpm", "upm": "rpm", "tr mn": "rpm",
     "rev/minute": "rpm", "revs/min": "rpm", "k rpm": "krpm", "krpm": "krpm", "in hg": "inHg", "inhg": "inHg",
     "mm hg": "mmHg", "mmhg": "mmHg", "torr": "mmHg", "millibar": "mbar", "mb": "mbar",
+    "giri/min": "rpm", "giri/1'": "rpm", "об/мин": "rpm", "转/分": "rpm", "轉/分": "rpm", "r/m": "rpm",
+    "omw/min": "rpm",
+    "obr/min": "rpm", "ot/min": "rpm", "tours/min": "rpm", "trs/min": "rpm", "rpm/min": "rpm", "rot/min": "rpm",
+    "min -1": "rpm", "kts": "kt", "fps": "ft_s", "kph": "km_h", "kmh": "km_h", "kilowatt": "kW", "millivolt": "mV",
+    "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "秒": "s", "с": "s",
+    "в": "V", "а": "A", "вт": "W", "н": "N", "нм": "Nm", "н м": "Nm", "安": "A", "伏": "V", "瓦": "W", "牛": "N",
+    "pct.": "pct", "prozent": "pct", "kg/cubic metre": "kg_m3", "kp cm": "kgf_cm", "kpcm": "kgf_cm", "kgcm": "kgf_cm",
 }  # fmt: skip
 _TWO_MEANINGS = {
     "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
@@ -48,6 +57,9 @@ _COMPOUND = {
     "gf/W": units.Unit("N_W", "efficacy", units.KGF * 1e-3), "kgf/W": units.Unit("N_W", "efficacy", units.KGF),
     "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
     "m/s2": units.Unit("m_s2", "acceleration", 1.0), "m/s^2": units.Unit("m_s2", "acceleration", 1.0),
+    "daN": units.Unit("", "force", 10.0), "cN": units.Unit("", "force", 0.01), "kp": units.UNITS["kgf"],
+    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF),
+    "ch": units.Unit("", "power", 75.0 * units.KGF),
 }  # fmt: skip
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
@@ -77,26 +89,11 @@ _WORDS = {  # heading in lower case -> name and dimension it must have
     "accx": ("acceleration_x", "acceleration"),
     "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
-_TONGUES = {  # German, French, Spanish: what stands before the unit, without accents, as English says it
-    "drehzahl": "rotation speed", "motordrehzahl": "motor speed", "propellerdrehzahl": "propeller speed",
-    "schub": "thrust", "schubkraft": "thrust", "standschub": "thrust", "zugkraft": "thrust", "drehmoment": "torque",
-    "moment": "torque", "spannung": "voltage", "akkuspannung": "voltage", "strom": "current",
-    "stromstarke": "current", "leistung": "power", "elektrische leistung": "electrical power",
-    "wellenleistung": "mechanical power", "eingangsleistung": "electrical power", "zeit": "time",
-    "fluggeschwindigkeit": "airspeed", "luftdruck": "pressure", "temperatur": "temperature",
-    "lufttemperatur": "temperature", "gas": "throttle", "gasstellung": "throttle",
-    "poussee": "thrust", "traction": "thrust", "couple": "torque", "regime": "rotation speed",
-    "vitesse de rotation": "rotation speed", "vitesse": "speed", "vitesse air": "airspeed", "tension": "voltage",
-    "courant": "current", "intensite": "current", "puissance": "power", "puissance electrique": "electrical power",
-    "puissance mecanique": "mechanical power", "temps": "time", "pression": "pressure", "commande": "throttle",
-    "empuje": "thrust", "par": "torque", "par motor": "torque", "momento": "torque", "velocidad": "speed",
-    "velocidad de giro": "rotation speed", "velocidad del motor": "motor speed", "velocidad del aire": "airspeed",
-    "voltaje": "voltage", "corriente": "current", "potencia": "power", "potencia electrica": "electrical power",
-    "potencia mecanica": "mechanical power", "tiempo": "time", "presion": "pressure", "acelerador": "throttle",
-}  # fmt: skip
 _WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
     "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
+    "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
+    "公斤": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
 }  # fmt: skip
 """Units of mass in which stands state a force: that which the mass weighs."""
 _FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
@@ -205,8 +202,9 @@ def unit_of(text: str) -> units.Unit | str:
     t = text.strip()
     for wrong, right in _MOJIBAKE:
         t = t.replace(wrong, right)
-    t = re.sub(r"[·⋅*]|(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", t).replace("µ", "u").replace("μ", "u")
-    t = " ".join(re.sub("[°º˚]", "deg", t.replace("³", "3").replace("²", "2")).split())
+    t = unicodedata.normalize("NFKC", t.replace("º", "°").replace("⁻", "^-", 1)).replace("\u2212", "-")
+    t = re.sub(r"[·⋅∙•×*]|(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", t).replace("µ", "u").replace("μ", "u")
+    t = " ".join(re.sub("[°˚]", "deg", t).split()).replace("^^", "^")
     power = re.fullmatch(r"(\w+) (\w+)\^?-([123])", t)  # m s^-1
     if power:
         t = f"{power[1]}/{power[2]}" + (power[3] if power[3] != "1" else "")
@@ -252,16 +250,10 @@ def slug(text: str) -> str:
     return re.sub(r"_+", "_", re.sub(r"[^\w/]+", "_", text.strip())).strip("_")
 
 
-def _plain(text: str) -> str:
-    """Lower case without accents; blanks for underscores."""
-    bare = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
-    return " ".join(bare.lower().replace("_", " ").split())
-
-
 def _spoken(text: str) -> tuple[str, set[str]]:
     """What stands before the unit of a heading, in plain English, and its words."""
-    base = re.split(r"[(\[]", _plain(text))[0].strip()
-    return base, set(re.findall(r"[^\W\d]+", _TONGUES.get(base, base)))
+    base = re.split(r"[(\[]", plain(text))[0].strip()
+    return base, set(english(base))
 
 
 def may_be_shaft_speed(text: str) -> bool:
@@ -301,6 +293,8 @@ def heading(text: str) -> Heading:
     ('temperature_K', 'rpm', 'rpm')
     """
     text = " ".join(text.split())
+    if re.fullmatch(r"[a-z]{2,}[A-Z]\w*", text):  # thrustGrams
+        return replace(heading(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)), text=text)
     if thousands := _THOUSANDS.fullmatch(text):
         found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
         told = f"{text!r} is read as thousands of revolutions per minute"
@@ -310,12 +304,10 @@ def heading(text: str) -> Heading:
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
-    english = _TONGUES.get(_plain(parts[1] if parts else text), "")
-    if english:
-        found = heading(f"{english} ({parts[2]})" if parts else english)
-        return replace(found, text=text, told=found.told.replace(found.text, text))
+    if (by_words := _by_words(text)) is not None:
+        return by_words
     unit = _WEIGHTS.get(parts[2]) if parts else None
-    if parts and unit and _THRUSTS.fullmatch(_plain(parts[1])):
+    if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
         told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
         return replace(found, text=text, told=told)
@@ -324,7 +316,7 @@ def heading(text: str) -> Heading:
         return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
     if parts and re.fullmatch(r"[gG]/W", parts[2]):
         return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
-    if parts and (qualified := _QUALIFIED.fullmatch(_plain(parts[1]))):
+    if parts and (qualified := _QUALIFIED.fullmatch(plain(parts[1]))):
         name = next(word for word in qualified.groups() if word)
         unit = _weight(parts[2]) if name == "torque" else ""
         found = _heading(f"{name} ({unit or parts[2]})")
@@ -333,7 +325,84 @@ def heading(text: str) -> Heading:
             return replace(found, text=text, told=told)
         if found.unit is not None:
             return replace(found, text=text)
-    return _heading(text)
+    found = _heading(text)
+    if found.unit is None and not found.doubt and not text.isascii() and quantities(words := english(text)):
+        return replace(found, name=slug(" ".join(dict.fromkeys(words))))
+    return found
+
+
+def _splits(text: str) -> Iterator[tuple[str, str]]:
+    """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
+    for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
+        yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
+    if not re.search(r"[(\[]", text):
+        for mark in (r"\s+(?:in|en|em)\s+", r"\s+[-\u2013\u2014:]\s+", r"\s*[,;:]\s*", r"\s*/\s*", r"[\s_-]+"):
+            for found in re.finditer(mark, text):
+                unit = text[found.end() :]
+                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
+                    yield text[: found.start()], unit
+    yield text, ""
+
+
+_ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kgf": "kgf", "lbf": "lbf", "s": "s",
+             "kw": "kW", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "c": "C", "f": "F", "k": "K", "ncm": "Ncm", "hp": "hp",
+             "us": "us", "kn": "kN", "m/s": "m_s"}  # fmt: skip
+"""Units that capitals do not change where the quantity is known."""
+
+
+def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
+    """Unit of a quantity of known dimension ("": any), and what was taken for granted."""
+    found = unit_of(text)
+    if not dimension:
+        return (found, "") if isinstance(found, units.Unit) else None
+    if dimension == "force" and (weight := _WEIGHTS.get(unicodedata.normalize("NFKC", text))):
+        return units.UNITS[weight], f"{_FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
+    if dimension == "torque" and isinstance(found, str) and (weight := _weight(text)):
+        made = unit_of(weight)
+        assert isinstance(made, units.Unit)
+        return made, f"{weight.replace(' ', ' times ')}: a weight, as stands mean it"
+    if not isinstance(found, units.Unit):
+        found = units.UNITS.get(_ANY_CASE.get(text.lower(), ""), "")
+    return (found, "") if isinstance(found, units.Unit) and found.dimension == dimension else None
+
+
+_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
+_LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
+
+
+def _by_words(text: str) -> Heading | None:
+    """Heading whose words are one quantity, in any of the languages, with a unit that goes with it; None: another."""
+    bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
+    words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
+    if found := _COEFFICIENT.fullmatch(" ".join(words)):
+        return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
+    if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(
+        unit := unit_of(bare[1:].strip(" ()[]")), units.Unit
+    ):
+        if unit.dimension == "time":
+            return Heading(text, "time_s", unit)
+    for base, unit in _splits(bare):
+        words = english(base)
+        for name, dimension in quantities(words):
+            if not unit:
+                if name == "rpm" and "rpm" in words:
+                    return Heading(text, "rpm", units.UNITS["rpm"])
+                if set(words) == {"throttle"} and not re.search(r"[\s_]", bare):
+                    return Heading(text, "throttle", units.Unit("", "none", 1.0))
+                continue
+            if (goes := unit_for(dimension, unit)) is None:
+                continue
+            made, told = goes
+            if dimension == "angular_speed":
+                if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
+                    turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
+                    return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
+                made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
+                return Heading(text, "rpm", made)
+            si = _si_name(made)
+            label = slug(name) + ("" if si == "-" else f"_{si}")
+            return Heading(text, label, made, told=f"{text!r} is read as {told}" if told else "")
+    return None
 
 
 def _weight(text: str) -> str:
@@ -370,7 +439,7 @@ def _either(text: str) -> str:
 
 def _of_the_air(base: str, unit: units.Unit) -> str:
     """Quantity of the air around the rotor that a heading names; "qnh" for a pressure that is no local one; "" none."""
-    words = set(re.findall(r"[^\W\d_]+", _plain(base)))
+    words = set(re.findall(r"[^\W\d_]+", plain(base)))
     if unit.dimension == "pressure" and words & {"qnh", "slp"}:
         return "qnh"
     if unit.dimension == "fraction" and (words & {"humidity", "rh", "luftfeuchte", "luftfeuchtigkeit", "humedad"}):

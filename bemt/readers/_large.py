@@ -82,7 +82,7 @@ def large_table(path: str | os.PathLike[str]) -> tuple[NumberTable, str] | None:
     if head.misfits or tuple(head.lines) != tuple(range(first, first + len(head.rows))):
         return None
     decimal = decimal_mark(head)
-    if any(len(head.numbers(k, decimal)[1]) > MOST_ODD * len(head) for k in range(head.width)):
+    if decimal == ".," or any(len(head.numbers(k, decimal)[1]) > MOST_ODD * len(head) for k in range(head.width)):
         return None
     start = 0
     for _ in range(first - 1):

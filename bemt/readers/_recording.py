@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import difflib
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,11 +22,16 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._clock import clock_seconds
 from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, may_be_shaft_speed, slug, surely_shaft_speed
+from bemt.readers._headings import Heading, heading, may_be_shaft_speed, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
-from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, some
+from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, with_unit
+from bemt.readers._words import english, quantities
 
 Array = NDArray[np.float64]
+FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
+"""Throttle beyond which it is no fraction; greatest one from which it is percent. [1]"""
+HOTTEST_AIR, MOST_AIR_VARIES = 323.0, 20.0
+"""Temperature above which, and range over which, no air around a stand is. [K]"""
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BLOCK = 1 << 17
 """Samples that are searched for spikes at once."""
@@ -92,6 +99,8 @@ class Builder:
     empty: list[str] = field(default_factory=list)
     words: list[str] = field(default_factory=list)
     clocks: list[str] = field(default_factory=list)
+    units_stated: set[str] = field(default_factory=set)
+    asks: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
@@ -138,6 +147,12 @@ class Builder:
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
             self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))
             return ""
+        if bad and (stated := self._one_unit(index, bad)):
+            values, bad, _ = column_numbers([(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], decimal)
+            cells = {i: self.table.cell(i, index) for i in bad}
+            head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
+            head = replace(head, text=label)
+            self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
         name = self.free(head.name)
         if len(bad) > MOST_ODD * (len(values) - empty):
             column = self.table.cells(index)
@@ -170,14 +185,57 @@ class Builder:
             over = np.isinf(values)
             self.flag(np.flatnonzero(over), f"{name}: too large a number", "; NaN there")
             values[over] = np.nan
+        if head.unit is not None and head.unit.dimension == "fraction":
+            self.units_stated.add(name)
         if head.name != name:
             self.warnings.append(f"column {label!r} has the name of another column: kept as {name}")
         self.channels[name] = Channel(values if sign == 1.0 else values * sign, head.unit_name)
         self.headings[name] = head.text
         return name
 
+    def _one_unit(self, index: int, bad: Sequence[int]) -> str:
+        """Unit that the cells of a column say, all of them the same; "" for any other column."""
+        stated = {found[1] if (found := with_unit(self.table.cell(i, index))) else "" for i in bad}
+        return stated.pop() if len(stated) == 1 and len(bad) > 1 else ""
+
+    def check_command(self) -> None:
+        """A throttle without a unit: percent where it can be nothing else, else no unit; either is said."""
+        channel = self.channels.get("throttle")
+        top = float(np.nanmax(channel.values, initial=0.0)) if channel is not None else 0.0
+        if channel is None or top <= FULL_THROTTLE or "throttle" in self.units_stated:
+            return
+        label = self.headings["throttle"]
+        if LEAST_PERCENT <= top <= 100.0 * FULL_THROTTLE and float(np.nanmin(channel.values)) >= 0.0:
+            self.channels["throttle"] = Channel(channel.values / 100.0, "-")
+            self.warnings.append(f"{label!r} goes up to {top:g} without a unit: read as percent")
+        else:
+            self.channels["throttle"] = Channel(channel.values, "")
+            self.unitless.append(f"{label!r} (up to {top:g}: head it throttle (%), or PWM (us) for a pulse width)")
+
+    def check_air(self) -> None:
+        """A temperature that only a part reaches is not that of the air, whatever its heading leaves open."""
+        channel = self.channels.get("temperature_K")
+        stated = self.format == "recording" or set(english(self.headings.get("temperature_K", "air"))) & {
+            "ambient",
+            "air",
+        }
+        if channel is None or stated:
+            return
+        v = channel.values[np.isfinite(channel.values)]
+        if v.size and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):
+            label = self.headings.pop("temperature_K")
+            name = self.free("part_temperature_K")
+            self.channels = {name if k == "temperature_K" else k: c for k, c in self.channels.items()}
+            self.headings[name] = label
+            told = (
+                f"{label!r} goes from {np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C: a part's, not the air's"
+            )
+            self.warnings.append(told + "; head that of the air Ambient temperature (C)")
+
     def check_magnitudes(self) -> None:
         """Warn of magnitudes that look like a slip of units; nothing is converted."""
+        self.check_command()
+        self.check_air()
         for name, (low, high, hint) in _PLAUSIBLE.items():
             for key, channel in self.channels.items():
                 if not (key == name or key.endswith("_" + name)) or not channel.unit:
@@ -237,6 +295,12 @@ class Builder:
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")
+        asks = [*self.asks, *_asked(self.unitless, self.channels)]
+        if asks and self.format == "table":
+            file = Path(self.table.source.name)
+            out = shlex.quote(file.with_name("recording.toml").as_posix())
+            step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
+            self.warnings.append(f"in one step, with your units in place of UNIT: {step}" if "UNIT" in step else step)
         said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
@@ -270,6 +334,19 @@ _MEANINGS = ("rpm", "thrust", "torque", "voltage", "current", "power", "time", "
              "temperature", "density", "humidity")  # fmt: skip
 
 
+def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
+    """Options of ``bemt import`` that state the unit of headings whose words are one quantity."""
+    out: dict[str, str] = {}
+    for label in headings:
+        name = label[1:].rsplit("'", 1)[0].split("' (")[0]
+        found = {q.replace(" ", "_") for q, _ in quantities(english(re.split(r"[(\[]", name)[0]))}
+        found -= {"pulse_width"} if "throttle" in found else set()
+        quantity = "power" if found == {"mechanical_power"} else found.pop() if len(found) == 1 else ""
+        if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
+            out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
+    return list(out.values())
+
+
 def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
     r"""What headings without a unit may mean, and the line of a recording.toml that says so; empty: nothing is near.
 
@@ -286,7 +363,8 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
         word = re.split(r"[\s_(\[]", name.strip().lower())[0]
         found = _speeds_meant(name, channels) if may_be_shaft_speed(name) else None
         if found is None:
-            found = difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
+            known = [q for q, _ in quantities(english(name)) if q in _MEANINGS]
+            found = known[:1] or difflib.get_close_matches(word, _MEANINGS, 1, 0.75)
         if found:
             near[name] = found
     if not near:

@@ -17,6 +17,7 @@ from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
+from bemt.readers._words import english, quantities
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
@@ -30,6 +31,16 @@ MISFIT_SHARE = 0.05
 """Share of lines of another length from which a file is refused."""
 _COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:([,. '\u2019\u00a0\u202f])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+"""Digits in groups of three."""
+_SUMMARY = re.compile(
+    r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe"
+    r"|moyenne|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
+    re.IGNORECASE,
+)
+"""First cells of rows that sum up the others."""
+_LABVIEW = "***End_of_Header***"
+_COMMENT = re.compile(r"\s*[#%](?!\s*[,;|])")
 _EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 
 
@@ -44,6 +55,7 @@ class SplitTable:
     lines: tuple[int, ...]
     warnings: tuple[str, ...] = ()
     cut: int | None = None  # index of a row that the end of the file cut off
+    headings_line: int = 1
     misfits: tuple[int, ...] = ()  # rows of another number of cells: kept, without values
 
     def __len__(self) -> int:
@@ -73,7 +85,13 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
     bad: list[int] = []
     empty = 0
     for i, cell in enumerate(cells):
-        value = number(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
+        if decimal == ",":
+            value = _ungrouped(cell, ",") if "." in cell else None
+            value = number(cell.replace(",", ".") if "." not in cell else cell) if value is None else value
+        else:
+            value = number(cell)
+        if value is None and cell:
+            value = _ungrouped(cell, decimal)
         if value is not None:
             values[i] = value
         elif cell.lower() in NO_VALUE:
@@ -81,6 +99,20 @@ def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np
         else:
             bad.append(i)
     return values, bad, empty
+
+
+def _ungrouped(cell: str, decimal: str) -> float | None:
+    """Number whose digits are in groups of three, where the marks leave one reading.
+
+    >>> _ungrouped("1 234,5", ","), _ungrouped("1,234.5", "."), _ungrouped("1,234", ".")
+    (1234.5, 1234.5, None)
+    """
+    grouped = _GROUPED.fullmatch(cell)
+    if not grouped or grouped[1] == decimal[0]:
+        return None
+    bare = cell.replace(grouped[1], "")
+    alone = grouped[1] in ",." and bare.lstrip("+-").isdigit() and cell.count(grouped[1]) == 1
+    return None if alone and decimal == "." else number(bare.replace(",", "."))
 
 
 def split_line(line: str, mark: str) -> list[str]:
@@ -92,10 +124,26 @@ def split_line(line: str, mark: str) -> list[str]:
     return [c.strip() for c in line.split(mark)]
 
 
+def heading_cells(line: str, mark: str, width: int) -> list[str]:
+    """Cells of a line of headings; between blanks, parted by two or more if that makes as many as the rows have."""
+    cells = split_line(line, mark)
+    apart = re.split(r"\s{2,}", line.strip()) if mark == " " and len(cells) != width else cells
+    return apart if len(apart) == width else cells
+
+
 def _is_units(cells: Sequence[str]) -> bool:
     """Whether a line below the headings holds nothing but units."""
     stated = [unit_of(c.strip("()[]")) for c in cells if c.strip("-()[]")]
     return bool(stated) and all(isinstance(u, units.Unit) or u for u in stated)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment; ``%,A,V`` holds units.
+
+    >>> is_comment("# day 2"), is_comment("%;1/min;N")
+    (True, False)
+    """
+    return bool(_COMMENT.match(line))
 
 
 def some(items: Iterable[object], limit: int = 5) -> str:
@@ -129,6 +177,9 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
     >>> find_start(["Run 7", "rpm;T_N", "1;2", "3;4"]), find_start(["sep=;", "rpm;T_N", "1;2"])
     ((1, ';'), (1, ';'))
     """
+    ends = [k for k, line in enumerate(lines) if line.startswith(_LABVIEW)]
+    if ends and ends[-1] + 2 < len(lines):
+        return ends[-1] + 1, find_delimiter(lines[ends[-1] + 1 : ends[-1] + 4])
     excel = _EXCEL.fullmatch(lines[0]) if lines else None
     if excel:
         return 1, excel[1]
@@ -145,25 +196,122 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
         rows = all(len(cells) == width and any(number(c) is not None for c in cells) for cells in body)
         if said and rows and not _is_units(names):
             return start, mark
-    return 0, find_delimiter(lines[:5])
+    usual = find_delimiter(lines[:5])
+    return _below_a_block(lines, usual) or (0, usual)
+
+
+def _reads(cell: str) -> bool:
+    """Whether a cell is a number, in whatever way it is written."""
+    return number(cell) is not None or bool(
+        cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell))
+    )
+
+
+def with_unit(cell: str) -> tuple[str, str] | None:
+    """Number and unit of a cell that holds both, such as ``50 %`` or ``11.0V``."""
+    found = re.fullmatch(r"([+-]?\d[\d.,]*)\s*([^\W\d_][^\s\d]{0,7}|%|\u00b0[CF])", cell)
+    return (found[1], found[2]) if found and unit_of(found[2]) != "" else None
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    numbers, full = sum(map(_reads, cells)), sum(map(bool, cells))
+    return numbers >= 2 and 2 * numbers >= full
+
+
+def _named(cells: Sequence[str]) -> float:
+    """Share of headings that are words of a quantity."""
+    full = [cell for cell in cells if cell]
+    return sum(bool(quantities(english(re.split(r"[(\[]", cell)[0]))) for cell in full) / max(len(full), 1)
+
+
+def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
+    """Headings right above the first two rows of numbers, below titles as wide as the table; None: as usual."""
+    for mark in dict.fromkeys((usual, *DELIMITERS, " ")):
+        split = [split_line(line, mark) for line in lines]
+        if mark == " ":
+            rows = [_is_row(cells) for cells in split]
+            split = [
+                cells if row else re.split(r"\s{2,}", line.strip())
+                for cells, row, line in zip(split, rows, lines, strict=True)
+            ]
+        first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
+        if not first:
+            continue
+        wide = max(2.0, 0.6 * sum(map(bool, split[first])))
+        top = first
+        while (
+            top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4
+        ):
+            top -= 1
+        told = [k for k in range(top, first) if not _is_units(split[k])]
+        while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
+            del told[0]
+        whole = told and all(len(split[k]) >= len(split[first]) for k in told)  # a cut line of headings is none
+        if whole and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
+            return told[0], mark
+    return None
 
 
 def decimal_mark(table: SplitTable) -> str:
-    """Decimal mark of a table: a comma only where it can be nothing else."""
+    """Decimal mark of a table: a comma only where it can be nothing else; ``.,`` if commas stand between thousands."""
+    cells = {cell for row in table.rows for cell in row}
+    commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
+    points = [cell for cell in cells if "." in cell and number(cell) is not None]
+    thousands = all(_THOUSANDS.fullmatch(cell) for cell in commas)
+    if commas and thousands and any(not re.fullmatch(r"[+-]?\d{1,3}\.\d{3}", cell) for cell in points):
+        return ".,"
     if table.delimiter == "," or not table.headings:
         return "."
-    cells = [cell for row in table.rows for cell in row]
-    commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
-    pointed = any("." in cell and number(cell) is not None for cell in cells)
+    grouped = all(_GROUPED.fullmatch(cell) for cell in points)
     plain = all(_COMMA.fullmatch(cell) for cell in commas)
-    return "," if plain and not pointed and any(not _THOUSANDS.fullmatch(cell) for cell in commas) else "."
+    return "," if plain and grouped and not thousands else "."
 
 
-def split_table(source: SourceText, delimiter: str | None = None, header: bool | None = None) -> SplitTable:
-    """Split a file into rows of equal length."""
+def _in_a_comment(
+    lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str
+) -> tuple[int, list[str]] | None:
+    """Headings in the comment right above the first row of numbers."""
+    at, cells = split[0]
+    above = lines[at - 2] if at > 1 else ""
+    if not _is_row(cells) or not is_comment(above):
+        return None
+    names = split_line(re.sub(r"^\s*[#%]+[ \t]*(?=\w)|^\s*[#%]", "", above), mark)
+    return (at - 1, names) if len(names) == len(cells) and not any(map(_reads, names)) else None
+
+
+def _without_ends(
+    body: list[tuple[int, list[str]]], names: Sequence[str], notes: list[str]
+) -> list[tuple[int, list[str]]]:
+    """Rows without headings that come again, sums of the rows above, and remarks at the end, all named in notes."""
+    again = [i for i, cells in body if cells == list(names)]
+    sums = [
+        (i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))
+    ]
+    out = {*again, *(i for i, _ in sums)}
+    kept = [(i, cells) for i, cells in body if i not in out]
+    ends: list[tuple[int, list[str]]] = []
+    while (
+        len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3)
+    ):
+        ends.append(kept.pop())
+    if again:
+        notes.append(f"{len(again)} lines left out: the headings again (line {some(again)})")
+    if sums:
+        words = some((f"{word!r} in line {i}" for i, word in sums), 3)
+        notes.append(f"{len(sums)} lines left out: sums of others ({words})")
+    if ends:
+        words = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
+        notes.append(f"{len(ends)} lines left out: remarks at the end ({words})")
+    return kept
+
+
+def split_table(
+    source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
+) -> SplitTable:
+    """Split a file into rows of equal length; refused where more lines than a share of them have another length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not t.lstrip().startswith(("#", "%"))]
-    comments = sum(1 for t in lines if t.lstrip().startswith(("#", "%")))
+    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
+    comments = sum(map(is_comment, lines))
     bare = [i for i, t in used if not t.strip(" \t;,|")]
     used = [(i, t) for i, t in used if t.strip(" \t;,|")]
     if not used:
@@ -172,6 +320,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     notes += [f"{len(bare)} lines of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
+    stated = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
     if start:
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
         notes += [] if _EXCEL.fullmatch(used[0][1]) else [f"{start} lines above the headings left out: {above}"]
@@ -179,20 +328,44 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
     if any(len(t) > 100_000 for _, t in used):
         raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
     split = [(i, split_line(t, mark)) for i, t in used]
+    if header is None and (said := _in_a_comment(lines, split, mark)):
+        split.insert(0, said)
+        notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
+        notes.append(f"the headings are the comment in line {said[0]}")
     first = split[0][1]
     if header is None:
         header = not any(number(c) is not None for c in first)
+    if header and len(split) > 1 and split[0][0] == used[0][0]:
+        first = heading_cells(used[0][1], mark, len(split[1][1]))
+    if stated:  # LabVIEW: of the channels, which stand behind the time
+        more = [*["s"][: len(first)], *stated[1:], *[""] * len(first)]
+        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, more, strict=False)]
+        first[0] = first[0].replace("X_Value", "Time")
     width = len(first)
     while header and width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
         width -= 1
     if not header:
         width = max((len(c) for _, c in split[:2]), default=width)
-    if header and len(split) > 2 and _is_units(split[1][1]):
-        stated = [*split[1][1], *[""] * width]
-        stated = [unit.strip("-()[]") for unit in stated]
-        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
-        notes.append(f"line {split[1][0]} holds units")
+    while header and len(split) > 2:
+        below = split[1][1]
+        if _is_units(below):
+            stated = [unit.strip("-()[]") for unit in [*below, *[""] * width]]
+            first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
+            notes.append(f"line {split[1][0]} holds units")
+        elif sum(a == b for a, b in zip(first, below, strict=False)) > 0.5 * width:
+            notes.append(f"1 lines left out: the headings again (line {split[1][0]})")
+        elif not any(map(_reads, below)) and sum(map(bool, below)) >= max(2.0, 0.6 * width) and _named(below) >= 0.5:
+            first = [" ".join(filter(None, pair)) for pair in zip(first, [*below, *[""] * width], strict=False)]
+            notes.append(f"line {split[1][0]} holds more headings")
+        else:
+            break
         del split[1]
+    if header:
+        last = [split.pop()] if lines[-1] and len(split) > 2 else []  # the end of the file cut it off: no remark
+        split = [split[0], *_without_ends(split[1:], split[0][1], notes), *last]
+        usual = {len(c) for _, c in split[1:]}
+        if len(usual) == 1 and (most := usual.pop()) < width and len(split) > 2:  # columns that no row fills
+            split = [split[0], *((i, [*c, *[""] * (width - most)]) for i, c in split[1:])]
     rows: list[tuple[str, ...]] = []
     faults: list[Fault] = []
     misfits: list[int] = []
@@ -215,7 +388,7 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
             rows.append(("",) * width)
         else:
             rows.append(tuple(cells[:width]))
-    if len(faults) > MISFIT_SHARE * len(body):
+    if len(faults) > most_misfits * len(body):
         extra = len(faults) - MAX_FAULTS
         faults = faults[:MAX_FAULTS]
         if extra > 0:
@@ -225,4 +398,4 @@ def split_table(source: SourceText, delimiter: str | None = None, header: bool |
         raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
     names = tuple(first[:width]) if header else ()
     return SplitTable(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
-                 tuple(notes), cut, tuple(misfits))  # fmt: skip
+                 tuple(notes), cut, split[0][0], tuple(misfits))  # fmt: skip

@@ -20,7 +20,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
-from bemt.readers._blade import BladeFile, checked, values, whole
+from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.polars import Polar
 
 KIND = "aerodyn"
@@ -52,7 +52,8 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     folder = Path(path).parent / Path(_text(driver, ("AeroFile", "AD_InputFile", "InputFile"))).parent
     blade = load_text(_file(primary, ("ADBlFile(1)", "ADBlFile"), folder, faults))
     polars = [_turned(polar_aerodyn.read(folder / name)) for name in _airfoils(primary, faults)]
-    nodes = _nodes(blade, faults)
+    rows = _nodes(blade, faults)
+    nodes = [rows.take(7, "a node", 7) for _ in rows.rows]
     ids = [whole(row[6]) for row in nodes]
     for bad in sorted({i for i in ids if not 1 <= i <= len(polars)}):
         faults.append(Fault(blade.name, "BlAFID", f"{bad}", f"1 to {len(polars)}, as {primary.name} lists"))
@@ -68,7 +69,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         Path(path).stem, "AeroDyn", whole(count), float(r[-1]), hub, r, chord, np.radians(twist),
         _anchors(r / r[-1], ids, polars), rpm, V, rho, tuple(notes),
     )  # fmt: skip
-    return checked(blade, found, faults)
+    return rows.finish(found)
 
 
 def _value(source: SourceText, key: str) -> tuple[int, str] | None:
@@ -116,7 +117,7 @@ def _airfoils(source: SourceText, faults: list[Fault]) -> list[str]:
     return names
 
 
-def _nodes(source: SourceText, faults: list[Fault]) -> list[list[float]]:
+def _nodes(source: SourceText, faults: list[Fault]) -> Cursor:
     """Rows of span, three shapes of the axis, twist, chord and airfoil."""
     count = whole(_number(source, "NumBlNds", faults))
     begin = (_value(source, "NumBlNds") or (0, ""))[0] + 2
@@ -124,7 +125,9 @@ def _nodes(source: SourceText, faults: list[Fault]) -> list[list[float]]:
     if len(rows) < max(count, 2):
         faults.append(Fault(source.name, "NumBlNds", f"{len(rows)} nodes", f"{max(count, 2)}"))
         raise InputError(faults)
-    return [values(source, i, text, 7, "a node", faults, most=7) for i, text in rows]
+    cursor = Cursor(source, "")
+    cursor.rows, cursor.faults = rows, faults
+    return cursor
 
 
 def _anchors(rR: np.ndarray, ids: Sequence[int], polars: Sequence[Polar]) -> list[tuple[float, Polar]]:

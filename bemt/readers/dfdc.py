@@ -7,9 +7,8 @@ import re
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
-from bemt.readers import SourceText, head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
+from bemt.readers import head_text
+from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.readers.xrotor import read_section
 
 KIND = "dfdc"
@@ -28,44 +27,36 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
     """Read the rotor of one case."""
-    source = load_text(path)
-    rows = lines_of(source, "!#")
-    faults: list[Fault] = []
-    words = [text.split()[0].split("!")[0].upper() for _, text in rows]
+    rows = Cursor(path, "!#")
+    words = [text.split()[0].split("!")[0].upper() for _, text in rows.rows]
     if "ROTOR" not in words:
         got = "an actuator disk without blades" if "ACTDISK" in words else "no ROTOR"
-        raise InputError(Fault(source.name, "", got, "a case with a ROTOR block", "A disk has no blade to read"))
+        rows.refuse("", got, "a case with a ROTOR block", "A disk has no blade to read")
     notes = ["the blade ends at the wall: the file has no tip gap"]
-    name = rows[1][1].strip() if len(rows) > 1 else ""
+    name = rows.rows[1][1].strip() if len(rows.rows) > 1 else ""
     V = rpm = rho = None
     if "OPER" in words:
-        at = words.index("OPER") + 1
-        speeds = _line(source, rows, at, 3, "Vinf Vref RPM", faults)
-        air = _line(source, rows, at + 1, 4, "Rho Vso Rmu Alt", faults)
-        V, rpm = speeds[0], abs(speeds[2]) or None
-        rho = air[0] if 0.01 < air[0] < 10.0 else None
+        rows.at = words.index("OPER") + 1
+        V, _, turning = rows.take(3, "Vinf Vref RPM")
+        air, *_ = rows.take(4, "Rho Vso Rmu Alt")
+        rpm, rho = abs(turning) or None, air if 0.01 < air < 10.0 else None
     sections = []
     if "AERO" in words:
-        at = words.index("AERO") + 1
-        count = whole(_line(source, rows, at, 1, "#sections", faults)[0])
-        for k in range(count):
-            sections.append(read_section(source, rows, at + 1 + 5 * k, faults))
+        rows.at = words.index("AERO") + 1
+        sections = [read_section(rows) for _ in range(whole(rows.take(1, "#sections")[0]))]
     else:
-        faults.append(Fault(source.name, "AERO", "nothing", "sections of the blade"))
-    at = words.index("ROTOR") + 1
+        rows.fault("AERO", "nothing", "sections of the blade")
+    rows.at = words.index("ROTOR") + 1
     if words.count("ROTOR") > 1:
         notes.append("the file has several rotors: the first is read")
-    x_disk, blades, _ = _line(source, rows, at, 3, "Xdisk Nblds NRsta", faults)
-    n = whole(_line(source, rows, at + 1, 1, "#stations", faults)[0])
-    body = np.array([values(source, *row, 3, "r chord beta", faults) for row in rows[at + 2 : at + 2 + n]]).reshape(
-        -1, 3
-    )
+    x_disk, blades, _ = rows.take(3, "Xdisk Nblds NRsta")
+    n = whole(rows.take(1, "#stations")[0])
+    body = rows.table(n, 3, "r chord beta")
     if len(body) < n:
-        faults.append(Fault(source.name, "ROTOR", f"{len(body)} stations", f"{n}"))
-    if faults:
-        raise InputError(faults)
+        rows.fault("ROTOR", f"{len(body)} stations", f"{n}")
+    rows.check()
     r, c, b = body.T
-    hub, tip, duct = _walls(source, rows, words, x_disk, faults)
+    hub, tip, duct = _walls(rows, words, x_disk)
     if hub is None or not 0.0 < hub <= r[0]:
         hub = float(r[0])
         notes.append("no centre body at the rotor: the hub is that of the first station")
@@ -75,18 +66,17 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     blade = BladeFile(
         name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
     )
-    return checked(source, blade, faults)
+    return rows.finish(blade)
 
 
-def _walls(
-    source: SourceText, rows: list[tuple[int, str]], words: list[str], x: float, faults: list[Fault]
-) -> tuple[float | None, float | None, dict[str, float] | None]:
+def _walls(rows: Cursor, words: list[str], x: float) -> tuple[float | None, float | None, dict[str, float] | None]:
     """Radii of centre body and bore at the rotor, None where there is no outline; the duct's keys of a case."""
     if "GEOM" not in words or "ENDGEOM" not in words:
         return None, None, None
     parts: list[list[list[float]]] = [[]]
-    for line, text in rows[words.index("GEOM") + 2 : words.index("ENDGEOM")]:
-        pair = values(source, line, text, 2, "x r", faults)
+    rows.at = words.index("GEOM") + 2
+    while rows.at < words.index("ENDGEOM"):
+        pair = rows.take(2, "x r")
         if pair[0] > 900.0:
             parts.append([])
         else:
@@ -117,12 +107,3 @@ def _crossings(outline: np.ndarray, x: float) -> list[float]:
         if min(x0, x1) <= x <= max(x0, x1) and x0 != x1:
             out.append(float(abs(r0 + (x - x0) / (x1 - x0) * (r1 - r0))))
     return out
-
-
-def _line(
-    source: SourceText, rows: list[tuple[int, str]], at: int, count: int, what: str, faults: list[Fault]
-) -> list[float]:
-    """Numbers of a line that must be there."""
-    if at >= len(rows):
-        raise InputError([*faults, Fault(source.name, str(len(source.lines)), "the end of the file", what)])
-    return values(source, *rows[at], count, what, faults)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,13 +20,16 @@ from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
-from bemt.readers._headings import Heading, heading
+from bemt.readers._headings import Heading, heading, slug
 from bemt.readers._large import NumberTable, large_table
 from bemt.readers._recording import Builder, spikes
-from bemt.readers._split import SplitTable, decimal_mark, find_start, split_line, split_table
+from bemt.readers._split import SplitTable, decimal_mark, find_start, heading_cells, is_comment, split_line, split_table
+from bemt.readers._words import NEUTRAL, english
 
 KIND = "table"
 FALLBACK = True
+_MARKS = frozenset("0 1 2 3 4 5 6 7 8 9 g n kgf gf lbf kn nm mnm ncm cm mm kg lb oz".split())
+"""Numbers of a sensor, and units, that a heading may have beside its words."""
 SETUP = re.compile(r"prop|motor|combination|setup|set-up|config|rotor|luftschraube|helice|h[ée]lice")
 """Headings of text that name what was on the stand."""
 SIZE = re.compile(r"(prop(eller)?_?)?(d|dia|diam|diameter|pitch)_m$", re.IGNORECASE)
@@ -41,7 +45,7 @@ def sniff(head: bytes | str) -> bool:
     (True, False)
     """
     text = head_text(head)
-    lines = [t for t in text.splitlines() if t.strip() and not t.lstrip().startswith(("#", "%"))]
+    lines = [t for t in text.splitlines() if t.strip() and not is_comment(t)]
     if len(text) >= 4096 and len(lines) > 2:
         lines = lines[:-1]  # the head may end in the middle of a line
     if len(lines) < 2 or lines[0].lstrip().startswith(("[", "{", "<", "!", "/*", "//")):
@@ -54,6 +58,7 @@ def sniff(head: bytes | str) -> bool:
     if mark == " " and not all(_blank_numbers(t) for t in lines[1:20]):
         return False
     split = [split_line(t, mark) for t in lines[:50]]
+    split[0] = heading_cells(lines[0], mark, len(split[1]))
     width = len(split[0])
     if width < 2:
         return False
@@ -93,10 +98,13 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
     if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
         heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    heads = _apart(heads)
     for k, head in enumerate(heads):
         build.add(k, head, decimal)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
+    if decimal == ".,":
+        build.warnings.append("commas between thousands left out")
     if decimal == ",":
         build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
@@ -110,7 +118,8 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         for name, channel in build.channels.items():
             if name != "time_s" and channel.unit not in ("", "-"):
                 build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
-    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm"):
+    _only_ones(build)
+    if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
         build.warnings.append(
@@ -123,6 +132,59 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
         build.kind = "bench"
     return build.finish()
+
+
+def _apart(heads: list[Heading]) -> list[Heading]:
+    """Headings of one quantity in one table: the shortest is it, others with more words keep them in their names."""
+    words = [frozenset(english(re.split(r"[(\[]", head.text)[0])) for head in heads]
+    out = []
+    for head, own in zip(heads, words, strict=True):
+        shorter = any(o.name == head.name and w < own for o, w in zip(heads, words, strict=True))
+        if shorter and head.unit is not None and head.unit_name not in ("rpm", "-", ""):
+            base = re.sub(r"[(\[].*", "", head.text)
+            head = replace(head, name=f"{slug(base.lower())}_{head.unit_name.replace('/', '_')}")
+        out.append(head)
+    return out
+
+
+_ONLY = {  # channel: words that the heading of the only column in its unit may have
+    "thrust_N": "thrust force load cell loadcell lift pull axial f fx fy fz x y z reading scale balance",
+    "torque_Nm": "torque m mx my mz q x y z motor reading reaction balance",
+    "voltage_V": "voltage u v motor main power mean",
+    "current_A": "current i motor main power mean",
+}  # fmt: skip
+
+
+_SHORT = {
+    "thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"),
+    "torque_Nm": ("Q_Nm", "M_Nm"),
+    "voltage_V": ("U_V",),
+    "current_A": ("I_A",),
+}
+"""Names that recordings know for the quantity."""
+
+
+def _only_ones(build: Builder) -> None:
+    """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
+    for name, words in _ONLY.items():
+        unit = name.rsplit("_", 1)[1]
+        same = [k for k, c in build.channels.items() if c.unit == unit and k != "duct_thrust_N"]
+        ours = [
+            k for k in same if set(english(build.headings[k])) - {unit.lower()} <= set(words.split()) | NEUTRAL | _MARKS
+        ]
+        if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
+            continue
+        if len(same) == 1:
+            label = build.headings.pop(ours[0])
+            build.channels = {name if k == ours[0] else k: c for k, c in build.channels.items()}
+            build.headings[name] = label
+            build.warnings.append(f"{label!r} is taken for the {name.rsplit('_', 1)[0]}: the only column in {unit}")
+        else:
+            quantity = name.rsplit("_", 1)[0]
+            shown = ", ".join(repr(build.headings[k]) for k in ours[:6])
+            most = max(ours, key=lambda k: np.nanmax(np.abs(build.channels[k].values), initial=0.0))
+            build.warnings.append(f"which of {shown} is the {quantity}? {build.headings[most]!r} is the largest")
+            build.asks.append(f"--column {quantity}={shlex.quote(build.headings[most])}")
 
 
 def _electrical(build: Builder) -> None:

@@ -7,22 +7,16 @@ import os
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
-from bemt.readers import head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
+from bemt.readers import head_text
+from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.parametric import QpropSection
 
 KIND = "qprop"
 BLADE = True
 HEAD = (
-    (1, "Nblades R"),
-    (2, "CL0 CL_a"),
-    (2, "CLmin CLmax"),
-    (4, "CD0 CD2u CD2l CLCD0"),
-    (2, "REref REexp"),
-    (3, "Rfac Cfac Bfac"),
-    (3, "Radd Cadd Badd"),
-)
+    (1, "Nblades R"), (2, "CL0 CL_a"), (2, "CLmin CLmax"), (4, "CD0 CD2u CD2l CLCD0"), (2, "REref REexp"),
+    (3, "Rfac Cfac Bfac"), (3, "Radd Cadd Badd"),
+)  # fmt: skip
 
 
 def sniff(head: bytes | str) -> bool:
@@ -52,61 +46,36 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
     """Read one propeller file."""
-    source = load_text(path)
-    rows = lines_of(source, "#!")
-    faults: list[Fault] = []
-    if len(rows) < 10:
-        raise InputError(Fault(source.name, "", f"{len(rows)} lines", "a title, seven lines of numbers, two stations"))
-    got = [
-        values(source, *row, n, what, faults, most=max(n, 2)) for row, (n, what) in zip(rows[1:8], HEAD, strict=True)
-    ]
-    body, widths = [], set()
-    for line, text in rows[8:]:
-        row = values(source, line, text, 3, "r c beta", faults, most=13)
-        widths.add(len(row))
-        body.append(row)
-    if faults:
-        raise InputError(faults)
-    (blades, *given), (cl0, cla), (low, high), (cd0, cd2u, cd2l, clcd0), (reref, reexp), factor, offset = got
-    basic = [cl0, cla, low, high, cd0, cd2u, cd2l, clcd0, reref, reexp]
-    columns = np.array([row[:3] for row in body]) * factor + offset
-    r, c, b = columns.T
-    R = given[0] if given and given[0] > 0.0 else float(r[-1])
-    if not given or given[0] <= 0.0:
-        notes = ["no tip radius in the file: that of the last station"]
-    else:
-        notes = []
+    rows = Cursor(path, "#!")
+    if len(rows.rows) < 10:
+        rows.refuse("", f"{len(rows.rows)} lines", "a title, seven lines of numbers, two stations")
+    rows.at, line = 1, rows.rows[1][0]
+    got = [rows.take(n, what, max(n, 2)) for n, what in HEAD]
+    body = [rows.take(3, "r c beta", 13) for _ in rows.rows[8:]]
+    rows.check()
+    (blades, *given), (cl0, cla), (low, high), drag, reynolds, factor, offset = got
+    basic = [cl0, cla, low, high, *drag, *reynolds]
+    r, c, b = (np.array([row[:3] for row in body]) * factor + offset).T
+    stated = bool(given and given[0] > 0.0)
+    R = given[0] if stated else float(r[-1])
+    notes = [] if stated else ["no tip radius in the file: that of the last station"]
     notes.append("the file has no hub radius: that of the first station; compressibility: effects of the case")
-    full = [row[3:] + basic[len(row) - 3 :] for row in body]
     sections: list[tuple[float, QpropSection]] = [(0.0, QpropSection(*basic))]
-    if widths != {3}:
+    if {len(row) for row in body} != {3}:
+        full = [row[3:] + basic[len(row) - 3 :] for row in body]
         sections = [(float(x / R), QpropSection(*row)) for x, row in zip(r, full, strict=True)]
     for k, (_, s) in enumerate(sections):
         if not (0.5 <= s.cla <= 15.0 and s.reref > 0.0 and s.cd0 > 0.0 and s.clmin < s.clmax):
-            faults.append(
-                Fault(
-                    source.name,
-                    f"section {k + 1}",
-                    f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}",
-                    "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax",
-                )
-            )
+            told = f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}"
+            rows.fault(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
+    last = f"{r[-1]:g} m"
     if math.isfinite(R) and R > 1.5 * r[-1]:
-        beside = f"R = {R:g} m with a last radius of {r[-1]:g} m"
-        faults.append(Fault(source.name, str(rows[1][0]), beside, "a tip near it", "R takes no Rfac: metres"))
+        rows.fault(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
     if blades != whole(blades):
-        faults.append(Fault(source.name, str(rows[1][0]), f"{blades:g} blades", "a whole number"))
+        rows.fault(line, f"{blades:g} blades", "a whole number")
     if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
-        faults.append(
-            Fault(
-                source.name,
-                str(rows[1][0]),
-                f"R = {R:g}",
-                f"at least the last radius, {r[-1]:g} m",
-                "R is in metres, whatever Rfac is",
-            )
-        )
-    blade = BladeFile(
-        rows[0][1].strip(), "QPROP", whole(blades), R, float(r[0]), r, c, np.radians(b), sections, notes=tuple(notes)
+        rows.fault(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
+    name, beta = rows.rows[0][1].strip(), np.radians(b)
+    return rows.finish(
+        BladeFile(name, "QPROP", whole(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
     )
-    return checked(source, blade, faults)

@@ -26,7 +26,7 @@ from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading
 from bemt.readers._large import large_table
 from bemt.readers._recording import Builder, spikes
-from bemt.readers._split import some, split_table
+from bemt.readers._split import SplitTable, decimal_mark, some, split_table
 
 __all__ = ["KIND", "QUANTITIES", "RecordingToml", "read", "sniff"]
 
@@ -233,7 +233,8 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         raise InputError(faults)
     joined = _join(runs, head.files)
     warnings = list(joined.notes)
-    if "density_kg_m3" not in constants and "density_kg_m3" not in joined:
+    air = {"pressure_Pa", "temperature_K"} <= joined.values.keys() or "density_kg_m3" in joined
+    if "density_kg_m3" not in constants and not air:
         warnings.append("no air state: coefficients need a density ([air] in the recording)")
     said = {"recording": out.file, **{k: v for k, v in head.given().items() if isinstance(v, str) and k != "file"}}
     for name, facts in (("rotor", made.rotor), ("stand", made.stand)):
@@ -307,7 +308,8 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     if faults:
         raise InputError(faults)
     build = Builder(table, KIND)
-    decimal = head.decimal
+    stated = "decimal" in head.model_fields_set
+    decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:

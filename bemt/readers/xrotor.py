@@ -8,9 +8,8 @@ import re
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
-from bemt.readers import SourceText, head_text, load_text
-from bemt.readers._blade import BladeFile, checked, lines_of, values, whole
+from bemt.readers import head_text
+from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.parametric import XrotorSection
 
 KIND = "xrotor"
@@ -27,64 +26,50 @@ def sniff(head: bytes | str) -> bool:
     return _HEAD.match(head_text(head)) is not None
 
 
-def read_section(
-    source: SourceText, rows: list[tuple[int, str]], at: int, faults: list[Fault]
-) -> tuple[float, XrotorSection]:
+_SECTION = (
+    (1, "r/R of a section"), (4, "A0deg dCLdA CLmax CLmin"), (4, "dCLdAstall dCLstall Cmconst Mcrit"),
+    (3, "CDmin CLCDmin dCDdCL^2"), (2, "REref REexp"),
+)  # fmt: skip
+
+
+def read_section(rows: Cursor) -> tuple[float, XrotorSection]:
     """Five lines of a section, of XROTOR and of DFDC: r/R, lift, stall, drag, Reynolds number."""
-    got = []
-    for k, (count, what) in enumerate(
-        (
-            (1, "r/R of a section"),
-            (4, "A0deg dCLdA CLmax CLmin"),
-            (4, "dCLdAstall dCLstall Cmconst Mcrit"),
-            (3, "CDmin CLCDmin dCDdCL^2"),
-            (2, "REref REexp"),
-        )
-    ):
-        if at + k >= len(rows):
-            raise InputError([*faults, Fault(source.name, str(len(source.lines)), "the end of the file", what)])
-        got.append(values(source, *rows[at + k], count, what, faults))
-    (x,), (a0, slope, top, bottom), (stall, span, cm, mcrit), (least, middle, bend), (reref, reexp) = got
-    line = str(rows[at][0])
-    if not 0.5 <= slope <= 15.0:
-        faults.append(Fault(source.name, line, f"a lift slope of {slope:g}", "0.5 to 15 per radian", "Per degree?"))
-    if not (span > 0.0 and reref > 0.0 and least > 0.0):
-        faults.append(
-            Fault(source.name, line, f"dCLstall {span:g}, REref {reref:g}, CDmin {least:g}", "values above 0")
-        )
-    return x, XrotorSection(
-        math.radians(a0), slope, top, bottom, stall, span, least, middle, bend, reref, reexp, cm, mcrit
+    line = rows.rows[min(rows.at, len(rows.rows) - 1)][0]
+    (x,), (a0, slope, top, bottom), (stall, span, cm, mcrit), (least, middle, bend), (reref, reexp) = (
+        rows.take(*what) for what in _SECTION
     )
+    if not 0.5 <= slope <= 15.0:
+        rows.fault(line, f"a lift slope of {slope:g}", "0.5 to 15 per radian", "Per degree?")
+    if not (span > 0.0 and reref > 0.0 and least > 0.0):
+        rows.fault(line, f"dCLstall {span:g}, REref {reref:g}, CDmin {least:g}", "values above 0")
+    numbers = (slope, top, bottom, stall, span, least, middle, bend, reref, reexp, cm, mcrit)
+    return x, XrotorSection(math.radians(a0), *numbers)
 
 
 def read(path: str | os.PathLike[str]) -> BladeFile:
     """Read one saved rotor."""
-    source = load_text(path)
-    rows = lines_of(source, "!#")
-    faults: list[Fault] = []
-    if len(rows) < 9 or not sniff(source.text):
-        raise InputError(Fault(source.name, "1", repr(source.text[:30]), "XROTOR VERSION, a title and the rotor"))
-    name = rows[1][1].strip()
-    rho, vso, rmu, alt = values(source, *rows[2], 4, "Rho Vso Rmu Alt", faults)
-    R, V, adv, rake = values(source, *rows[3], 4, "Rad Vel Adv Rake", faults)
-    hub, _ = values(source, *rows[4], 2, "XI0 XIW", faults)
-    count = values(source, *rows[5], 1, "Naero", faults)[0]
-    if faults or not 1 <= count <= 50:
-        raise InputError(faults or [Fault(source.name, str(rows[5][0]), f"{count:g} sections", "1 to 50")])
-    at, sections = 6, []
-    for _ in range(whole(count)):
-        sections.append(read_section(source, rows, at, faults))
-        at += 5
-    if at + 1 >= len(rows):
-        raise InputError([*faults, Fault(source.name, "", "the end of the file", "flags, stations")])
-    flags = rows[at][1].split()
-    n, blades = values(source, *rows[at + 1], 2, "II Nblds", faults)
-    body = rows[at + 2 : at + 2 + whole(n)]
-    if len(body) < n:
-        faults.append(Fault(source.name, str(rows[-1][0]), f"{len(body)} stations", f"{n:g}"))
-    table = np.array([values(source, *row, 4, "r/R C/R Beta0deg Ubody", faults) for row in body]).reshape(-1, 4)
-    if faults:
-        raise InputError(faults)
+    rows = Cursor(path, "!#")
+    if len(rows.rows) < 9 or not sniff(rows.source.text):
+        rows.refuse(1, repr(rows.source.text[:30]), "XROTOR VERSION, a title and the rotor")
+    name, rows.at = rows.rows[1][1].strip(), 2
+    rho, *_ = rows.take(4, "Rho Vso Rmu Alt")
+    R, V, adv, rake = rows.take(4, "Rad Vel Adv Rake")
+    hub, _ = rows.take(2, "XI0 XIW")
+    (count,) = rows.take(1, "Naero")
+    rows.check()
+    if not 1 <= count <= 50:
+        rows.refuse(rows.rows[5][0], f"{count:g} sections", "1 to 50")
+    sections = [read_section(rows) for _ in range(whole(count))]
+    if rows.at + 1 >= len(rows.rows):
+        rows.refuse("", "the end of the file", "flags, stations")
+    flags = rows.rows[rows.at][1].split()
+    rows.at += 1
+    n, blades = rows.take(2, "II Nblds")
+    left = len(rows.rows) - rows.at
+    if min(left, whole(n)) < n:
+        rows.fault(rows.rows[-1][0], f"{min(left, whole(n))} stations", f"{n:g}")
+    table = rows.table(whole(n), 4, "r/R C/R Beta0deg Ubody")
+    rows.check()
     notes = ["compressibility: effects of the case instead of XROTOR's Mcrit"]
     if len(flags) > 1 and flags[1].upper().startswith("T"):
         notes.append("the file has XROTOR's duct option on: read as an open rotor")
@@ -96,20 +81,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     air = rho if 0.01 < rho < 10.0 else None
     x = np.array([s[0] for s in sections])
     if np.any(np.diff(x) <= 0.0):
-        faults.append(Fault(source.name, "sections", f"r/R {x.tolist()}", "ascending"))
-    blade = BladeFile(
-        name,
-        "XROTOR",
-        whole(blades),
-        R,
-        hub * R,
-        table[:, 0] * R,
-        table[:, 1] * R,
-        np.radians(table[:, 2]),
-        sections,
-        rpm,
-        V if rpm else None,
-        air,
-        tuple(notes),
-    )
-    return checked(source, blade, faults)
+        rows.fault("sections", f"r/R {x.tolist()}", "ascending")
+    r, c, beta = table[:, 0] * R, table[:, 1] * R, np.radians(table[:, 2])
+    point = (rpm, V if rpm else None, air)
+    return rows.finish(BladeFile(name, "XROTOR", whole(blades), R, hub * R, r, c, beta, sections, *point, tuple(notes)))

@@ -16,14 +16,15 @@ from bemt.readers._cfd import unit_of
 from bemt.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
 from bemt.recordings.cfd_run import DUCT
 
-__all__ = ["run_from", "write_run"]
+__all__ = ["pairs", "run_from", "write_run"]
 
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")
 _WORDS = {"true": True, "yes": True, "false": False, "no": False}
 
 
-def _pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, str]:
+def pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, str]:
+    """Options ``NAME=VALUE`` as a table, each name once."""
     out: dict[str, str] = {}
     for text in given:
         name, mark, value = text.partition("=")
@@ -64,7 +65,7 @@ def run_from(
     faults: list[Fault] = []
     columns: dict[str, dict[str, Any]] = {}
     several: dict[str, list[str]] = {}
-    for name, text in _pairs("--unit", unit, faults).items():
+    for name, text in pairs("--unit", unit, faults).items():
         quantity = _quantity(name, text)
         if quantity is None or unit_of(text) is None:
             usual = ", ".join(dict.fromkeys(u for _, u in QUANTITIES.values()))
@@ -78,7 +79,7 @@ def run_from(
             columns[quantity]["column"] = names[0]
         else:
             zones = [*zones, *names]
-    for name, text in _pairs("--column", column, faults).items():
+    for name, text in pairs("--column", column, faults).items():
         if name not in QUANTITIES:
             faults.append(Fault("", "--column", name, f"one of {', '.join(QUANTITIES)}", "As in --column thrust=NAME"))
         else:
@@ -124,7 +125,7 @@ def _split(texts: Sequence[str]) -> list[str]:
 
 def _numbers(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
     out: dict[str, Any] = {}
-    for name, text in _pairs("--reference", _split(texts), faults).items():
+    for name, text in pairs("--reference", _split(texts), faults).items():
         key = _REFERENCE.get(name, name)
         try:
             out[key] = float(text)
@@ -135,7 +136,7 @@ def _numbers(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
 
 def _setup(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
     out: dict[str, Any] = {}
-    for name, text in _pairs("--setup", texts, faults).items():
+    for name, text in pairs("--setup", texts, faults).items():
         kind = SetupTable.model_fields.get(name)
         value: Any = text
         if kind is not None and "str" not in str(kind.annotation) and "Literal" not in str(kind.annotation):

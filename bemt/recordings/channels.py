@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base import units
 from bemt.dataset import Dataset
+from bemt.readers._recording import FULL_THROTTLE
 
 Array = NDArray[np.float64]
 HUGE = 1e9
@@ -109,6 +110,12 @@ def stated(d: Dataset) -> dict[str, Array]:
     return {key: u for key, u in d.u.items() if np.isfinite(u).any()}
 
 
+def in_one_step(d: Dataset) -> str:
+    """Command that states what the headings of a table leave open, as a sentence to append; "" where none is known."""
+    step = next((note for note in d.notes if "bemt import " in note), "")
+    return f"; {step}" if step else ""
+
+
 def runs_of(d: Dataset) -> Array:
     """Run of each row, (N,), from 1; 0 where the file has a gap."""
     return np.nan_to_num(d["run"]) if "run" in d else np.ones(len(d))
@@ -153,6 +160,7 @@ def named(d: Dataset) -> Dataset:
             notes.append(f"{name}: uncertainty of a channel that the file has not; left out")
     _angular(d, values, names, notes)
     _speed(d, values, names, notes)
+    _command(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
     bare = d.provenance.get("headings", {}).get("power_W", "")
     if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
@@ -170,7 +178,9 @@ def named(d: Dataset) -> Dataset:
 def _angular(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
     """Speed of rotation from an angular speed, where the file has no other."""
     found = [
-        k for k in d.values if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed)", k, re.I)
+        k
+        for k in d.values
+        if d.unit(k) == "rad_s" and re.match(r"(omega|angular|rotation|motor|w|speed|[nωΩ]_)", k, re.I)
     ]
     if len(found) == 1 and not {"rpm", *_SPEEDS} & values.keys():
         values["rpm"], names["rpm"] = d[found[0]] / units.RPM, found[0]
@@ -192,6 +202,24 @@ def _speed(d: Dataset, values: dict[str, Array], names: dict[str, str], notes: l
             values["rpm"], names["rpm"] = d[name], name
             notes.append(f"rpm is {name}: {condition}")
             return
+
+
+THROTTLE_IS_PULSE = "throttle read as 1000 us at 0 % and 2000 us at 100 %, which the file does not say"
+
+
+def pulse_of(throttle: Array) -> Array:
+    """Pulse width that a throttle stands for where the file has none, (N,) [s]."""
+    return 1e-3 + 1e-3 * throttle
+
+
+def _command(values: dict[str, Array], names: dict[str, str], notes: list[str]) -> None:
+    """A throttle is a command as a pulse width is: what needs one takes either."""
+    throttle = values.get("throttle")
+    if throttle is None or "pwm_s" in values or not np.isfinite(throttle).any():
+        return
+    if np.nanmin(throttle) >= 0.0 and np.nanmax(throttle) <= FULL_THROTTLE:
+        values["pwm_s"], names["pwm_s"] = pulse_of(throttle), names["throttle"]
+        notes.append(THROTTLE_IS_PULSE)
 
 
 def shaft_power(values: Mapping[str, Array]) -> Array | None:

@@ -83,6 +83,7 @@ def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
         return [f"{indent}not reduced: {found['error']}"]
     points = found["points"]
     names = [k for k in SHOWN if any(_number(p.get(k)) is not None for p in points)]
+    names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
     head = ["from"]
     for name in names:
         head += [name] + ([f"u({name})"] if any(_number(p["u"].get(name)) is not None for p in points) else [])

@@ -22,7 +22,18 @@ from numpy.typing import NDArray
 from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset, concat
-from bemt.recordings.channels import LOADS, Lost, dropped, file_name, lost, named, runs_of, shaft_power, stated
+from bemt.recordings.channels import (
+    LOADS,
+    Lost,
+    dropped,
+    file_name,
+    in_one_step,
+    lost,
+    named,
+    runs_of,
+    shaft_power,
+    stated,
+)
 from bemt.recordings.points import Found, Point, from_rows, from_samples
 from bemt.recordings.rows import command_of, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
@@ -74,7 +85,7 @@ def reduce(
     constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
-        hint = "Name units in the headings or in a recording.toml"
+        hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
         if records[0].kind == "flight":
             hint = (
                 "Nothing on board weighs the thrust: give a table with thrust_N, mass times acceleration per propeller"
