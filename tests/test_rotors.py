@@ -15,7 +15,7 @@ from bemt.__main__ import main
 from bemt.base.errors import InputError
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate, solve_known
+from bemt.case.propagate import propagate, solve_at
 from bemt.rotors.conditioning import condition
 from bemt.rotors.fit import MeasuredRotor, Rotors, with_families
 from bemt.rotors.latents import NAMES, Prior, Sensed
@@ -466,7 +466,7 @@ def test_a_calibrated_rotor_is_solved_with_all_that_its_run_tells(
     np.testing.assert_allclose(known.thrust_N, thrust, rtol=0.025)
     np.testing.assert_array_equal(known.thrust_N, banded.thrust_N)
     np.testing.assert_allclose(known.power_W, known.torque_Nm * rpm * np.pi / 30.0, rtol=1e-12)
-    grid = solve_known(case, prepare_case(case), rpm, V, np.zeros(8), case.air())
+    grid = solve_at(prepare_case(case), rpm, V, np.zeros(8), case.air())
     np.testing.assert_allclose(grid.thrust_N, known.thrust_N, rtol=1e-9)
 
 
