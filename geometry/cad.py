@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
 from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
+from geometry.printed import HEXAGON, cutters, framed, root_depth
 from geometry.rotor import Rotor
 from geometry.solid import Mesh, profile_volume
 
@@ -48,11 +49,12 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     """
     blade = rotor.blade
     options = options or Options()
-    grid = Options(_POINTS, 20 * options.tolerance, options.segments, options.fillet)
+    printed = options.printed
+    grid = replace(options, n=_POINTS, tolerance=20 * options.tolerance)
     rho = radii(blade, grid)
     rho = np.sort(np.concatenate([rho, 0.5 * (rho[1:] + rho[:-1])]))
     step = 0.02 * rotor.R
-    fine = Options(_POINTS, options.tolerance, options.segments, options.fillet)
+    fine = replace(options, n=_POINTS)
     curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
     angle = curves[..., 0] / rho[:, None]
     if np.abs(angle).max() > 1.3:
@@ -62,11 +64,20 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     outside, slope = [], (curves[-1] - curves[-2]) / (rho[-1] - rho[-2])
     reach = rotor.R * (1 / math.cos(float(np.abs(angle[-1]).max())) - 1) + step
     for k in range(1, 9):
-        outside.append(curves[-1] + slope * reach * k / 8)
+        outside.append(
+            curves[-1] + slope * reach * k / 8
+            if printed is None
+            else wrapped_outline(blade, float(rho[-1]) + reach * k / 8, fine)
+        )
     lowest = 0.75 * rotor.Rhub * math.cos(min(float(np.abs(angle[0]).max()) * 1.35, 1.4))
     inside = np.linspace(max(lowest, 0.3 * rotor.Rhub), rho[0], 9)[:-1]
     table = np.concatenate([inside, rho, rho[-1] + reach * np.arange(1, 9) / 8])
-    curves = np.concatenate([np.repeat(curves[:1], len(inside), axis=0), curves, np.stack(outside)])
+    within = (
+        np.repeat(curves[:1], len(inside), axis=0)
+        if printed is None
+        else np.stack([wrapped_outline(blade, float(r), fine) for r in inside])
+    )
+    curves = np.concatenate([within, curves, np.stack(outside)])
     angle = curves[..., 0] / table[:, None]
     x, y = table[:, None] * np.cos(angle), table[:, None] * np.sin(angle) * rotor.rotation
     bottom, top = float(x[0].max()), float(x[-1].min())
@@ -203,6 +214,42 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
         got = f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections"
         raise GeometryError([("blade", got, "at most 0.5 %", "Use the mesh formats, which need no loft")])
     return solid, profile
+
+
+def printed_solid(rotor: Rotor, options: Options) -> Any:
+    """Make a printed rotor as one CAD solid: blades fused with the hub, the holes cut. The very tip's edge stays sharp.
+
+    `options.printed` is what `geometry.mesh.settled_options` gives.
+    """
+    cq = needs("cadquery", "cad")
+
+    assert options.printed is not None
+    options = replace(options, printed=replace(options.printed, round_edge=False))
+    assert options.printed is not None
+    root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, options.printed), options)
+    profile = hub_profile(rotor, framed(root, options.printed))
+    low, high = float(profile[:, 1].min()), float(profile[:, 1].max())
+    try:
+        loft = _fixed(_loft(planar_sections(rotor, options)))
+        tip = cq.Solid.makeCylinder(rotor.R * MM, 4 * rotor.R * MM, cq.Vector(0, 0, -2 * rotor.R * MM))
+        blade = _one(loft.intersect(tip), "blade")
+        solid = _fixed(_turned(profile))
+        for k in range(rotor.B):
+            solid = solid.fuse(blade.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / rotor.B))
+        for _, shape, sides in cutters(options.printed, profile, options.segments):
+            radius, bottom, top = float(shape[:, 0].max()) * MM, float(shape[0, 1]) * MM, float(shape[-1, 1]) * MM
+            if sides == HEXAGON:
+                corner = radius * math.sqrt((2 * math.pi / sides) / math.sin(2 * math.pi / sides))
+                hole = cq.Workplane(origin=(0, 0, bottom)).polygon(sides, 2 * corner).extrude(top - bottom).val()
+            else:
+                hole = cq.Solid.makeCylinder(radius, top - bottom, cq.Vector(0, 0, bottom))
+            solid = solid.cut(hole)
+        return _one(solid.clean(), "rotor")
+    except GeometryError:
+        raise
+    except Exception as error:  # the CAD kernel raises its own kinds
+        got, hint = f"a failure of the CAD kernel ({type(error).__name__})", "Use stl or 3mf, which need no loft"
+        raise GeometryError([("blade", got, "sections that can be lofted", hint)]) from error
 
 
 def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
