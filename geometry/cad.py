@@ -25,6 +25,9 @@ from geometry.solid import Mesh, profile_volume
 MM = 1000.0
 TOLERANCE = 5e-3
 _POINTS = 45
+TRIED = ((45, 8e-3), (45, 15e-3), (61, 8e-3), (45, 3e-3), (37, 8e-3))
+"""Points of a section and least distance of sections over R of printed blades, tried in turn: the CAD kernel fuses most
+of them, and says nothing when it loses a blade."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,20 +44,23 @@ class Parts:
         return self.volumes["blade"] + self.volumes["hub"]
 
 
-def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[float, Array]]:
+def planar_sections(
+    rotor: Rotor, options: Options | None = None, count: int = _POINTS, apart: float = 1e-4
+) -> list[tuple[float, Array]]:
     """Cut the wrapped blade by planes across its pitch axis. [m]
 
     A point with arc t(rho) lies at x = rho cos(t/rho), y = rho sin(t/rho); x grows with rho while the arc stays below a
-    quarter turn, so that the radius is found by interpolation on a fine table of radii.
+    quarter turn, so that the radius is found by interpolation on a fine table of radii. `count` points a section; planes
+    are no nearer to each other than `apart` times the tip radius.
     """
     blade = rotor.blade
     options = options or Options()
     printed = options.printed
-    grid = replace(options, n=_POINTS, tolerance=20 * options.tolerance)
+    grid = replace(options, n=count, tolerance=20 * options.tolerance)
     rho = radii(blade, grid)
     rho = np.sort(np.concatenate([rho, 0.5 * (rho[1:] + rho[:-1])]))
     step = 0.02 * rotor.R
-    fine = replace(options, n=_POINTS)
+    fine = replace(options, n=count)
     curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
     angle = curves[..., 0] / rho[:, None]
     if np.abs(angle).max() > 1.3:
@@ -87,7 +93,12 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
             [("chord", "a blade too wide for its hub", "a root that ends inside the hub", "Less chord or a larger hub")]
         )
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
-    planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
+    if printed is None:
+        planes = planes[np.concatenate([[True], np.diff(planes) > apart * rotor.R])]
+    else:
+        high = rotor.Rhub + (printed.blend or 0.0)
+        flare = np.linspace(root, high, 1 + math.ceil((high - root) / max(0.2 * (high - rotor.Rhub), 2e-3 * rotor.R)))
+        planes = np.concatenate([flare[:-1], _apart(np.concatenate([[high], planes[planes > high]]), apart * rotor.R)])
     out = [(float(plane), np.empty((curves.shape[1], 2))) for plane in planes]
     radius = table.tolist()  # plain numbers: there are a few at a time, which arrays are slow at
     for j in range(curves.shape[1]):
@@ -98,6 +109,15 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
                 at += plane - _cubic(radius, along, at)
             section[j] = _cubic(radius, across, at), _cubic(radius, axial, at)
     return out
+
+
+def _apart(planes: Array, least: float) -> Array:
+    """Planes that are no nearer to each other than a distance; first and last stay."""
+    kept = [float(planes[0])]
+    for plane in planes[1:-1]:
+        if plane - kept[-1] > least and planes[-1] - plane > least:
+            kept.append(float(plane))
+    return np.array([*kept, float(planes[-1])])
 
 
 def _cubic(x: list[float], y: list[float], at: float) -> float:
@@ -216,26 +236,45 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
     return solid, profile
 
 
-def printed_solid(rotor: Rotor, options: Options) -> Any:
-    """Make a printed rotor as one CAD solid: blades fused with the hub, the holes cut. The very tip's edge stays sharp.
+def printed_solid(rotor: Rotor, options: Options, volume: float) -> Any:
+    """Make a printed rotor as one CAD solid: blades fused with the hub, the holes cut.
 
-    `options.printed` is what `geometry.mesh.settled_options` gives.
+    `options` and `volume` [m^3] are those of its mesh. The edge of the very tip stays sharp.
     """
+    assert options.printed is not None
+    sharp = replace(options, printed=replace(options.printed, round_edge=False))
+    volume += rotor.B * (blade_volume(rotor.blade, sharp) - blade_volume(rotor.blade, options))
+    last = GeometryError([])
+    for count, apart in TRIED:
+        try:
+            solid = _printed_solid(rotor, sharp, count, apart)
+        except GeometryError as error:
+            last = error
+            continue
+        if abs(solid.Volume() / MM**3 / volume - 1) < TOLERANCE:
+            return solid
+        got = f"a solid of {solid.Volume():.4g} mm^3"
+        hint = "Use stl or 3mf, which need no loft"
+        last = GeometryError([("blade", got, f"{volume * MM**3:.4g} mm^3, those of the mesh, within 0.5 %", hint)])
+    raise last
+
+
+def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> Any:
     cq = needs("cadquery", "cad")
 
-    assert options.printed is not None
-    options = replace(options, printed=replace(options.printed, round_edge=False))
     assert options.printed is not None
     root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, options.printed), options)
     profile = hub_profile(rotor, framed(root, options.printed))
     low, high = float(profile[:, 1].min()), float(profile[:, 1].max())
     try:
-        loft = _fixed(_loft(planar_sections(rotor, options)))
-        tip = cq.Solid.makeCylinder(rotor.R * MM, 4 * rotor.R * MM, cq.Vector(0, 0, -2 * rotor.R * MM))
+        loft = _fixed(_loft(planar_sections(rotor, options, count, apart)))
+        foot, axis = cq.Vector(0, 0, -2 * rotor.R * MM), cq.Vector(0, 0, 1)
+        tip = cq.Solid.makeCylinder(rotor.R * MM, 4 * rotor.R * MM, foot).rotate(cq.Vector(), axis, 90.0)
         blade = _one(loft.intersect(tip), "blade")
-        solid = _fixed(_turned(profile))
+        # Seams of surfaces of revolution lie away from the blades.
+        solid = _fixed(_turned(profile)).rotate(cq.Vector(), axis, 180.0 / rotor.B)
         for k in range(rotor.B):
-            solid = solid.fuse(blade.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / rotor.B))
+            solid = solid.fuse(blade.rotate(cq.Vector(), axis, 360.0 * k / rotor.B))
         for _, shape, sides in cutters(options.printed, profile, options.segments):
             radius, bottom, top = float(shape[:, 0].max()) * MM, float(shape[0, 1]) * MM, float(shape[-1, 1]) * MM
             if sides == HEXAGON:

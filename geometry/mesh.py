@@ -49,6 +49,7 @@ class MeshModel:
     duct: Mesh | None = None  # Duct and stator
     # What was measured on the meshes, lengths in metres, volumes in cubic metres
     checks: Mapping[str, float] = field(default_factory=dict)
+    options: Options = field(default_factory=Options)  # As meshed: those of a printed rotor are thick enough now
 
     @property
     def parts(self) -> list[Mesh]:
@@ -154,7 +155,7 @@ def rotor_mesh(rotor: Rotor, options: Options | None = None) -> Mesh:
     return _rotor(rotor, options or Options())[0]
 
 
-def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
+def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float], Options]:
     blade, printed = rotor.blade, options.printed
     faults = Faults()
     if not blade.anchors:
@@ -202,7 +203,7 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     if options.printed is not None:
         del checks["min_section_thickness"], checks["min_trailing_edge"]  # of the rounded tip, where they mean nothing
         checks |= {"min_thickness": thin, "trailing_edge": options.printed.edge, "flare": options.printed.blend or 0.0}
-    return mesh, checks
+    return mesh, checks, options
 
 
 def _skinned(rotor: Rotor, options: Options, depth: float) -> tuple[Array, Array, Array]:
@@ -288,9 +289,9 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
     (('blade', 'hub'), 0.1016)
     """
     options = options or Options()
-    mesh, checks = _rotor(rotor, options)
+    mesh, checks, options = _rotor(rotor, options)
     if duct is None:
-        return MeshModel(mesh, None, checks)
+        return MeshModel(mesh, None, checks, options)
     duct.check(rotor)
     rho, z = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]), mesh.vertices[:, 2]
     hub = np.unique(mesh.part("hub"))
@@ -316,4 +317,4 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
         got, hint = f"{duct._rotor * 1e3:.4g} mm, blade tips outside the duct", "Move the rotor or lengthen the duct"
         raise GeometryError([("duct.rotor_x", got, "blade tips inside the duct", hint)])
     checks["gap"] = gap
-    return MeshModel(mesh, standing, checks)
+    return MeshModel(mesh, standing, checks, options)
