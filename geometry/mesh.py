@@ -169,6 +169,7 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float], Opti
         outer, curves, points = _skinned(rotor, options, 0.12 * blade.Rhub)
     else:
         options, outer, curves, points, thin = _thick_enough(rotor, options, printed)
+        printed = options.printed
     _check_sections(rotor, outer, curves[1:], options)
     solid = as_solid(*skin(points), "blade")
     profile = hub_profile(rotor, curves[0] if printed is None else framed(curves[0], printed))
@@ -200,9 +201,9 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float], Opti
         "min_section_thickness": min(thick),
         "min_trailing_edge": float(edge),
     }
-    if options.printed is not None:
+    if printed is not None:
         del checks["min_section_thickness"], checks["min_trailing_edge"]  # of the rounded tip, where they mean nothing
-        checks |= {"min_thickness": thin, "trailing_edge": options.printed.edge, "flare": options.printed.blend or 0.0}
+        checks |= {"min_thickness": thin, "trailing_edge": printed.edge, "flare": printed.blend or 0.0}
     return mesh, checks, options
 
 
