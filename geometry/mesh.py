@@ -37,6 +37,8 @@ __all__ = [
 ]
 
 VOLUME_TOLERANCE = 5e-3
+BETWEEN = 1.02
+"""Least thickness that the rays must find over the one asked for: for what lies between the rays [1]."""
 TRIES = 4
 """Meshes of a printed rotor until it is thick enough."""
 
@@ -222,19 +224,22 @@ def _thick_enough(rotor: Rotor, options: Options, printed: Printed) -> tuple[Opt
     By rays from the middle of facets straight into the blade.
     """
     made = settled(rotor, printed)
+    root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, made), replace(options, printed=made))
+    cutters(made, hub_profile(rotor, framed(root, made)), options.segments)  # its faults come first
     for _ in range(TRIES):
         options = replace(options, printed=made)
         outer, curves, points = _skinned(rotor, options, root_depth(rotor, made))
         vertices, faces = skin(points)
         m = points.shape[1]
-        corners = vertices[faces[m : (len(points) - 1) * m]]  # one of two triangles of each facet above the hub
+        # Above the hub, one of two triangles of every third facet: 3 divides no usual number of points.
+        corners = vertices[faces[m : (len(points) - 1) * m : 3]]
         middle, across = corners.mean(axis=1), np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         thick = ray_thickness(vertices, faces, middle, across / np.linalg.norm(across, axis=1, keepdims=True))
         k = int(np.argmin(thick))
         thin, at = float(thick[k]), float(np.hypot(*middle[k, :2])) / rotor.R
-        if thin >= printed.min_thickness:
+        if thin >= BETWEEN * printed.min_thickness:
             return options, outer, curves, points, thin
-        made = made.thicker(1.002 * printed.min_thickness / thin)
+        made = made.thicker(1.002 * BETWEEN * printed.min_thickness / thin)
     got = f"{thin * 1e3:.3g} mm at r/R = {at:.2f}"
     raise GeometryError([("thickness", got, f"at least min_thickness, {printed.min_thickness * 1e3:g} mm", "")])
 
