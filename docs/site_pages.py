@@ -37,7 +37,16 @@ API = {  # page: title, introduction, names
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
-    "How to": ("choose.md", "notebooks/*", "flight_logs.md", "exports.md", "adding.md", "scaling.md", "trust.md"),
+    "How to": (
+        "choose.md",
+        "printing.md",
+        "notebooks/*",
+        "flight_logs.md",
+        "exports.md",
+        "adding.md",
+        "scaling.md",
+        "trust.md",
+    ),  # fmt: skip
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("believe.md", "theory.md", "oblique.md", "effects.md", "diagnosis.md"),

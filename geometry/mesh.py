@@ -215,7 +215,11 @@ def _skinned(rotor: Rotor, options: Options, depth: float) -> tuple[Array, Array
     ring = np.concatenate([[rotor.Rhub - depth], outer])
     curves = rings(rotor.blade, ring, options)
     turn = rotor.rotation * curves[..., 0] / ring[:, None]
-    return outer, curves, np.stack([ring[:, None] * np.cos(turn), ring[:, None] * np.sin(turn), curves[..., 1]], axis=-1)
+    return (
+        outer,
+        curves,
+        np.stack([ring[:, None] * np.cos(turn), ring[:, None] * np.sin(turn), curves[..., 1]], axis=-1),
+    )
 
 
 def _thick_enough(rotor: Rotor, options: Options, printed: Printed) -> tuple[Options, Array, Array, Array, float]:

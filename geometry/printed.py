@@ -75,7 +75,6 @@ class Printed:
         """Thickness of the trailing edge [m]."""
         return self.min_thickness if self.trailing_edge is None else self.trailing_edge
 
-
     def thicker(self, factor: float) -> Printed:
         """The same with all thicknesses times a factor [-]."""
         edge = None if self.trailing_edge is None else self.trailing_edge * factor
@@ -215,9 +214,7 @@ def _edges(blade: Blade, r: float, chord: float, printed: Printed) -> tuple[floa
     return min(float(more[0]) * printed.min_thickness, 0.5), min(float(more[1]) * printed.edge, 0.5)
 
 
-def _slopes(
-    blade: Blade, r: float, s: Array, along: Array, mean: Array, printed: Printed
-) -> tuple[Array, Array]:
+def _slopes(blade: Blade, r: float, s: Array, along: Array, mean: Array, printed: Printed) -> tuple[Array, Array]:
     """Slopes of the surface of the mean lines along chord and span."""
     at, change = _motion(blade, r, printed)
     camber = np.gradient(mean, s)
@@ -249,7 +246,9 @@ def cutters(printed: Printed, profile: Array, segments: int) -> list[tuple[str, 
     corner, same = printed.hexagon[0] / math.sqrt(3.0), printed.hexagon[0] * math.sqrt(math.sqrt(3.0) / (2.0 * math.pi))
     for name, width in (("bore", printed.bore), ("recess", printed.recess[0]), ("hexagon", 2.0 * corner)):
         if width > 0.0 and 0.5 * width + wall > radius:
-            wanted = f"at most {2e3 * (radius - wall):.4g} mm in a hub of {2e3 * radius:.4g} mm: a wall of twice the least"
+            wanted = (
+                f"at most {2e3 * (radius - wall):.4g} mm in a hub of {2e3 * radius:.4g} mm: a wall of twice the least"
+            )
             faults.add(name, f"{width * 1e3:.4g} mm", f"{wanted} thickness stays", "A larger hub or a smaller hole")
     depth = max(printed.recess[1], printed.hexagon[1])
     rim = float(profile[profile[:, 0] > 0.99 * radius, 1].max()) - back
