@@ -24,6 +24,7 @@ from geometry.solid import Mesh, profile_volume
 
 MM = 1000.0
 TOLERANCE = 5e-3
+SOUND = 1.5e-3  # volume error of a fused solid above which the next try may be better: some surfaces then cross
 _POINTS = 45
 TRIED = ((45, 8e-3), (45, 15e-3), (61, 8e-3), (45, 3e-3), (37, 8e-3))
 """Points of a section and least distance of sections over R of printed blades, tried in turn: the CAD kernel fuses most
@@ -244,18 +245,23 @@ def printed_solid(rotor: Rotor, options: Options, volume: float) -> Any:
     assert options.printed is not None
     sharp = replace(options, printed=replace(options.printed, round_edge=False))
     volume += rotor.B * (blade_volume(rotor.blade, sharp) - blade_volume(rotor.blade, options))
-    last = GeometryError([])
+    last, close = GeometryError([]), []
     for count, apart in TRIED:
         try:
             solid = _printed_solid(rotor, sharp, count, apart)
         except GeometryError as error:
             last = error
             continue
-        if abs(solid.Volume() / MM**3 / volume - 1) < TOLERANCE:
+        off = abs(solid.Volume() / MM**3 / volume - 1)
+        if off < SOUND:
             return solid
+        if off < TOLERANCE:
+            close.append((off, solid))
         got = f"a solid of {solid.Volume():.4g} mm^3"
         hint = "Use stl or 3mf, which need no loft"
         last = GeometryError([("blade", got, f"{volume * MM**3:.4g} mm^3, those of the mesh, within 0.5 %", hint)])
+    if close:
+        return min(close, key=lambda pair: pair[0])[1]
     raise last
 
 
