@@ -36,9 +36,11 @@ def points(folder: Path, count: int) -> pd.DataFrame:
     laws = pd.read_csv(folder / "props_static_fits.csv")
     table = motors[(motors.no_load == 0) & (motors.gear_ratio == 1) & (motors.I_A > 0.5) & (motors.Rm > 0)]
     table = table.merge(laws, left_on="prop_id", right_on="myid")
-    table = table[~table.motor.map(seen) & (table.a > 0) & table.D_in.between(4, 20) & (table.Rm * table.I_A < 0.6 * table.U_V)]
+    table = table[~table.motor.map(seen) & (table.a > 0) & table.D_in.between(4, 20)]
+    table = table[table.Rm * table.I_A < 0.6 * table.U_V]
     cells = (table.U_V / LOADED_CELL_V).round().clip(lower=1)
-    table = table.assign(cells=cells.astype(int), thrust_N=1e-3 * G0 * table.a * (table.n_rpm / 1000) ** table.b)
+    thrust = 1e-3 * G0 * table.a * (table.n_rpm / 1000) ** table.b
+    table = table.assign(cells=cells.astype(int), thrust_N=thrust)
     table = table[(table.U_V / (LOADED_CELL_V * table.cells) - 1).abs() < 0.05]
     table = table.sample(frac=1.0, random_state=0).drop_duplicates("motor_id").drop_duplicates("prop_id")
     return table.head(count)
@@ -64,7 +66,8 @@ def curve(found: np.ndarray) -> list[tuple[str, int, float, float]]:
     for low, high in zip(BINS, BINS[1:], strict=False):
         inside = (found[:, 0] >= low) & ((found[:, 0] < high) | (high == 1.0))
         if inside.any():
-            rows.append((f"{low:.0%} to {high:.0%}", int(inside.sum()), *(float(v) for v in found[inside].mean(axis=0))))
+            stated, met = (float(v) for v in found[inside].mean(axis=0))
+            rows.append((f"{low:.0%} to {high:.0%}", int(inside.sum()), stated, met))
     return rows
 
 

@@ -51,8 +51,8 @@ def planar_sections(
     """Cut the wrapped blade by planes across its pitch axis. [m]
 
     A point with arc t(rho) lies at x = rho cos(t/rho), y = rho sin(t/rho); x grows with rho while the arc stays below a
-    quarter turn, so that the radius is found by interpolation on a fine table of radii. `count` points a section; planes
-    are no nearer to each other than `apart` times the tip radius.
+    quarter turn, so that the radius is found by interpolation on a fine table of radii. A section has `count`
+    points; planes are no nearer to each other than `apart` times the tip radius.
     """
     blade = rotor.blade
     options = options or Options()
@@ -271,7 +271,6 @@ def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> 
     assert options.printed is not None
     root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, options.printed), options)
     profile = hub_profile(rotor, framed(root, options.printed))
-    low, high = float(profile[:, 1].min()), float(profile[:, 1].max())
     try:
         loft = _fixed(_loft(planar_sections(rotor, options, count, apart)))
         foot, axis = cq.Vector(0, 0, -2 * rotor.R * MM), cq.Vector(0, 0, 1)

@@ -1,9 +1,9 @@
 """A rotor made of plastic: edges that a printer can lay down, a rounded tip, a root that flares into a hub with a bore.
 
 The mean line, chord and blade angle of a section stay. Its half thickness t becomes (t^p + s^p)^(1/p), where s is that
-of a strip of the least thickness with a round nose and a round trailing edge; so no place is thinner than the strip, and
-what is thicker stays as it is. Thickness is meant across the surface, not across the chord: s is widened by the slope
-of the mean line and by the tilt that twist, sweep and rake give the surface along the span. Lengths in metres.
+of a strip of the least thickness with round edges; so no place is thinner than the strip, and what is thicker stays.
+Thickness is meant across the surface, not across the chord: s is widened by the slope of the mean line and by the tilt
+that twist, sweep and rake give the surface along the span. Lengths in metres.
 """
 
 from __future__ import annotations
@@ -88,9 +88,9 @@ ADAPTERS: dict[str, dict[str, Any]] = {
     "m6": {"bore": 6.2e-3, "hexagon": (10.2e-3, 5.4e-3)},
     "m8": {"bore": 8.2e-3, "hexagon": (13.2e-3, 7.0e-3)},
 }
-"""Holes for what propellers are mounted on. ``ring``: a quarter-inch bore and the recess of adapter rings, declared from
-one propeller on sale, 9.5 mm wide and 3.1 mm deep. ``m3`` to ``m8``: a bolt and its nut by ISO 4032 (across flats 5.5,
-8, 10, 13 mm; height 2.4, 4.7, 5.2, 6.8 mm; not checked against the standard) with 0.2 mm to spare."""
+"""Holes for what propellers are mounted on. ``ring``: a quarter-inch bore and a recess for adapter rings, declared from
+one propeller on sale, 9.5 mm wide and 3.1 mm deep. ``m3`` to ``m8``: a bolt and its nut by ISO 4032 (across flats
+5.5, 8, 10, 13 mm; height 2.4, 4.7, 5.2, 6.8 mm; not checked against the standard) with 0.2 mm to spare."""
 
 
 def settled(rotor: Rotor, printed: Printed) -> Printed:

@@ -183,8 +183,6 @@ def join(parts: Sequence[tuple[str, Any]], where: str, cut: Sequence[tuple[str, 
 
 def ray_thickness(vertices: Array, faces: Faces, points: Array, outward: Array) -> Array:
     """Length of the way through a closed mesh, straight in from points on its surface. (N,) [m]"""
-    manifold3d = needs("manifold3d", "cad")
-
     solid = as_solid(vertices, faces, "blade")
     reach = 2.0 * float(np.ptp(vertices, axis=0).max())
     skip = 1e-7 * reach

@@ -63,7 +63,7 @@ def model(request: pytest.FixtureRequest):
 
 
 def way_through(mesh: Mesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Length of rays straight in from random places of the blades, and r: Moeller and Trumbore, every triangle tried."""
+    """Length of rays straight in from random places of the blades, and r (Moeller and Trumbore)."""
     rng = np.random.default_rng(3)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -158,7 +158,8 @@ def test_both_hands_are_mirror_images() -> None:
         (lambda: Printed(0.8), "min_thickness"), (lambda: Printed(8e-4, trailing_edge=5e-4), "trailing_edge"),
         (lambda: Printed(8e-4, bore=6e-3, recess=(5e-3, 3e-3)), "recess"),
         (lambda: Printed(8e-4, recess=(9e-3, 3e-3), hexagon=(8e-3, 3e-3)), "hexagon"),
-        (lambda: printed(rotor_of(), bore=0.03, recess=(0.0, 0.0)), "bore"), (lambda: printed(rotor_of(), recess=(9e-3, 0.05)), "recess"),
+        (lambda: printed(rotor_of(), bore=0.03, recess=(0.0, 0.0)), "bore"),
+        (lambda: printed(rotor_of(), recess=(9e-3, 0.05)), "recess"),
         (lambda: printed(rotor_of(), min_thickness=5e-3), "chord|rotor|thickness"),
         (lambda: build(replace(rotor_of(), hub_length=4e-3), options=Options(printed=Printed())), "hub_length"),
     ],

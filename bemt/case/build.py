@@ -101,7 +101,7 @@ def _blade(case: CaseFile, path: Path) -> Blade:
 
 
 def _bent(case: CaseFile, blade: Blade) -> Blade:
-    """Blade with the sweep and the rake of the case, quadratic in the radius; chord and blade angle stay as they are."""
+    """Blade with the sweep and the rake of the case, quadratic in the radius; chord and blade angle stay."""
     sweep, rake = 1e-3 * case.blade.tip_sweep_mm, 1e-3 * case.blade.tip_rake_mm
     if sweep == 0.0 and rake == 0.0:
         return blade

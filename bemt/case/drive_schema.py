@@ -1,15 +1,15 @@
 """[drive] of a case file: battery, ESC, motor and vehicle that turn the rotor.
 
-A motor's label gives its K_v only. What is known of resistance and no-load current is how loaded motors are in use: the
-share of the voltage that the speed says is lost, 1 - n/(K_v U), and the share of the current that friction and iron take,
-both near full throttle. Medians and 68 % ranges are of points with a propeller, collected by Drive Calculator (direct
-drive): the voltage of 2879 points on 859 motors of 174 makers, half of all, chosen by a checksum of the maker's name; the
-current of 3582 points on 1088 motors. A uniform range has its ends at sqrt(3) times that.
+A motor's label gives its K_v only. What is known of its losses is how loaded motors are in use: the share of the
+voltage that the speed says is lost, 1 - n/(K_v U), and the share of the current that friction and iron take, both near
+full throttle. Medians and 68 % ranges are of points with a propeller, collected by Drive Calculator (direct drive): the
+voltage of 2879 points on 859 motors of 174 makers, half of all, chosen by a checksum of the maker's name; the current
+of 3582 points on 1088 motors. A uniform range has its ends at sqrt(3) times that.
 
-The speed is lost in more than the winding at rest. Without load these motors turn at 0.994 of K_v (U - R I) in the median,
-with a propeller at 0.926, whatever share of the voltage R I is: what is missing is as a resistance in series, 33 to 60
-mohm in the median from small motors to large. That is the controller's switches, the leads, commutation and the warm
-winding; the source does not part them. So a motor of known resistance has the share `drop` of the controller as well.
+The speed is lost in more than the winding at rest. Without load these motors turn at 0.994 of K_v (U - R I) in the
+median, with a propeller at 0.926, whatever share of the voltage R I is. What is missing acts as a resistance in series,
+33 to 60 mohm in the median from low to high winding resistance: switches, leads, commutation and the warm winding,
+which the source does not part. So a motor of known resistance also has the share `drop` of its controller.
 """
 
 from __future__ import annotations

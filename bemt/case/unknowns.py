@@ -99,7 +99,7 @@ DRIVE = (
 )
 ESC_DROP = Unknown(
     "drive.esc.drop", 0.07, 0.0, 0.18,
-    "controller not known; it, the leads and a warm winding take 2 to 13 % of the voltage in two of three of 859 motors",
+    "controller not known; it, leads and a warm winding take 2 to 13 % of the voltage in two of three of 859 motors",
 )  # fmt: skip
 _STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
            "drive.motor.idle_share": "no_load_A"}  # fmt: skip

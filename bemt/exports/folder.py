@@ -14,8 +14,8 @@ from bemt.base.toml import shown
 from bemt.case import Case, find_cases, load_case, repeated_names
 from bemt.exports import exports
 from bemt.exports.base import FEATURES, Job, entry
-from bemt.exports.printing import Print, faults_of, printable
 from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
+from bemt.exports.printing import Print, faults_of, printable
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
