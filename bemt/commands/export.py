@@ -63,12 +63,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _printing(parser: argparse.ArgumentParser) -> None:
-    from geometry.printed import ADAPTERS
-
     part = parser.add_argument_group("printing (docs/printing.md)")
     one = "one solid for a printer: thick enough, round tip, hub with a bore; stl, step, 3mf or obj"
     part.add_argument("--printable", action="store_true", help=one)
-    part.add_argument("--adapter", choices=sorted(ADAPTERS), help="bore and recess for a quarter-inch ring or a nut")
+    part.add_argument("--adapter", metavar="NAME", help="bore and recess: ring (quarter inch), m3, m5, m6 or m8 (nut)")
     part.add_argument("--bore-mm", type=float, metavar="D", help="hole through the hub (default: none)")
     pair: dict[str, Any] = {"type": float, "nargs": 2}
     part.add_argument("--recess-mm", metavar=("D", "DEPTH"), help="round recess in the back of the hub", **pair)

@@ -45,6 +45,8 @@ def faults_of(request: Print, formats: list[str]) -> list[Fault]:
     """What the options alone say that cannot be printed."""
     wrong = [word for word in formats if word not in SOLIDS]
     found = [Fault("", "--printable", f"the format {word}", f"one of {', '.join(SOLIDS)}") for word in wrong]
+    if request.adapter is not None and request.adapter not in ADAPTERS:
+        return [*found, Fault("", "--adapter", request.adapter, f"one of {', '.join(sorted(ADAPTERS))}")]
     try:
         _printed(request, ducted=False)
     except GeometryError as error:
