@@ -46,7 +46,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
         "adding.md",
         "scaling.md",
         "trust.md",
-    ),  # fmt: skip
+    ),
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": ("believe.md", "theory.md", "oblique.md", "effects.md", "diagnosis.md"),
