@@ -41,6 +41,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "How to": (
         "choose.md",
         "design.md",
+        "printing.md",
         "notebooks/*",
         "flight_logs.md",
         "exports.md",

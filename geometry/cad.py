@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,17 @@ from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
 from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
+from geometry.printed import HEXAGON, cutters, framed, root_depth
 from geometry.rotor import Rotor
 from geometry.solid import Mesh, profile_volume
 
 MM = 1000.0
 TOLERANCE = 5e-3
+SOUND = 1.5e-3  # volume error of a fused solid above which the next try may be better: some surfaces then cross
 _POINTS = 45
+TRIED = ((45, 8e-3), (45, 15e-3), (61, 8e-3), (45, 3e-3), (37, 8e-3))
+"""Points of a section and least distance of sections over R of printed blades, tried in turn: the CAD kernel fuses most
+of them, and says nothing when it loses a blade."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +45,23 @@ class Parts:
         return self.volumes["blade"] + self.volumes["hub"]
 
 
-def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[float, Array]]:
+def planar_sections(
+    rotor: Rotor, options: Options | None = None, count: int = _POINTS, apart: float = 1e-4
+) -> list[tuple[float, Array]]:
     """Cut the wrapped blade by planes across its pitch axis. [m]
 
     A point with arc t(rho) lies at x = rho cos(t/rho), y = rho sin(t/rho); x grows with rho while the arc stays below a
-    quarter turn, so that the radius is found by interpolation on a fine table of radii.
+    quarter turn, so that the radius is found by interpolation on a fine table of radii. A section has `count`
+    points; planes are no nearer to each other than `apart` times the tip radius.
     """
     blade = rotor.blade
     options = options or Options()
-    grid = Options(_POINTS, 20 * options.tolerance, options.segments, options.fillet)
+    printed = options.printed
+    grid = replace(options, n=count, tolerance=20 * options.tolerance)
     rho = radii(blade, grid)
     rho = np.sort(np.concatenate([rho, 0.5 * (rho[1:] + rho[:-1])]))
     step = 0.02 * rotor.R
-    fine = Options(_POINTS, options.tolerance, options.segments, options.fillet)
+    fine = replace(options, n=count)
     curves = np.stack([wrapped_outline(blade, float(r), fine) for r in rho])
     angle = curves[..., 0] / rho[:, None]
     if np.abs(angle).max() > 1.3:
@@ -62,11 +71,20 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
     outside, slope = [], (curves[-1] - curves[-2]) / (rho[-1] - rho[-2])
     reach = rotor.R * (1 / math.cos(float(np.abs(angle[-1]).max())) - 1) + step
     for k in range(1, 9):
-        outside.append(curves[-1] + slope * reach * k / 8)
+        outside.append(
+            curves[-1] + slope * reach * k / 8
+            if printed is None
+            else wrapped_outline(blade, float(rho[-1]) + reach * k / 8, fine)
+        )
     lowest = 0.75 * rotor.Rhub * math.cos(min(float(np.abs(angle[0]).max()) * 1.35, 1.4))
     inside = np.linspace(max(lowest, 0.3 * rotor.Rhub), rho[0], 9)[:-1]
     table = np.concatenate([inside, rho, rho[-1] + reach * np.arange(1, 9) / 8])
-    curves = np.concatenate([np.repeat(curves[:1], len(inside), axis=0), curves, np.stack(outside)])
+    within = (
+        np.repeat(curves[:1], len(inside), axis=0)
+        if printed is None
+        else np.stack([wrapped_outline(blade, float(r), fine) for r in inside])
+    )
+    curves = np.concatenate([within, curves, np.stack(outside)])
     angle = curves[..., 0] / table[:, None]
     x, y = table[:, None] * np.cos(angle), table[:, None] * np.sin(angle) * rotor.rotation
     bottom, top = float(x[0].max()), float(x[-1].min())
@@ -76,7 +94,12 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
             [("chord", "a blade too wide for its hub", "a root that ends inside the hub", "Less chord or a larger hub")]
         )
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
-    planes = planes[np.concatenate([[True], np.diff(planes) > 1e-4 * rotor.R])]
+    if printed is None:
+        planes = planes[np.concatenate([[True], np.diff(planes) > apart * rotor.R])]
+    else:
+        high = rotor.Rhub + (printed.blend or 0.0)
+        flare = np.linspace(root, high, 1 + math.ceil((high - root) / max(0.2 * (high - rotor.Rhub), 2e-3 * rotor.R)))
+        planes = np.concatenate([flare[:-1], _apart(np.concatenate([[high], planes[planes > high]]), apart * rotor.R)])
     out = [(float(plane), np.empty((curves.shape[1], 2))) for plane in planes]
     radius = table.tolist()  # plain numbers: there are a few at a time, which arrays are slow at
     for j in range(curves.shape[1]):
@@ -87,6 +110,15 @@ def planar_sections(rotor: Rotor, options: Options | None = None) -> list[tuple[
                 at += plane - _cubic(radius, along, at)
             section[j] = _cubic(radius, across, at), _cubic(radius, axial, at)
     return out
+
+
+def _apart(planes: Array, least: float) -> Array:
+    """Planes that are no nearer to each other than a distance; first and last stay."""
+    kept = [float(planes[0])]
+    for plane in planes[1:-1]:
+        if plane - kept[-1] > least and planes[-1] - plane > least:
+            kept.append(float(plane))
+    return np.array([*kept, float(planes[-1])])
 
 
 def _cubic(x: list[float], y: list[float], at: float) -> float:
@@ -203,6 +235,65 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
         got = f"a CAD solid whose volume is {off:+.2f} % off the integral of its sections"
         raise GeometryError([("blade", got, "at most 0.5 %", "Use the mesh formats, which need no loft")])
     return solid, profile
+
+
+def printed_solid(rotor: Rotor, options: Options, volume: float) -> Any:
+    """Make a printed rotor as one CAD solid: blades fused with the hub, the holes cut.
+
+    `options` and `volume` [m^3] are those of its mesh. The edge of the very tip stays sharp.
+    """
+    assert options.printed is not None
+    sharp = replace(options, printed=replace(options.printed, round_edge=False))
+    volume += rotor.B * (blade_volume(rotor.blade, sharp) - blade_volume(rotor.blade, options))
+    last, close = GeometryError([]), []
+    for count, apart in TRIED:
+        try:
+            solid = _printed_solid(rotor, sharp, count, apart)
+        except GeometryError as error:
+            last = error
+            continue
+        off = abs(solid.Volume() / MM**3 / volume - 1)
+        if off < SOUND:
+            return solid
+        if off < TOLERANCE:
+            close.append((off, solid))
+        got = f"a solid of {solid.Volume():.4g} mm^3"
+        hint = "Use stl or 3mf, which need no loft"
+        last = GeometryError([("blade", got, f"{volume * MM**3:.4g} mm^3, those of the mesh, within 0.5 %", hint)])
+    if close:
+        return min(close, key=lambda pair: pair[0])[1]
+    raise last
+
+
+def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> Any:
+    cq = needs("cadquery", "cad")
+
+    assert options.printed is not None
+    root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, options.printed), options)
+    profile = hub_profile(rotor, framed(root, options.printed))
+    try:
+        loft = _fixed(_loft(planar_sections(rotor, options, count, apart)))
+        foot, axis = cq.Vector(0, 0, -2 * rotor.R * MM), cq.Vector(0, 0, 1)
+        tip = cq.Solid.makeCylinder(rotor.R * MM, 4 * rotor.R * MM, foot).rotate(cq.Vector(), axis, 90.0)
+        blade = _one(loft.intersect(tip), "blade")
+        # Seams of surfaces of revolution lie away from the blades.
+        solid = _fixed(_turned(profile)).rotate(cq.Vector(), axis, 180.0 / rotor.B)
+        for k in range(rotor.B):
+            solid = solid.fuse(blade.rotate(cq.Vector(), axis, 360.0 * k / rotor.B))
+        for _, shape, sides in cutters(options.printed, profile, options.segments):
+            radius, bottom, top = float(shape[:, 0].max()) * MM, float(shape[0, 1]) * MM, float(shape[-1, 1]) * MM
+            if sides == HEXAGON:
+                corner = radius * math.sqrt((2 * math.pi / sides) / math.sin(2 * math.pi / sides))
+                hole = cq.Workplane(origin=(0, 0, bottom)).polygon(sides, 2 * corner).extrude(top - bottom).val()
+            else:
+                hole = cq.Solid.makeCylinder(radius, top - bottom, cq.Vector(0, 0, bottom))
+            solid = solid.cut(hole)
+        return _one(solid.clean(), "rotor")
+    except GeometryError:
+        raise
+    except Exception as error:  # the CAD kernel raises its own kinds
+        got, hint = f"a failure of the CAD kernel ({type(error).__name__})", "Use stl or 3mf, which need no loft"
+        raise GeometryError([("blade", got, "sections that can be lofted", hint)]) from error
 
 
 def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:

@@ -88,6 +88,20 @@ def frozen(values: ArrayLike) -> Array:
     return out
 
 
+def offset(outline: Array, distance: float) -> Array:
+    """Move a closed outline outwards along its normals (mean of the two edges at a corner, mitre up to 2)."""
+    edge = np.roll(outline, -1, axis=0) - outline
+    length = np.linalg.norm(edge, axis=1, keepdims=True)
+    unit = edge / np.maximum(length, 1e-300)
+    normal = np.stack([unit[:, 1], -unit[:, 0]], axis=1)
+    area = np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1])
+    normal *= math.copysign(1.0, area)
+    both = normal + np.roll(normal, 1, axis=0)
+    size = np.linalg.norm(both, axis=1, keepdims=True)
+    out: Array = outline + distance * both / np.maximum(size, 1e-9) * np.minimum(2 / np.maximum(size, 1e-9), 2.0)
+    return out
+
+
 def pchip_slopes(x: Array, y: Array) -> Array:
     """Find the slopes that :func:`pchip` gives the nodes, (N, k)."""
     h = np.diff(x)[:, None]

@@ -1,4 +1,4 @@
-"""Files of solids: STL, OBJ, STEP and OpenFOAM surfaces with a manifest; reading STL, OBJ and STEP back.
+"""Files of solids: STL, OBJ, 3MF, STEP and OpenFOAM surfaces with a manifest; reading STL, OBJ and STEP back.
 
 Everything is written under a temporary name, read back and checked, then renamed: a file that is there is sound.
 """
@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
 from geometry.solid import Mesh
 
-FORMATS = ("stl", "step", "obj", "openfoam")
+FORMATS = ("stl", "step", "obj", "3mf", "openfoam")
 UNITS = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
 SCHEMA = "geometry.export/1"
 MANIFEST = "manifest.json"
@@ -62,9 +63,11 @@ def export(
         volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
         for word in dict.fromkeys(formats):
             if word == "step":
-                files.append(_step(rotor, duct, work, name, unit, options, volumes))
+                files.append(_step(rotor, duct, work, name, unit, model, volumes))
             elif word == "openfoam":
                 files += _openfoam(model, work)
+            elif word == "3mf":
+                files.append(_three_mf(model, work, name))
             else:
                 files.append(_meshes(model, work, name, word, unit))
         for item in files:
@@ -162,6 +165,42 @@ def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> di
     return {"path": path.name, "format": kind, "unit": unit, "watertight": True, "surfaces": _surfaces(model)}
 
 
+_THREE_MF = {
+    "[Content_Types].xml": '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>',
+    "_rels/.rels": '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+    '<Relationship Target="/3D/3dmodel.model" Id="rel0" '
+    'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>',
+}
+
+
+def _three_mf(model: MeshModel, work: Path, name: str) -> dict[str, Any]:
+    """3MF, always in millimetres: one object per solid (3MF Consortium, core specification 1.3; not checked)."""
+    pieces, items = [], []
+    for number, part in enumerate(model.parts, 1):
+        vertices, faces, _ = _clean(part, UNITS["mm"])
+        rows = ('<vertex x="%.9g" y="%.9g" z="%.9g"/>' * len(vertices)) % tuple(vertices.ravel().tolist())
+        triangles = ('<triangle v1="%d" v2="%d" v3="%d"/>' * len(faces)) % tuple(faces.ravel().tolist())
+        pieces.append(
+            f'<object id="{number}" type="model"><mesh><vertices>{rows}</vertices>'
+            f"<triangles>{triangles}</triangles></mesh></object>"
+        )
+        items.append(f'<item objectid="{number}"/>')
+    text = (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<model unit="millimeter" xml:lang="en-US" '
+        'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
+        f"<resources>{''.join(pieces)}</resources><build>{''.join(items)}</build></model>"
+    )
+    path = work / f"{name}.3mf"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        for entry, content in (_THREE_MF | {"3D/3dmodel.model": text}).items():
+            packed.writestr(zipfile.ZipInfo(entry), content, zipfile.ZIP_DEFLATED)  # no date: equal rotors, equal files
+    return {"path": path.name, "format": "3mf", "unit": "mm", "watertight": True, "surfaces": _surfaces(model)}
+
+
 def _openfoam(model: MeshModel, work: Path) -> list[dict[str, Any]]:
     folder = work / "constant" / "triSurface"
     folder.mkdir(parents=True)
@@ -199,15 +238,20 @@ def _check_file(paths: Sequence[Path], scale: float, volume: float, bodies: int)
 
 
 def _step(
-    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, options: Options, volumes: dict[str, float]
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel, volumes: dict[str, float]
 ) -> dict[str, Any]:
     """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
     cq = needs("cadquery", "cad")
     from cadquery.occ_impl.exporters.assembly import exportAssembly
 
-    from geometry.cad import assembly, solids
+    from geometry.cad import Parts, assembly, printed_solid, solids
 
-    parts = solids(rotor, duct, options)
+    options = model.options
+    if options.printed is None:
+        parts = solids(rotor, duct, options)
+    else:
+        one = printed_solid(rotor, options, model.rotor.volume)
+        parts = Parts((("hub", "rotor", one),), {"blade": 0.0, "hub": one.Volume() * 1e-9})
     volumes["volume_rotor_cad"] = parts.rotor_volume
     meshed = volumes["volume_rotor_mesh"]
     path = work / f"{name}.step"
@@ -225,7 +269,7 @@ def _step(
     if abs(parts.rotor_volume / meshed - 1) > VOLUME_TOLERANCE:
         faults.add(path.name, f"a rotor of {parts.rotor_volume:g} m^3", f"that of the mesh, {meshed:g} m^3")
     faults.check()
-    surfaces = [{"name": key, "volume_m3": value} for key, value in parts.volumes.items()]
+    surfaces = [{"name": key, "volume_m3": value} for key, value in parts.volumes.items() if value > 0.0]
     return {"path": path.name, "format": "step", "unit": unit, "watertight": True, "surfaces": surfaces,
             "solids": [part for _, part, _ in parts.solids]}  # fmt: skip
 

@@ -11,16 +11,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from geometry.blade import Blade
-from geometry.common import Array, Faults, GeometryError
+from geometry.common import Array, Faults, GeometryError, offset
 from geometry.duct import Duct
 from geometry.mesh_duct import duct_mesh, plan_stator
+from geometry.printed import Printed, cutters, framed, outline, root_depth, seeds, settled
 from geometry.rotor import Rotor
-from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, revolve, skin
+from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, ray_thickness, revolve, skin
 
 __all__ = [
     "Mesh",
@@ -36,6 +37,10 @@ __all__ = [
 ]
 
 VOLUME_TOLERANCE = 5e-3
+BETWEEN = 1.02
+"""Least thickness that the rays must find over the one asked for: for what lies between the rays [1]."""
+TRIES = 4
+"""Meshes of a printed rotor until it is thick enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,7 @@ class MeshModel:
     duct: Mesh | None = None  # Duct and stator
     # What was measured on the meshes, lengths in metres, volumes in cubic metres
     checks: Mapping[str, float] = field(default_factory=dict)
+    options: Options = field(default_factory=Options)  # As meshed: those of a printed rotor are thick enough now
 
     @property
     def parts(self) -> list[Mesh]:
@@ -53,29 +59,17 @@ class MeshModel:
         return [self.rotor] if self.duct is None else [self.rotor, self.duct]
 
 
-def _offset(outline: Array, distance: float) -> Array:
-    """Move a closed outline outwards along its normals (mean of the two edges at a corner, mitre up to 2)."""
-    edge = np.roll(outline, -1, axis=0) - outline
-    length = np.linalg.norm(edge, axis=1, keepdims=True)
-    unit = edge / np.maximum(length, 1e-300)
-    normal = np.stack([unit[:, 1], -unit[:, 0]], axis=1)
-    area = np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1])
-    normal *= math.copysign(1.0, area)
-    both = normal + np.roll(normal, 1, axis=0)
-    size = np.linalg.norm(both, axis=1, keepdims=True)
-    out: Array = outline + distance * both / np.maximum(size, 1e-9) * np.minimum(2 / np.maximum(size, 1e-9), 2.0)
-    return out
-
-
 def wrapped_outline(blade: Blade, r: float, options: Options) -> Array:
     """Give the outline of the solid blade at a radius, unrolled from its cylinder, fillet included. [m]"""
+    if options.printed is not None:
+        return outline(blade, r, options.n, options.printed)
     at = min(max(r, blade.Rhub), blade.R)
     curve = blade.section_curve(at, options.n)
     height = max(r - blade.Rhub, 0.0)
     if height < options.fillet:
         rise = options.fillet - math.sqrt(options.fillet**2 - (options.fillet - height) ** 2)
         sharp = _sharp(curve)
-        moved = _offset(curve[:-1] if sharp else curve, rise)
+        moved = offset(curve[:-1] if sharp else curve, rise)
         curve = np.vstack([moved, moved[:1]]) if sharp else moved
     return curve
 
@@ -100,11 +94,13 @@ def radii(blade: Blade, options: Options | None = None) -> Array:
     """
     options = options or Options()
     inner = [x * blade.R for x, _ in blade.anchors if blade.Rhub < x * blade.R < blade.R]
-    seeds = [*np.linspace(blade.Rhub, blade.R, 17), *inner]
+    some = [*np.linspace(blade.Rhub, blade.R, 17), *inner]
+    if options.printed is not None:
+        some += seeds(blade, options.printed).tolist()
     if options.fillet > 0:
         rise = options.fillet * (1 - np.cos(np.linspace(0, np.pi / 2, 9)))
-        seeds += [blade.Rhub + float(h) for h in rise if blade.Rhub + h < blade.R]
-    ring = np.unique(np.array(seeds))
+        some += [blade.Rhub + float(h) for h in rise if blade.Rhub + h < blade.R]
+    ring = np.unique(np.array(some))
     ring = ring[np.concatenate([[True], np.diff(ring) > 1e-9 * blade.R])]
     ring[-1] = blade.R
     for _ in range(6):
@@ -161,8 +157,8 @@ def rotor_mesh(rotor: Rotor, options: Options | None = None) -> Mesh:
     return _rotor(rotor, options or Options())[0]
 
 
-def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
-    blade = rotor.blade
+def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float], Options]:
+    blade, printed = rotor.blade, options.printed
     faults = Faults()
     if not blade.anchors:
         faults.add("anchors", "none", "one section or more", "A solid needs sections")
@@ -171,21 +167,23 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     if options.fillet > 0.5 * rotor.span:
         faults.add("fillet", f"{options.fillet:g} m", f"at most half of the blade's length, {0.5 * rotor.span:g} m")
     faults.check()
-    outer = radii(blade, options)
-    depth = min(0.12 * blade.Rhub, 0.5 * blade.Rhub)
-    ring = np.concatenate([[blade.Rhub - depth], outer])
-    curves = rings(blade, ring, options)
+    if printed is None:
+        outer, curves, points = _skinned(rotor, options, 0.12 * blade.Rhub)
+    else:
+        options, outer, curves, points, thin = _thick_enough(rotor, options, printed)
+        printed = options.printed
     _check_sections(rotor, outer, curves[1:], options)
-    turn = rotor.rotation * curves[..., 0] / ring[:, None]
-    points = np.stack([ring[:, None] * np.cos(turn), ring[:, None] * np.sin(turn), curves[..., 1]], axis=-1)
     solid = as_solid(*skin(points), "blade")
-    profile = hub_profile(rotor, curves[0])
+    profile = hub_profile(rotor, curves[0] if printed is None else framed(curves[0], printed))
     segments = rotor.B * math.ceil(options.segments / rotor.B)
     hub = as_solid(*revolve(profile, segments), "hub")
     copies = [("blade", solid.rotate([0.0, 0.0, 360.0 * k / rotor.B])) for k in range(rotor.B)]
-    mesh = join([*copies, ("hub", hub)], "rotor")
+    holes = [] if printed is None else cutters(printed, profile, options.segments)
+    cut = [(name, as_solid(*revolve(shape, sides), name)) for name, shape, sides in holes]
+    mesh = join([*copies, ("hub", hub)], "rotor", cut)
     sections = _integral(blade, outer, options)
-    expected = profile_volume(profile) + rotor.B * sections
+    taken = join([("hub", hub)], "hub", cut).volume - hub.volume() if cut else 0.0
+    expected = profile_volume(profile) + taken + rotor.B * sections
     check_closed(mesh, "rotor", bodies=1)
     if abs(mesh.volume / expected - 1) > VOLUME_TOLERANCE:
         gap = 100 * (mesh.volume / expected - 1)
@@ -196,17 +194,58 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float]]:
     if abs(tip / rotor.R - 1) > 1e-6:
         raise GeometryError([("rotor", f"a tip radius of {tip:g} m", f"R = {rotor.R:g} m", "")])
     thick = [float(_thickness(curve)) for curve in curves[1:]]
+    edge = min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])
     checks = {
         "volume_rotor_mesh": mesh.volume,
         "volume_rotor_sections": expected,
         "volume_blade_sections": sections,
         "tip_radius": tip,
         "min_section_thickness": min(thick),
-        "min_trailing_edge": float(
-            min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])
-        ),  # noqa: E501
+        "min_trailing_edge": float(edge),
     }
-    return mesh, checks
+    if printed is not None:
+        del checks["min_section_thickness"], checks["min_trailing_edge"]  # of the rounded tip, where they mean nothing
+        checks |= {"min_thickness": thin, "trailing_edge": printed.edge, "flare": printed.blend or 0.0}
+    return mesh, checks, options
+
+
+def _skinned(rotor: Rotor, options: Options, depth: float) -> tuple[Array, Array, Array]:
+    """Radii of the free rings, outlines (N + 1, m, 2) with one inside the hub before them, and their points."""
+    outer = radii(rotor.blade, options)
+    ring = np.concatenate([[rotor.Rhub - depth], outer])
+    curves = rings(rotor.blade, ring, options)
+    turn = rotor.rotation * curves[..., 0] / ring[:, None]
+    return (
+        outer,
+        curves,
+        np.stack([ring[:, None] * np.cos(turn), ring[:, None] * np.sin(turn), curves[..., 1]], axis=-1),
+    )
+
+
+def _thick_enough(rotor: Rotor, options: Options, printed: Printed) -> tuple[Options, Array, Array, Array, float]:
+    """Make the blade a little thicker until no place is too thin; with the least thickness that was found. [m]
+
+    By rays from the middle of facets straight into the blade.
+    """
+    made = settled(rotor, printed)
+    root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, made), replace(options, printed=made))
+    cutters(made, hub_profile(rotor, framed(root, made)), options.segments)  # its faults come first
+    for _ in range(TRIES):
+        options = replace(options, printed=made)
+        outer, curves, points = _skinned(rotor, options, root_depth(rotor, made))
+        vertices, faces = skin(points)
+        m = points.shape[1]
+        # Above the hub, one of two triangles of every third facet: 3 divides no usual number of points.
+        corners = vertices[faces[m : (len(points) - 1) * m : 3]]
+        middle, across = corners.mean(axis=1), np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        thick = ray_thickness(vertices, faces, middle, across / np.linalg.norm(across, axis=1, keepdims=True))
+        k = int(np.argmin(thick))
+        thin, at = float(thick[k]), float(np.hypot(*middle[k, :2])) / rotor.R
+        if thin >= BETWEEN * printed.min_thickness:
+            return options, outer, curves, points, thin
+        made = made.thicker(1.002 * BETWEEN * printed.min_thickness / thin)
+    got = f"{thin * 1e3:.3g} mm at r/R = {at:.2f}"
+    raise GeometryError([("thickness", got, f"at least min_thickness, {printed.min_thickness * 1e3:g} mm", "")])
 
 
 def _thickness(curve: Array) -> float:
@@ -241,7 +280,7 @@ def blade_volume(blade: Blade, options: Options | None = None) -> float:
 
 def _integral(blade: Blade, ring: Array, options: Options) -> float:
     """Integral of the section areas from hub to tip, finer than the mesh: Gauss points between rings, all points."""
-    fine = Options(201, options.tolerance, options.segments, options.fillet)
+    fine = replace(options, n=201)
     half, mid = 0.5 * np.diff(ring), 0.5 * (ring[1:] + ring[:-1])
     total = 0.0
     for x, w in zip(*np.polynomial.legendre.leggauss(2), strict=True):
@@ -260,9 +299,9 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
     (('blade', 'hub'), 0.1016)
     """
     options = options or Options()
-    mesh, checks = _rotor(rotor, options)
+    mesh, checks, options = _rotor(rotor, options)
     if duct is None:
-        return MeshModel(mesh, None, checks)
+        return MeshModel(mesh, None, checks, options)
     duct.check(rotor)
     rho, z = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]), mesh.vertices[:, 2]
     hub = np.unique(mesh.part("hub"))
@@ -288,4 +327,4 @@ def build(rotor: Rotor, duct: Duct | None = None, options: Options | None = None
         got, hint = f"{duct._rotor * 1e3:.4g} mm, blade tips outside the duct", "Move the rotor or lengthen the duct"
         raise GeometryError([("duct.rotor_x", got, "blade tips inside the duct", hint)])
     checks["gap"] = gap
-    return MeshModel(mesh, standing, checks)
+    return MeshModel(mesh, standing, checks, options)

@@ -8,12 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.common import Array, Faults, GeometryError, needs
+
+if TYPE_CHECKING:
+    from geometry.printed import Printed
 
 Faces = NDArray[np.int64]
 
@@ -32,6 +35,7 @@ class Options:
     segments: int = 240  # Facets round hub and duct, at least
     fillet: float = 0.0  # Radius of the fillet between blade and hub; 0 is none [m]
     min_thickness: float = 0.0  # Smallest section thickness that is let pass; 0 lets all pass [m]
+    printed: Printed | None = None  # What a printer needs; None leaves the rotor as its sections say
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -148,11 +152,14 @@ def as_solid(vertices: Array, faces: Faces, where: str) -> Any:
     return solid.as_original()
 
 
-def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
-    """Join named solids; every face keeps the name of the solid that it comes from."""
+def join(parts: Sequence[tuple[str, Any]], where: str, cut: Sequence[tuple[str, Any]] = ()) -> Mesh:
+    """Join named solids and take others away; every face keeps the name of the solid that it comes from."""
     manifold3d = needs("manifold3d", "cad")
 
     total = manifold3d.Manifold.batch_boolean([solid for _, solid in parts], manifold3d.OpType.Add)
+    for _, solid in cut:
+        total -= solid
+    parts = [*parts, *cut]
     if total.is_empty():
         raise GeometryError([(where, "solids whose union is empty", "solids that can be joined", "")])
     # Slivers below what files resolve would open a file's mesh when its corners are merged.
@@ -172,6 +179,19 @@ def join(parts: Sequence[tuple[str, Any]], where: str) -> Mesh:
     root[np.asarray(data.merge_from_vert, dtype=np.int64)] = np.asarray(data.merge_to_vert, dtype=np.int64)
     used, faces = np.unique(root[faces], return_inverse=True)
     return Mesh(vertices[used], faces.reshape(-1, 3), group, names)
+
+
+def ray_thickness(vertices: Array, faces: Faces, points: Array, outward: Array) -> Array:
+    """Length of the way through a closed mesh, straight in from points on its surface. (N,) [m]"""
+    solid = as_solid(vertices, faces, "blade")
+    reach = 2.0 * float(np.ptp(vertices, axis=0).max())
+    skip = 1e-7 * reach
+    out = np.full(len(points), math.inf)
+    for i, (point, normal) in enumerate(zip(points, outward, strict=True)):
+        hits = solid.ray_cast(point - skip * normal, point - reach * normal)
+        if hits:
+            out[i] = skip + min(hit.distance for hit in hits) * (reach - skip)
+    return out
 
 
 def check_closed(mesh: Mesh, where: str, bodies: int | None = None) -> None:

@@ -81,6 +81,19 @@ def test_a_known_motor_narrows_the_power() -> None:
     assert worse.power_W > known.power_W and worse.full_thrust_N < known.full_thrust_N
 
 
+@pytest.mark.slow
+def test_the_stated_probability_is_met_by_makers_not_calibrated_on(shared_data, project) -> None:
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location("choose_truth", project / "docs" / "choose_truth.py")
+    truth = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(truth)
+    table = truth.points(shared_data / "drivecalc", 30)
+    for known in (False, True):
+        stated, met = truth.answers(table, known).mean(axis=0)
+        assert abs(stated - met) < 0.15
+
+
 def test_an_unreachable_target_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["choose", "--thrust", "60", "--cells", "3", "--kv", "900", "--labels", "10x4.5", "9x6"]
     assert main(words) == 1

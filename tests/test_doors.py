@@ -304,7 +304,7 @@ def test_bands_go_through_any_function_of_the_loads(own: Case) -> None:
 
 
 def test_the_drive_asks_the_same_rotor() -> None:
-    found = bemt.drive(LABEL, kv=1000, cells=4)
+    found = bemt.drive(LABEL, kv=1000, cells=6)
     full = found.full["rpm"].value
     rotor = bemt.propeller(LABEL).solve(full, 0.0)
     assert found.full["thrust_N"].value == pytest.approx(rotor.thrust_N[0], rel=2e-3)

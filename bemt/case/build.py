@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -92,9 +93,21 @@ def _blade(case: CaseFile, path: Path) -> Blade:
             chord={k: v for k, v in chord.items() if v is not None},
             pitch={k: v for k, v in laws.items() if v is not None},
         )
-        return from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
+        return _bent(
+            case, from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
+        )
     x, c, beta = _stations(case, path)
-    return from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name)
+    return _bent(case, from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name))
+
+
+def _bent(case: CaseFile, blade: Blade) -> Blade:
+    """Blade with the sweep and the rake of the case, quadratic in the radius; chord and blade angle stay."""
+    sweep, rake = 1e-3 * case.blade.tip_sweep_mm, 1e-3 * case.blade.tip_rake_mm
+    if sweep == 0.0 and rake == 0.0:
+        return blade
+    start = case.blade.sweep_from * blade.R
+    grown = (np.clip(blade.r - start, 0.0, None) / (blade.R - start)) ** 2
+    return replace(blade, sweep=sweep * grown, rake=rake * grown)
 
 
 def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

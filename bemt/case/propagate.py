@@ -9,6 +9,7 @@ far measured rotors of such a description are from the solver (`bemt.rotors`), w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -53,6 +54,8 @@ Progress = Callable[[int, int, str], None]
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
 """Channels that get a band; of a coaxial pair also its `LOADS` and `RATIOS`."""
 
+SWEPT_DEG = 15.0
+"""Sweep or rake of the outer half of the blade from which its loads are doubted, declared [deg]."""
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
 _UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
@@ -358,7 +361,25 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
             known, ducted = Validity.of_rotors((known, own)), False
         factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
-    return factor, tuple((*a, *b) for a, b in zip(words, tip, strict=True))
+    swept = swept_words(case)
+    return factor, tuple((*a, *b, *swept) for a, b in zip(words, tip, strict=True))
+
+
+def swept_words(case: Case) -> tuple[str, ...]:
+    """What is said of a blade whose sweep or rake is too large to be left out of the loads.
+
+    By simple sweep theory, lift goes with the square of the cosine of the angle of sweep, whatever its direction; the
+    solver leaves it out. 15 deg are 7 % of the tip's lift, about what the band of a usual blade holds.
+    """
+    blade = case.rotor().blade
+    if blade.sweep is None or blade.rake is None:
+        return ()
+    out = blade.r > 0.5 * blade.R
+    slope = np.hypot(np.gradient(blade.sweep, blade.r), np.gradient(blade.rake, blade.r))
+    angle = math.degrees(math.atan(float(np.max(slope[out], initial=0.0))))
+    if angle < SWEPT_DEG:
+        return ()
+    return (f"swept blade: by up to {angle:.0f} deg, loads are those of the straight one",)
 
 
 def loads_of(points: Dataset, D: float, u: Array, J_axial: Array | None = None) -> dict[str, Array]:

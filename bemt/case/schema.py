@@ -190,6 +190,16 @@ class BladeTable(Table):
     uiuc: str | None = entry("UIUC geometry file", words=FILE)
     apc: str | None = entry("APC PE0 file", words=FILE)
     beta_offset_deg: float = entry("rotation of the whole blade", "deg", -45, 45, default=0.0)
+    tip_sweep_mm: float = entry(
+        "offset of the tip in the plane of rotation, positive backwards; for geometry, not for loads",
+        "mm", -2000, 2000, default=0.0,
+    )  # fmt: skip
+    tip_rake_mm: float = entry(
+        "offset of the tip along the shaft, positive downstream; for geometry, not for loads",
+        "mm", -2000, 2000, default=0.0,
+    )  # fmt: skip
+    sweep_from: float = entry("r/R from which sweep and rake grow, with the square of the distance", "", 0, 0.95,
+                              default=0.3)  # fmt: skip
     known_from: KnownFrom | None = entry("source of the blade shape; sets its uncertainty", choices=KNOWN_FROM)
     label_pitch_in: float | None = entry(
         "pitch printed on the propeller", "in", 0.1, 120, _inch("label_pitch_in", 120.1)

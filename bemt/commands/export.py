@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from bemt.base.errors import EXIT_INPUT, EXIT_OK
 from bemt.commands import _options, _terminal
+
+if TYPE_CHECKING:
+    from bemt.exports.printing import Print
 
 NAME = "export"
 HELP = "write a case for CAD, CFD, simulators and design tools"
@@ -25,9 +30,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unit", choices=("mm", "m"), default="mm", help="unit of the files (default mm; openfoam is always in m)"
     )
-    parser.add_argument("--fillet-mm", type=float, default=0.0, metavar="R", help="fillet of blade and hub (default 0)")
-    thin = "refuse a blade that is thinner than this anywhere (default 0: no check)"
-    parser.add_argument("--min-thickness-mm", type=float, default=0.0, metavar="T", help=thin)
+    parser.add_argument(
+        "--fillet-mm", type=float, metavar="R", help="fillet of blade and hub (default 0); height of a printed flare"
+    )
+    thin = "refuse a blade whose sections are thinner (default: no check); a printed blade is made so (default 0.8)"
+    parser.add_argument("--min-thickness-mm", type=float, metavar="T", help=thin)
+    _printing(parser)
     top = "highest speed of tables and fits; speed of a disk or openfoam (default: from the case) [rev/min]"
     parser.add_argument("--rpm", type=float, metavar="N", help=top)
     wind = "axial speed of disks, blades and openfoam (default: from the case) [m/s]"
@@ -54,12 +62,46 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     _options.add_json(parser, "bemt.export/1")
 
 
+def _printing(parser: argparse.ArgumentParser) -> None:
+    part = parser.add_argument_group("printing (docs/printing.md)")
+    one = "one solid for a printer: thick enough, round tip, hub with a bore; stl, step, 3mf or obj"
+    part.add_argument("--printable", action="store_true", help=one)
+    part.add_argument("--adapter", metavar="NAME", help="bore and recess: ring (quarter inch), m3, m5, m6 or m8 (nut)")
+    part.add_argument("--bore-mm", type=float, metavar="D", help="hole through the hub (default: none)")
+    pair: dict[str, Any] = {"type": float, "nargs": 2}
+    part.add_argument("--recess-mm", metavar=("D", "DEPTH"), help="round recess in the back of the hub", **pair)
+    part.add_argument("--hex-mm", metavar=("FLATS", "DEPTH"), help="hexagonal recess in the back of the hub", **pair)
+    part.add_argument("--hub-diameter-mm", type=float, metavar="D", help="hub (default: that of the case)")
+    part.add_argument("--hub-height-mm", type=float, metavar="H", help="hub (default: what the root needs)")
+    part.add_argument("--trailing-edge-mm", type=float, metavar="T", help="trailing edge (default: least thickness)")
+    tip = "length of the rounded tip over the chord (default 0.5; 0.1 in a duct)"
+    part.add_argument("--tip-round", type=float, metavar="S", help=tip)
+    hands = "direction of rotation (default: that of the case)"
+    part.add_argument("--hand", choices=("right", "left", "both"), help=hands)
+
+
+def _request(args: argparse.Namespace) -> Print | None:
+    """What is to be printed; None for a rotor as its sections say."""
+    from bemt.base.errors import Fault, InputError
+    from bemt.exports.printing import Print, asked
+
+    recess, hexagon = (None if pair is None else (pair[0], pair[1]) for pair in (args.recess_mm, args.hex_mm))
+    request = Print(None, args.trailing_edge_mm, args.tip_round, None, args.hub_diameter_mm, args.hub_height_mm,
+                    args.adapter, args.bore_mm, recess, hexagon, args.hand)  # fmt: skip
+    if args.printable:
+        return replace(request, min_thickness_mm=args.min_thickness_mm, flare_mm=args.fillet_mm)
+    if asked(request):
+        raise InputError([Fault("", name, "given", "nothing without --printable") for name in asked(request)])
+    return None
+
+
 def run(args: argparse.Namespace) -> int:
     """Write every valid target of every valid case; 2 if one was refused."""
     from bemt.base.tables import json_text
     from bemt.exports import folder
     from bemt.exports.openfoam.write import Run
 
+    request = _request(args)
     flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
                domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
     made, refused = folder.export_cases(
@@ -67,10 +109,11 @@ def run(args: argparse.Namespace) -> int:
         args.out,
         args.format or ["stl"],
         args.unit,
-        args.fillet_mm,
-        args.min_thickness_mm,
+        (args.fillet_mm or 0.0) if request is None else 0.0,
+        (args.min_thickness_mm or 0.0) if request is None else 0.0,
         flow,
         tuple(dict.fromkeys(args.hold or ())),
+        request,
     )
     for error in refused:
         _terminal.complain(error)

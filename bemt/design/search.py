@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.case.unknowns import DRIVE
+from bemt.case.unknowns import DRIVE, ESC_DROP
 from bemt.design import rotor_loads
 from bemt.design.motors_file import KnownMotor
 from bemt.design.rotor_loads import LoadScatter, RotorLoads
@@ -45,7 +45,7 @@ RATIOS = (0.35, 0.45, 0.55, 0.7)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
-SHARES = {item.key.rpartition(".")[2]: item for item in DRIVE}
+SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
 LOADING = (15.0, 1200.0)
 """Disk loading of the labels that are tried [N/m2]."""
 DRAWS = 256
@@ -264,12 +264,12 @@ def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
 
 @cache
 def _draws() -> tuple[Array, Array]:
-    """Standard normal (2, DRAWS + 1) for the rotor and uniform (3, DRAWS + 1) for the shares; the first is nominal."""
+    """Standard normal (2, DRAWS + 1) for the rotor and uniform (4, DRAWS + 1) for the shares; the first is nominal."""
     from scipy.stats import norm, qmc
 
-    u = qmc.Sobol(5, seed=0).random(DRAWS).T
+    u = qmc.Sobol(6, seed=0).random(DRAWS).T
     z = norm.ppf(np.clip(u[:2], 1e-9, 1.0 - 1e-9))
-    return np.c_[np.zeros(2), z], np.c_[np.full(3, math.nan), u[2:]]
+    return np.c_[np.zeros(2), z], np.c_[np.full(4, math.nan), u[2:]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,17 +303,17 @@ def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target) ->
     share = {}
     for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True):
         share[name] = np.where(np.isnan(u), item.value, item.low + (item.high - item.low) * u)
-    sag, drop, idle = share["sag"], share["winding_drop"], share["idle_share"]
+    sag, drop, idle, lost = share["sag"], share["winding_drop"], share["idle_share"], share["drop"]
     kv, ohm, no_load = (np.array([[getattr(m, f)] for m in machines]) for f in ("kv", "resistance_ohm", "no_load_A"))
     k, loaded = 30.0 / (math.pi * kv), (1.0 - sag) * target.voc
-    typical = np.where(np.isnan(ohm), drop, 0.05)
+    typical = np.where(np.isnan(ohm), drop, lost + 0.05)
     full = np.minimum((1.0 - typical) * loaded / k * 30.0 / math.pi, loads.rpm[-1])
     amps = loads.torque_at(full) / k / (1.0 - idle)
-    winding = np.where(np.isnan(ohm), drop * loaded / _driven(amps), ohm)
     for _ in range(60 if np.isfinite(ohm).any() else 0):  # a motor of known resistance: its full throttle
-        new = np.maximum((loaded - winding * amps) / k * 30.0 / math.pi, 1.0)
+        new = np.maximum(((1.0 - lost) * loaded - ohm * amps) / k * 30.0 / math.pi, 1.0)
         full = np.where(np.isnan(ohm), full, 0.7 * full + 0.3 * np.minimum(new, loads.rpm[-1]))
         amps = loads.torque_at(full) / k / (1.0 - idle)
+    winding = np.where(np.isnan(ohm), drop, lost) * loaded / _driven(amps) + np.nan_to_num(ohm)
     amps = _driven(amps)
     rest = np.where(np.isnan(no_load), idle * amps, no_load)
     return _Chain(k, winding, rest, sag * target.voc / amps, target.voc)

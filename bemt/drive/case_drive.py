@@ -51,12 +51,12 @@ def drive_of(case: Case, rotor: RotorMap) -> Drive:
     t = drive_table(case)
     m, e = t.motor, t.esc
     henry = None if m.inductance_uH is None else m.inductance_uH * 1e-6
+    battery, winding, idle, bridge = _losses(t, rotor)
     esc = Esc(
-        e.pulse_min_us, e.pulse_max_us, e.exponent, e.resistance_mohm * 1e-3, e.idle_A,
+        e.pulse_min_us, e.pulse_max_us, e.exponent, bridge, e.idle_A,
         math.inf if e.current_limit_A is None else e.current_limit_A, e.braking == "yes", e.brake_on_stop,
         math.inf if henry is None or e.pwm_kHz is None else 2e3 * henry * e.pwm_kHz,
     )  # fmt: skip
-    battery, winding, idle = _losses(t, rotor)
     turning = 0.3 * rotor.inertia_kg_m2 if m.inertia_kg_mm2 is None else m.inertia_kg_mm2 * 1e-6
     motor = Motor(
         t.kv, winding, idle, turning, math.inf if m.heat_capacity_J_K is None else m.heat_capacity_J_K,
@@ -65,8 +65,8 @@ def drive_of(case: Case, rotor: RotorMap) -> Drive:
     return Drive(battery_of(t, battery), esc, motor, rotor)
 
 
-def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float]:
-    """Resistance of the battery share and of the winding [ohm], no-load current [A].
+def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float, float]:
+    """Resistance of the battery share and of the winding [ohm], no-load current [A], resistance of the ESC [ohm].
 
     The current at full throttle, on which the shares depend, is the root of a falling function: damped iteration.
     """
@@ -74,11 +74,11 @@ def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float]:
     stated = None if t.battery.resistance_mohm is None else t.vehicle.rotors * t.battery.resistance_mohm * 1e-3
     ohm = None if t.motor.resistance_mohm is None else t.motor.resistance_mohm * 1e-3
     sag, drop, share = t.battery.sag or 0.0, t.motor.winding_drop or 0.0, t.motor.idle_share or 0.0
-    more = t.esc.resistance_mohm * 1e-3
+    more, lost = t.esc.resistance_mohm * 1e-3, t.esc.drop or 0.0
     amps = 1e-3
     for _ in range(200):
         loaded = volts * (1.0 - sag) if stated is None else volts - stated * (amps + t.esc.idle_A)
-        emf = loaded * (1.0 - drop) - more * amps if ohm is None else loaded - (ohm + more) * amps
+        emf = loaded * (1.0 - lost) - more * amps - (loaded * drop if ohm is None else ohm * amps)
         load = float(rotor.torque(max(emf, 0.0) / k)) / k
         new = load / (1.0 - share) if t.motor.no_load_A is None else load + t.motor.no_load_A
         step = new - amps
@@ -87,4 +87,5 @@ def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float]:
             break
     battery = volts * sag / amps if stated is None else stated
     winding = loaded * drop / amps if ohm is None else ohm
-    return battery, winding, share * amps if t.motor.no_load_A is None else t.motor.no_load_A
+    no_load = share * amps if t.motor.no_load_A is None else t.motor.no_load_A
+    return battery, winding, no_load, more + loaded * lost / amps

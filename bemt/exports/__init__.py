@@ -1,4 +1,5 @@
-"""Exports of a case, one file per target, found by scanning this folder: the file ``rotor_disk.py`` is ``rotor-disk``.
+"""Exports of a case, one file per target, found by scanning this folder: the file ``rotor_disk.py`` is ``rotor-disk``
+and ``_3mf.py`` is ``3mf``.
 
 An export is a class of :class:`bemt.exports.base.Export` whose ``id`` is the name of its file with ``-`` for ``_``.
 """
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["exports", "target_ids"]
 
-_SHARED = {"base", "blades", "folder", "hub", "parts", "performance"}
+_SHARED = {"base", "blades", "folder", "hub", "parts", "performance", "printing"}
 """Files of this folder that are no targets."""
 
 
@@ -34,7 +35,8 @@ def target_ids() -> list[str]:
     >>> {"stl", "openfoam", "jsbsim"} <= set(target_ids())
     True
     """
-    return sorted(i.name.replace("_", "-") for i in pkgutil.iter_modules(__path__) if i.name not in _SHARED)
+    names = (i.name.lstrip("_") for i in pkgutil.iter_modules(__path__) if i.name not in _SHARED)
+    return sorted(name.replace("_", "-") for name in names)
 
 
 @cache
@@ -55,7 +57,8 @@ def exports() -> Mapping[str, Export]:
 
     found = {}
     for word in target_ids():
-        module = importlib.import_module(f"{__name__}.{word.replace('-', '_')}")
+        first = "_" if word[0].isdigit() else ""
+        module = importlib.import_module(f"{__name__}.{first}{word.replace('-', '_')}")
         own = [
             c
             for c in vars(module).values()

@@ -15,6 +15,7 @@ from bemt.case import Case, find_cases, load_case, repeated_names
 from bemt.exports import exports
 from bemt.exports.base import FEATURES, Job, entry
 from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
+from bemt.exports.printing import Print, faults_of, printable
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
@@ -48,6 +49,7 @@ def export_case(
     options: Options | None = None,
     flow: Run | None = None,
     hold: tuple[str, ...] = (),
+    request: Print | None = None,
 ) -> dict[str, Any]:
     """Write one case for one or more targets; each is whole or not there.
 
@@ -75,8 +77,14 @@ def export_case(
     manifest, faults = _targets(case, out, words, run, hold)
     if solid:
         try:
-            made = export(case.rotor(), case.duct(), out, solid, name=case.name, unit=unit, options=options)
-            manifest = _joined(manifest, made)
+            if request is None:
+                made = export(case.rotor(), case.duct(), out, solid, name=case.name, unit=unit, options=options)
+                manifest = _joined(manifest, made)
+            else:
+                rotors, options = printable(case, request)
+                for end, rotor in rotors:
+                    made = export(rotor, None, out, solid, name=case.name + end, unit=unit, options=options)
+                    manifest = _joined(manifest, made | {"name": case.name})
         except GeometryError as error:
             faults += [Fault(case.path.as_posix(), *fault) for fault in error.faults]
     if "openfoam" in words:
@@ -247,6 +255,7 @@ def export_cases(
     min_thickness_mm: float = 0.0,
     flow: Run | None = None,
     hold: tuple[str, ...] = (),
+    request: Print | None = None,
 ) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
@@ -255,6 +264,7 @@ def export_cases(
     """
     flow = flow or Run()
     faults = check_run(flow, NAMES) + _unused(flow, formats, hold)
+    faults += faults_of(request, formats) if request is not None else []
     try:
         options = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
@@ -275,7 +285,7 @@ def export_cases(
     for case in cases:
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
-            made.append((export_case(case, folder, formats, unit, options, flow, hold), folder))
+            made.append((export_case(case, folder, formats, unit, options, flow, hold, request), folder))
         except PartlyRefused as error:
             made.append((error.manifest, folder))
             refused.append(error)
@@ -372,7 +382,11 @@ def text(manifest: dict[str, Any], out: Path) -> str:
         words.append(f"CAD {100 * (volumes['volume_rotor_cad'] / meshed - 1):+.3f} %")
     if "gap" in checks:
         words.append(f"gap {number_text(checks['gap'] * 1e3)} mm")
-    words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
+    if "min_thickness" in checks:
+        words.append(f"thinnest place of the blade {number_text(checks['min_thickness'] * 1e3)} mm")
+        words.append(f"trailing edge {number_text(checks['trailing_edge'] * 1e3, 3)} mm")
+    else:
+        words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
     lines.append(", ".join(words))
     if "openfoam" in manifest:
         about = manifest["openfoam"]
