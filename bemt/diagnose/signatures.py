@@ -123,7 +123,7 @@ def candidates(
     found: list[Candidate] = []
     absent: dict[str, str] = {}
     for name, cls in effects.catalogue().items():
-        if not cls.diagnosed or (only is not None and name not in only):
+        if not cls.diagnosed if only is None else name not in only:
             continue
         if progress:
             progress(name)

@@ -1,0 +1,144 @@
+"""Two recordings without a case: the same judge, with signatures from the laws of a rotor that its reference shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.air import Air
+from bemt.bem.model import acts_on_rotor
+from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
+from bemt.diagnose import evidence, gate, rules, signatures, verdict
+from bemt.diagnose.assemble import assemble
+from bemt.diagnose.law_rotor import BLADE_LAWS, LawRotor, law_part
+from bemt.diagnose.record import Record, air_of, thinned
+
+if TYPE_CHECKING:
+    from bemt.compare.stand_run import StandRun
+
+__all__ = ["law_effects", "records_of", "weighed"]
+
+Array = NDArray[np.float64]
+
+MOST = 40
+"""Points of a recording that are weighed; more are averaged with alike ones [1]."""
+# What a motor's losses may differ by from run to run, share, where electrical power stands for torque.
+_BY_POWER = 0.03
+# Speed below this share of the largest: a rotor that has just set off.
+_STARTED = 0.15
+_COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "sideslip_rad", "run")
+# Where nothing tells: density [kg/m3], diameter [m] and speed [rev/min] that coefficients are turned into loads with.
+_RHO, _D, _RPM = 1.2, 0.25, 6000.0
+_FEWEST = 4
+
+
+def law_effects() -> list[str]:
+    """Effects whose signature needs no blade.
+
+    >>> {"thrust_zero", "oblique_inflow", "propeller"} <= set(law_effects()), "stall_delay" in law_effects()
+    (True, False)
+    """
+    return [
+        i for i, cls in effects.catalogue().items()
+        if cls.kind != "drive" and not cls.on_by_default and (i in BLADE_LAWS or not acts_on_rotor(cls()))
+    ]  # fmt: skip
+
+
+def weighed(a: StandRun, b: StandRun, diameter_m: float, nulls: int = gate.NULLS) -> verdict.VerdictQuery | None:
+    """Explanations of what changed from A to B, weighed; None where nothing can be."""
+    both = records_of(a, b, diameter_m)
+    if both is None:
+        return None
+    known, test = both
+    rotor = LawRotor.of(known, diameter_m)
+    problem = assemble((law_part(test, rotor), law_part(known, rotor)))
+    with evidence.one_thread():
+        candidates, _ = signatures.candidates(problem, law_effects())
+        found = evidence.weigh(problem, candidates)
+        p = gate.p_value(found, nulls)
+    for state in found.states:
+        state.rivals.clear()
+    return verdict.VerdictQuery(found, p)
+
+
+def records_of(a: StandRun, b: StandRun, diameter_m: float) -> tuple[Record, Record] | None:
+    """Both recordings with the same channels, A as reference, in the air that both tell."""
+    channels = {}
+    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
+        for c in LOADS[name]:
+            if c == "electrical_power_W" and not like_voltage(a, b):
+                continue
+            if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b)):
+                channels[quantity] = c
+                break
+    channels = {k: c for k, c in channels.items() if c in ("CT", "CP", "CQ") or all("rpm" in r.points for r in (a, b))}
+    if not channels:
+        return None
+    log_ratio, unsure = density_change(a, b)
+    apart = [r.session.get(c, 0.0) for r in (a, b) for c in channels.values()]
+    apart += [SESSION["torque"], _BY_POWER if "electrical_power_W" in channels.values() else 0.0, unsure]
+    D = diameter_m if math.isfinite(diameter_m) else _D
+    out = [
+        _record(r, channels, D, rho, max(apart), reference)
+        for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
+    ]
+    known, test = out
+    if known is None or test is None:
+        return None
+    return thinned(known, MOST), thinned(_in_reach(test, known), MOST)
+
+
+def _in_reach(test: Record, known: Record) -> Record:
+    """Points of the test where the reference was, with a margin; all where they share no range."""
+    keep = np.ones(len(test), dtype=bool)
+    for of in (lambda r: np.log(r.rpm), lambda r: r.V / r.rpm):
+        x, seen = of(test), of(known)
+        low, high = log_range(seen, MARGIN)
+        inside = (x >= low) & (x <= high)
+        if (keep & inside).sum() >= _FEWEST:
+            keep &= inside
+    return test.take(np.flatnonzero(keep))
+
+
+def _record(
+    run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool
+) -> Record | None:  # fmt: skip
+    points = run.points
+    rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
+    n = rpm / 60.0
+    recorded = math.isfinite(run.density)
+    rho = np.asarray(points["density_kg_m3"], float) if "density_kg_m3" in points else np.full(len(run), np.nan)
+    rho = np.where(np.isfinite(rho), rho, run.density if recorded else _RHO * density)
+    V = np.nan_to_num(points["airspeed_m_s"]) if "airspeed_m_s" in points else np.zeros(len(run))
+    if "J" in points:
+        V = np.nan_to_num(points["J"]) * n * D
+    unit = {
+        "thrust_N": 1.0, "torque_Nm": 1.0, "power_W": 1.0 / (2.0 * np.pi * n),
+        "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
+        "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,
+    }  # fmt: skip
+    measured, u, zero = {}, {}, {}
+    for k, c in channels.items():
+        measured[k] = np.asarray(points[c], float) * unit[c]
+        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
+        u[k] = np.where(stated > 0.0, stated, np.nan)
+        if run.shift.get(c):
+            zero[k] = run.shift[c] * float(np.nanmax(np.abs(measured[k])))
+    good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
+    good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
+    good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
+    if good.sum() < 2:
+        return None
+    air = Air.from_density(_RHO)
+    fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
+    extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k]).all()}
+    record = Record(
+        points.name, rpm, V, air_of(fields), measured, u, extra, {}, zero, recorded,
+        reference=reference, repeatability=repeatability,
+    )  # fmt: skip
+    return record.take(np.flatnonzero(good))
