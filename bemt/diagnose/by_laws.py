@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,11 +16,13 @@ from bemt.bem.model import acts_on_rotor
 from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.diagnose import evidence, gate, rules, signatures, verdict
 from bemt.diagnose.assemble import assemble
-from bemt.diagnose.law_rotor import BLADE_LAWS, LawRotor, law_part
+from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, Curve, LawRotor, Laws, law_part
 from bemt.diagnose.record import Record, air_of, thinned
 
 if TYPE_CHECKING:
+    from bemt.compare.smooth_change import Scatter
     from bemt.compare.stand_run import StandRun
+    from bemt.diagnose.problem import Part
 
 __all__ = ["law_effects", "records_of", "weighed"]
 
@@ -35,6 +38,10 @@ _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "sides
 # Where nothing tells: density [kg/m3], diameter [m] and speed [rev/min] that coefficients are turned into loads with.
 _RHO, _D, _RPM = 1.2, 0.25, 6000.0
 _FEWEST = 4
+# At rest a coefficient below this share of the usual one is no reading of a turning rotor.
+_NEAR_ZERO, _STILL = 0.15, 0.02
+# Rows this many robust standard deviations off the curve through all of them are strays, and at least this share off.
+_FAR, _FAR_SHARE, _STRAYS = 5.0, 0.05, 0.1
 
 
 def law_effects() -> list[str]:
@@ -49,14 +56,22 @@ def law_effects() -> list[str]:
     ]  # fmt: skip
 
 
-def weighed(a: StandRun, b: StandRun, diameter_m: float, nulls: int = gate.NULLS) -> verdict.VerdictQuery | None:
-    """Explanations of what changed from A to B, weighed; None where nothing can be."""
-    both = records_of(a, b, diameter_m)
+def weighed(
+    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter], nulls: int = gate.NULLS
+) -> verdict.VerdictQuery | None:
+    """Explanations of what changed from A to B, weighed; None where nothing can be.
+
+    ``scatter`` of single readings as both recordings show it, by thrust and torque.
+    """
+    both = records_of(a, b, diameter_m, scatter)
     if both is None:
         return None
     known, test = both
-    rotor = LawRotor.of(known, diameter_m)
-    problem = assemble((law_part(test, rotor), law_part(known, rotor)))
+    def parts(laws: Laws) -> tuple[Part, ...]:
+        rotor = LawRotor.of(known, diameter_m, laws)
+        return law_part(test, rotor), law_part(known, rotor)
+
+    problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
     with evidence.one_thread():
         candidates, _ = signatures.candidates(problem, law_effects())
         found = evidence.weigh(problem, candidates)
@@ -66,7 +81,9 @@ def weighed(a: StandRun, b: StandRun, diameter_m: float, nulls: int = gate.NULLS
     return verdict.VerdictQuery(found, p)
 
 
-def records_of(a: StandRun, b: StandRun, diameter_m: float) -> tuple[Record, Record] | None:
+def records_of(
+    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter]
+) -> tuple[Record, Record] | None:  # fmt: skip
     """Both recordings with the same channels, A as reference, in the air that both tell."""
     channels = {}
     for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
@@ -84,12 +101,13 @@ def records_of(a: StandRun, b: StandRun, diameter_m: float) -> tuple[Record, Rec
     apart += [SESSION["torque"], _BY_POWER if "electrical_power_W" in channels.values() else 0.0, unsure]
     D = diameter_m if math.isfinite(diameter_m) else _D
     out = [
-        _record(r, channels, D, rho, max(apart), reference)
+        _record(r, channels, D, rho, max(apart), reference, scatter)
         for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
     ]
     known, test = out
     if known is None or test is None:
         return None
+    known, test = (_without_strays(r, D) for r in (known, test))
     return thinned(known, MOST), thinned(_in_reach(test, known), MOST)
 
 
@@ -106,7 +124,8 @@ def _in_reach(test: Record, known: Record) -> Record:
 
 
 def _record(
-    run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool
+    run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool,
+    scatter: Mapping[str, Scatter],
 ) -> Record | None:  # fmt: skip
     points = run.points
     rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
@@ -125,13 +144,21 @@ def _record(
     measured, u, zero = {}, {}, {}
     for k, c in channels.items():
         measured[k] = np.asarray(points[c], float) * unit[c]
+        full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
         stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
-        u[k] = np.where(stated > 0.0, stated, np.nan)
+        u[k] = np.sqrt(stated**2 + (math.hypot(s.share, s.wiggle) * measured[k]) ** 2 + (s.floor * full) ** 2)
         if run.shift.get(c):
-            zero[k] = run.shift[c] * float(np.nanmax(np.abs(measured[k])))
+            zero[k] = run.shift[c] * full
+        if c == "electrical_power_W":  # what a motor takes without load
+            zero[k] = max(zero.get(k, 0.0), _BY_POWER * full)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
+    for k, v in measured.items():
+        size = np.abs(v) / (rho * n**2)
+        usual = np.nanquantile(np.where(good, size, np.nan), 0.9)
+        v[(V <= _STILL * n * D) & ~(size > _NEAR_ZERO * usual)] = np.nan
+    good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     if good.sum() < 2:
         return None
     air = Air.from_density(_RHO)
@@ -142,3 +169,20 @@ def _record(
         reference=reference, repeatability=repeatability,
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
+
+
+def _without_strays(record: Record, D: float) -> Record:
+    """Record without readings that all others of it contradict."""
+    n = record.rpm / 60.0
+    unit, J = np.asarray(record.air.rho) * n**2, record.V / (n * D)
+    measured = {}
+    for channel, v in record.measured.items():
+        y = v / unit
+        good = np.isfinite(y)
+        off = np.where(good, y - Curve.of(y, J, record.rpm, (-1.0, 0.0, 0.5))(J, record.rpm), 0.0)
+        middle = float(np.median(off[good]))
+        spread = 1.48 * float(np.median(np.abs(off[good] - middle)))
+        far = np.abs(off - middle) > max(_FAR * spread, _FAR_SHARE * float(np.max(np.abs(y[good]))))
+        measured[channel] = np.where(far, np.nan, v) if far.sum() <= _STRAYS * good.sum() else v
+    kept = np.any([np.isfinite(v) for v in measured.values()], axis=0)
+    return replace(record, measured=measured).take(np.flatnonzero(kept))

@@ -25,11 +25,10 @@ __all__ = ["BLADE_LAWS", "Curve", "LawPart", "LawRotor", "law_part"]
 
 Array = NDArray[np.float64]
 
-# Slope of a load over V/(n D) at rest, share of the load, and its standard deviation, where the reference has no airspeed.
-# Of thrust it follows CP/CT, that is the pitch: the solver's of eight propellers by label, 8x3.8 to 18x12, and three
-# others lie within 0.2 of this line (declared). Torque hardly changes, as the induced power falls with thrust.
-_AT_REST = {"thrust_N": (-0.8, 0.4), "torque_Nm": (-0.05, 0.15)}
-_BY_PITCH, _BY_PITCH_SD, _STEEP = (-2.4, 3.9), 0.25, (-1.8, -0.05)
+# Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust there,
+# a + b CP/CT over its ends, [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie within
+# 0.2 of this line (declared).
+_NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
 _OVER_J, _OVER_SPEED = (3.0, 3.0, 2.0), (0.15, 0.1)
 _STILL = 0.02
@@ -37,10 +36,50 @@ _STILL = 0.02
 _ROW, _FLOOR = 0.01, 0.003
 # Coefficient of thrust by which a diameter is guessed where none is known: propellers of drones have 0.06 to 0.16.
 _CT = 0.1
-# Induced power over that of the ideal disk, and least share of profile drag in the torque (declared).
-_KAPPA, _LEAST_PROFILE = 1.25, 0.1
+# Least share of profile drag in the torque (declared).
+_LEAST_PROFILE = 0.1
 # Radius at which blade forces act, share of the tip radius.
 _AT = 0.75
+
+
+@dataclass(frozen=True)
+class Laws:
+    """Numbers of the laws that theory leaves open; each of :data:`VARIANTS` changes one of them by its uncertainty.
+
+    Attributes
+    ----------
+    no_thrust : float
+        Advance ratio of no thrust over CP/CT at rest: 1.5 to 1.8 of the same propellers [1].
+    slope : float
+        Added to the slope of thrust at rest [1].
+    last_torque : float
+        Torque there, share of that at rest: 0.1 to 0.5 [1].
+    kappa : float
+        Induced power over that of the ideal disk: 1.1 to 1.4 (Leishman 2006, ch. 2; not checked) [1].
+    rise : float
+        Power of the lift that profile drag rises with [1].
+    tip : (float, float)
+        Powers of the radius with which thrust and torque of a cut blade fall: 1.3 and 1.1 of tapered blades by the
+        solver, 4 and 5 of similar ones [1].
+    ducted_kappa : float
+        As ``kappa`` within a duct, whose wall carries the flow to the tips [1].
+    """
+
+    no_thrust: float = 1.65
+    slope: float = 0.0
+    last_torque: float = 0.3
+    kappa: float = 1.25
+    rise: float = 1.5
+    tip: tuple[float, float] = (2.0, 1.8)
+    ducted_kappa: float = 1.05
+
+
+LAWS = Laws()
+VARIANTS = (
+    replace(LAWS, no_thrust=1.35), replace(LAWS, slope=0.25), replace(LAWS, last_torque=0.5), replace(LAWS, kappa=1.4),
+    replace(LAWS, rise=3.0), replace(LAWS, tip=(3.0, 3.4)), replace(LAWS, ducted_kappa=0.9),
+)  # fmt: skip
+"""Laws in which one number is off by about its standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,24 +92,29 @@ class Curve:
     powers: int  # of J
 
     @classmethod
-    def of(cls, coefficient: Array, J: Array, rpm: Array, at_rest: tuple[float, float]) -> Curve:
-        """Least squares with weak priors for slopes and bends (ridge)."""
+    def of(cls, coefficient: Array, J: Array, rpm: Array, at_rest: tuple[float, float, float]) -> Curve:
+        """Least squares with weak priors for slopes and bends (ridge).
+
+        ``at_rest``: slope and bend over J, shares of the coefficient, of a rotor whose recording has no airspeed, and
+        the J to which they hold.
+        """
         good = np.isfinite(coefficient)
         c, J, x = coefficient[good], J[good], np.log(rpm[good])
         top = float(np.max(np.abs(c), initial=0.0)) or 1.0
         middle, half = 0.5 * float(x.max() + x.min()), 0.5 * float(np.ptp(x))
         span = float(np.ptp(J))
-        powers = min(3, np.unique(np.round(J, 2)).size - 1) if span > _STILL else 1
-        out = cls(np.zeros(0), (float(J.min()), float(J.max())), (middle, max(half, 1e-6)), powers)
+        still = span <= _STILL
+        powers = 2 if still else min(3, np.unique(np.round(J, 2)).size - 1)
+        last = max(float(J.max()), at_rest[2]) if still else float(J.max())
+        out = cls(np.zeros(0), (float(J.min()), last), (middle, max(half, 1e-6)), powers)
         A = out._columns(J, x)
         mean, sd = np.zeros(A.shape[1]), np.zeros(A.shape[1])
         level = float(np.median(c))
         mean[0], sd[0] = level, 10.0 * top
-        for k in range(powers):
-            sd[1 + k] = _OVER_J[k] * top
-        if span <= _STILL:
-            slope, spread = at_rest
-            mean[1], sd[1] = slope * level, spread * abs(level)
+        if still:
+            mean[1:3], sd[1:3] = np.array(at_rest[:2]) * level, 1e-6 * top
+        else:
+            sd[1 : 1 + powers] = np.array(_OVER_J[:powers]) * top
         sd[1 + powers :] = np.array(_OVER_SPEED) * top * min(1.0, half / 0.1)
         noise = np.hypot(_ROW * c, _FLOOR * top)
         W = A * sd / noise[:, None]
@@ -101,24 +145,28 @@ class LawRotor:
 
     diameter_m: float
     curves: Mapping[str, Curve]
+    laws: Laws = LAWS
     duct: Any = None  # as of `bemt.bem.Model`: a recording does not say whether there is one
 
     @classmethod
-    def of(cls, record: Record, diameter_m: float) -> LawRotor:
+    def of(cls, record: Record, diameter_m: float, laws: Laws = LAWS) -> LawRotor:
         """Rotor of a reference; without a diameter the one that a usual thrust coefficient gives."""
         n, rho = record.rpm / 60.0, np.asarray(record.air.rho)
+        c = {k: v / (rho * n**2) for k, v in record.measured.items()}
+        T, Q = (float(np.nanmedian(np.abs(c[k]))) if k in c else math.nan for k in ("thrust_N", "torque_Nm"))
         D = diameter_m
         if not math.isfinite(D):
-            T, Q = (np.abs(record.measured.get(c, np.full(n.size, np.nan))) / (rho * n**2) for c in _AT_REST)
-            D = float(np.nanquantile(T, 0.9) / _CT) ** 0.25 if np.isfinite(T).any() else (
-                float(np.nanquantile(Q, 0.9) / (0.1 * _CT))) ** 0.2  # fmt: skip
-        J, unit = record.V / (n * D), rho * n**2
-        at_rest = dict(_AT_REST)
-        if at_rest.keys() <= record.measured.keys():
-            T, Q = (float(np.nanmedian(record.measured[c] / unit)) for c in at_rest)
-            slope = _BY_PITCH[0] + _BY_PITCH[1] * 2.0 * math.pi * Q / (T * D) if T > 0.0 else _AT_REST["thrust_N"][0]
-            at_rest["thrust_N"] = float(np.clip(slope, *_STEEP)), _BY_PITCH_SD
-        return cls(D, {c: Curve.of(y / unit, J, record.rpm, at_rest[c]) for c, y in record.measured.items()})
+            D = (T / _CT) ** 0.25 if math.isfinite(T) else (10.0 * Q / _CT) ** 0.2
+        ratio = 2.0 * math.pi * Q / (T * D) if math.isfinite(T * Q) else _NO_THRUST / LAWS.no_thrust
+        last = laws.no_thrust * ratio
+        slope = (float(np.clip(_AT_REST[0] + _AT_REST[1] * ratio, *_ENDS)) + laws.slope) * last
+        falls = 0.1 * last  # of torque, slightly
+        at_rest = {
+            "thrust_N": (slope / last, -(1.0 + slope) / last**2, last),
+            "torque_Nm": (-falls / last, (laws.last_torque - 1.0 + falls) / last**2, last),
+        }
+        J = record.V / (n * D)
+        return cls(D, {k: Curve.of(v, J, record.rpm, at_rest[k]) for k, v in c.items()}, laws)
 
     def flow(self, record: Record) -> Flow:
         """Conditions of a recording with the loads of the curves."""
@@ -135,7 +183,7 @@ class LawRotor:
         """Thrust, torque and their slopes with V; zero where the reference does not show one."""
         unit, D = flow.rho * flow.n**2, self.diameter_m
         out = []
-        for channel in _AT_REST:
+        for channel in ("thrust_N", "torque_Nm"):
             c = self.curves.get(channel)
             zero = np.zeros_like(flow.rpm)
             J = flow.V / (flow.n * D)
@@ -152,65 +200,63 @@ class LawRotor:
         for e in effects:
             law = BLADE_LAWS.get(e.id)
             if law is not None:
-                law(e, loads, met)
+                law(e, loads, met, self.laws)
             e.loads(loads, met)
         return loads, met
 
 
-def _turned(degrees: Array | float, loads: Loads, flow: Flow) -> None:
+def _turned(degrees: Array | float, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Turn the blade by an angle at 0.75 R."""
-    _lifted(np.radians(degrees) * _AT * flow.omega * flow.R, loads, flow)
+    _lifted(np.radians(degrees) * _AT * flow.omega * flow.R, loads, flow, laws)
 
 
-def _lifted(faster: Array, loads: Loads, flow: Flow) -> None:
+def _lifted(faster: Array, loads: Loads, flow: Flow, laws: Laws) -> None:
     """More lift, as of an inflow slower by so much [m/s] with the induced speed left to follow, and its torque.
 
     The slope of thrust over V has dv/dV in it: with v (V + v) = T/(2 rho A) (Glauert 1935, ch. VII 2) an angle changes
     thrust by (V + 2 v)/(V + v) times as much as the same change of inflow by V. The power of the added thrust is
-    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile; the profile drag rises as the lift to the power 1.5 (declared).
+    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile.
     """
     V, v = np.maximum(flow.V, 0.0), flow.induced
     dT = -flow.dT_dV * faster * (V + 2.0 * v) / np.maximum(V + v, 1e-9)
     top = np.max(np.abs(flow.T0) / flow.n**2, initial=0.0) * flow.n**2
     share = np.divide(dT, top, out=np.zeros_like(dT), where=top > 0.0)
-    loads.Q = loads.Q + dT * (V + 1.5 * _KAPPA * v) / flow.omega + _profile(loads, flow) * 1.5 * share
+    loads.Q = loads.Q + dT * (V + 1.5 * laws.kappa * v) / flow.omega + _profile(loads, flow, laws) * laws.rise * share
     loads.T = loads.T + dT
 
 
-def _profile(loads: Loads, flow: Flow) -> Array:
+def _profile(loads: Loads, flow: Flow, laws: Laws) -> Array:
     """Torque of the profile drag: what thrust and induced speed leave, (P,) [N m]."""
-    lifting = np.maximum(loads.T, 0.0) * (flow.V + _KAPPA * flow.induced) / flow.omega
+    lifting = np.maximum(loads.T, 0.0) * (flow.V + laws.kappa * flow.induced) / flow.omega
     return np.asarray(np.maximum(loads.Q - lifting, _LEAST_PROFILE * np.abs(loads.Q)))
 
 
-def _pitch_offset(e: Any, loads: Loads, flow: Flow) -> None:
-    _turned(e.offset_deg, loads, flow)
+def _pitch_offset(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
+    _turned(e.offset_deg, loads, flow, laws)
 
 
-def _untwist(e: Any, loads: Loads, flow: Flow) -> None:
+def _untwist(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Nose down by tip_deg (r/R)^2 in proportion to rho Omega^2; at 0.75 R."""
-    _turned(-e.tip_deg * _AT**2 * e.share(flow), loads, flow)
+    _turned(-e.tip_deg * _AT**2 * e.share(flow), loads, flow, laws)
 
 
-def _section(e: Any, loads: Loads, flow: Flow) -> None:
+def _section(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Camber turns the zero-lift line by 2 camber; drag scales the profile torque and brakes thrust."""
-    dQ = (e.drag - 1.0) * _profile(loads, flow)
-    _turned(math.degrees(2.0 * e.camber), loads, flow)
+    dQ = (e.drag - 1.0) * _profile(loads, flow, laws)
+    _turned(math.degrees(2.0 * e.camber), loads, flow, laws)
     helix = (flow.V + flow.induced) / (_AT * flow.omega * flow.R)
     loads.Q = loads.Q + dQ
     loads.T = loads.T - dQ * helix / (_AT * flow.R)
 
 
-def _tip_cut(e: Any, loads: Loads, flow: Flow) -> None:
+def _tip_cut(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """A blade that tapers to its tip loses less there than a similar smaller one, and keeps its J of no thrust.
-
-    Powers of the radius: the solver's of tapered blades are 1.3 and 1.1, of similar ones 4 and 5 (declared: between).
     """
     smaller = 1.0 - e.cut
-    loads.T, loads.Q = smaller**2.0 * loads.T, smaller**1.8 * loads.Q
+    loads.T, loads.Q = smaller ** laws.tip[0] * loads.T, smaller ** laws.tip[1] * loads.Q
 
 
-def _duct(e: Any, loads: Loads, flow: Flow) -> None:
+def _duct(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """More air through the disk unloads the blades, the duct adds to the thrust; both fade with speed.
 
     At rest the disk takes sigma (2 T_r/(rho A))^1/2 instead of (T/(2 rho A))^1/2, and T = 2 sigma T_r (McCormick 1967,
@@ -223,17 +269,17 @@ def _duct(e: Any, loads: Loads, flow: Flow) -> None:
     s = np.clip(2.0 * slope / np.maximum(1.0 - slope, 0.2), 0.0, 2.0)
     root = -s * e.wake_ratio + np.sqrt((s * e.wake_ratio) ** 2 + 1.0 + s)
     more = root**2 * (1.0 + (2.0 * e.wake_ratio - 1.0) * (1.0 - 1.6 * e.lip_loss))
-    profile = _profile(loads, flow)
-    induced = (loads.Q - profile) * 2.0 * e.wake_ratio * root**3 * (1.05 / _KAPPA)
+    profile = _profile(loads, flow, laws)
+    induced = (loads.Q - profile) * 2.0 * e.wake_ratio * root**3 * (laws.ducted_kappa / laws.kappa)
     loads.Q = loads.Q + fade * (induced + profile * 0.5 * (1.0 + root**2) - loads.Q)
     loads.T = loads.T * (1.0 + fade * (more - 1.0)) - e.outer_drag * 0.5 * flow.rho * V**2 * flow.area
 
 
-def _nothing(e: Any, loads: Loads, flow: Flow) -> None:
+def _nothing(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Its other hooks say it all."""
 
 
-BLADE_LAWS: dict[str, Callable[[Any, Loads, Flow], None]] = {
+BLADE_LAWS: dict[str, Callable[[Any, Loads, Flow, Laws], None]] = {
     "pitch_offset": _pitch_offset, "untwist": _untwist, "section": _section, "tip_cut": _tip_cut, "duct": _duct,
     "propeller": _nothing, "diameter": _nothing, "nacelle": _nothing,
 }  # fmt: skip
@@ -245,6 +291,11 @@ class LawPart(Part):
     """Recording of a rotor that only the reference shows."""
 
     rotor: LawRotor = field(default_factory=lambda: LawRotor(1.0, {}))
+
+    @property
+    def by_laws(self) -> bool:
+        """Yes."""
+        return True
 
     def _ours(self, effects: Sequence[Effect]) -> Array:
         key = tuple(effects)

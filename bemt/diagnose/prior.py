@@ -32,7 +32,8 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = present(problem)
-    rest = {i: EVIDENT if effects.catalogue()[i].evident else 1.0 for i in ids}
+    # between two recordings the change is often one that was made and is known
+    rest = {i: EVIDENT if effects.catalogue()[i].evident and not problem.by_laws else 1.0 for i in ids}
     there = dict.fromkeys(on, PRESENT)
     if any(p.record.reference for p in problem.parts):
         there |= {e.id: BOTH for e in effects.standard() if e.id in on and not e.along}

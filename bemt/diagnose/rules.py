@@ -219,7 +219,7 @@ def _exact_relation(a: VerdictQuery) -> Decision | None:
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
     """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
     if a.p_value > GATE and (
-        a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
+        a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and not a.found.problem.by_laws and a.likeliest_none)
     ):
         return _nothing(a, _by_chance(a))
     return None
