@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.air import Air
 from bemt.bem.model import acts_on_rotor
+from bemt.compare import recordings
+from bemt.compare.drive_laws import Judgement
 from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.diagnose import evidence, gate, rules, signatures, verdict
 from bemt.diagnose.assemble import assemble
@@ -20,11 +22,12 @@ from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, Curve, LawRotor,
 from bemt.diagnose.record import Record, air_of, thinned
 
 if TYPE_CHECKING:
+    from bemt.compare.recordings import RunChange
     from bemt.compare.smooth_change import Scatter
     from bemt.compare.stand_run import StandRun
     from bemt.diagnose.problem import Part
 
-__all__ = ["law_effects", "records_of", "weighed"]
+__all__ = ["changed", "judged", "law_effects", "records_of", "weighed"]
 
 Array = NDArray[np.float64]
 
@@ -56,35 +59,52 @@ def law_effects() -> list[str]:
     ]  # fmt: skip
 
 
-def weighed(
-    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter], nulls: int = gate.NULLS
-) -> verdict.VerdictQuery | None:
-    """Explanations of what changed from A to B, weighed; None where nothing can be.
+def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
+    """Compare two recordings; what acts on the rotor is judged when it is asked for."""
+    return recordings.changed(a, b, diameter_m, judged)
 
-    ``scatter`` of single readings as both recordings show it, by thrust and torque.
-    """
-    both = records_of(a, b, diameter_m, scatter)
+
+def judged(pair: RunChange) -> Judgement:
+    """What changed the loads from A to B."""
+    with evidence.one_thread():
+        query = weighed(pair)
+        if query is None:
+            return recordings.NO_VERDICT
+        said = rules.decide(query)
+    P = sorted(query.P.items(), key=lambda kv: -kv[1])
+    parameters = query.refined(said.leading)[1] if said.leading and said.effects else {}
+    return Judgement(
+        said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability
+    )  # fmt: skip
+
+
+def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | None:
+    """Explanations of what changed from A to B, weighed; None where nothing can be."""
+    both = records_of(pair.a, pair.b, pair.diameter_m, pair.rotor.likelier)
     if both is None:
         return None
     known, test = both
+
     def parts(laws: Laws) -> tuple[Part, ...]:
-        rotor = LawRotor.of(known, diameter_m, laws)
+        rotor = LawRotor.of(known, pair.diameter_m, laws)
         return law_part(test, rotor), law_part(known, rotor)
 
     problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
-    with evidence.one_thread():
-        candidates, _ = signatures.candidates(problem, law_effects())
-        found = evidence.weigh(problem, candidates)
-        p = gate.p_value(found, nulls)
+    candidates, _ = signatures.candidates(problem, law_effects())
+    found = evidence.weigh(problem, candidates)
+    p = gate.p_value(found, nulls)
     for state in found.states:
         state.rivals.clear()
-    return verdict.VerdictQuery(found, p)
+    return verdict.VerdictQuery(found, p, pair=pair)
 
 
 def records_of(
     a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter]
 ) -> tuple[Record, Record] | None:  # fmt: skip
-    """Both recordings with the same channels, A as reference, in the air that both tell."""
+    """Both recordings with the same channels, A as reference, in the air that both tell.
+
+    ``scatter`` of single readings as both recordings show it, by thrust and torque.
+    """
     channels = {}
     for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
         for c in LOADS[name]:

@@ -58,11 +58,13 @@ class Laws:
         Induced power over that of the ideal disk: 1.1 to 1.4 (Leishman 2006, ch. 2; not checked) [1].
     rise : float
         Power of the lift that profile drag rises with [1].
-    tip : (float, float)
-        Powers of the radius with which thrust and torque of a cut blade fall: 1.3 and 1.1 of tapered blades by the
-        solver, 4 and 5 of similar ones [1].
+    diameter : (float, float)
+        Powers of the diameter with which thrust and torque go: 4 and 5 of similar propellers, 1.3 and 1.1 of a tapered
+        blade that is cut, by the solver [1].
     ducted_kappa : float
         As ``kappa`` within a duct, whose wall carries the flow to the tips [1].
+    size : float
+        Diameter over the one that is guessed, where none is known [1].
     """
 
     no_thrust: float = 1.65
@@ -70,14 +72,16 @@ class Laws:
     last_torque: float = 0.3
     kappa: float = 1.25
     rise: float = 1.5
-    tip: tuple[float, float] = (2.0, 1.8)
+    diameter: tuple[float, float] = (4.0, 5.0)
     ducted_kappa: float = 1.05
+    size: float = 1.0
 
 
 LAWS = Laws()
 VARIANTS = (
     replace(LAWS, no_thrust=1.35), replace(LAWS, slope=0.25), replace(LAWS, last_torque=0.5), replace(LAWS, kappa=1.4),
-    replace(LAWS, rise=3.0), replace(LAWS, tip=(3.0, 3.4)), replace(LAWS, ducted_kappa=0.9),
+    replace(LAWS, rise=3.0), replace(LAWS, diameter=(2.5, 3.0)), replace(LAWS, ducted_kappa=0.9),
+    replace(LAWS, size=0.8),
 )  # fmt: skip
 """Laws in which one number is off by about its standard deviation."""
 
@@ -156,7 +160,7 @@ class LawRotor:
         T, Q = (float(np.nanmedian(np.abs(c[k]))) if k in c else math.nan for k in ("thrust_N", "torque_Nm"))
         D = diameter_m
         if not math.isfinite(D):
-            D = (T / _CT) ** 0.25 if math.isfinite(T) else (10.0 * Q / _CT) ** 0.2
+            D = laws.size * ((T / _CT) ** 0.25 if math.isfinite(T) else (10.0 * Q / _CT) ** 0.2)
         ratio = 2.0 * math.pi * Q / (T * D) if math.isfinite(T * Q) else _NO_THRUST / LAWS.no_thrust
         last = laws.no_thrust * ratio
         slope = (float(np.clip(_AT_REST[0] + _AT_REST[1] * ratio, *_ENDS)) + laws.slope) * last
@@ -249,11 +253,10 @@ def _section(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     loads.T = loads.T - dQ * helix / (_AT * flow.R)
 
 
-def _tip_cut(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    """A blade that tapers to its tip loses less there than a similar smaller one, and keeps its J of no thrust.
-    """
-    smaller = 1.0 - e.cut
-    loads.T, loads.Q = smaller ** laws.tip[0] * loads.T, smaller ** laws.tip[1] * loads.Q
+def _diameter(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
+    """What other powers than those of similar propellers make; the effect itself does the rest."""
+    T, Q = (p - q for p, q in zip(laws.diameter, LAWS.diameter, strict=True))
+    loads.T, loads.Q = (1.0 + e.change) ** T * loads.T, (1.0 + e.change) ** Q * loads.Q
 
 
 def _duct(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
@@ -280,8 +283,8 @@ def _nothing(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
 
 
 BLADE_LAWS: dict[str, Callable[[Any, Loads, Flow, Laws], None]] = {
-    "pitch_offset": _pitch_offset, "untwist": _untwist, "section": _section, "tip_cut": _tip_cut, "duct": _duct,
-    "propeller": _nothing, "diameter": _nothing, "nacelle": _nothing,
+    "pitch_offset": _pitch_offset, "untwist": _untwist, "section": _section, "duct": _duct,
+    "propeller": _nothing, "diameter": _diameter, "nacelle": _nothing,
 }  # fmt: skip
 """How loads change with effects that have hooks inside of the solver, by id."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.compare.scaling_laws import LAWS
+from bemt.compare.recordings import NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.diagnose import blocks, ratio_check, wrong_rotor_check
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
@@ -219,7 +219,9 @@ def _exact_relation(a: VerdictQuery) -> Decision | None:
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
     """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
     if a.p_value > GATE and (
-        a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and not a.found.problem.by_laws and a.likeliest_none)
+        a.P[NONE] > 0.5
+        or (a.p_value > 5.0 * GATE and a.level < LEVEL)
+        or (not a.alone and not a.found.problem.by_laws and a.likeliest_none)
     ):
         return _nothing(a, _by_chance(a))
     return None
@@ -538,6 +540,8 @@ def _many_are_left(a: VerdictQuery) -> Decision | None:
 def _wrong_rotor_check(a: VerdictQuery) -> Decision | None:
     """Declared: loads off by a factor of three are those of another rotor, unit or speed before any physics."""
     said, problem = a.answer, a.found.problem
+    if problem.by_laws:
+        return None
     sure = said.effects[:1] if said.rule == BESIDE_IT else said.effects
     slip = (
         set(sure) & set(wrong_rotor_check.SLIPS)
@@ -641,7 +645,7 @@ def _ratios_fill(a: VerdictQuery) -> Decision | None:
     likely = {i: sum(p for k, p in a.P.items() if i in k.ids) for i in a.found.spans}
     # a single name is not for the ratios to give: they know no blade, and what the diagnosis holds likely may be it
     several = ratios.verdict == "class"
-    weighed = {*ratios.probability, *(row.id for row in LAWS)} if several else set(ratios.effects)
+    weighed = set(ratios.probability) if several else set(ratios.effects)
     least = LIKELY if several else RARE
     lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= least and i not in weighed]
     chance = sum(ratios.probability.get(k, 0.0) for k in ratios.effects)
@@ -662,3 +666,49 @@ def _drive_by_ratios(a: VerdictQuery) -> Decision | None:
     drive = change.drive
     chance = sum(drive.probability.get(k, 0.0) for k in drive.effects)
     return replace(said, verdict=drive.verdict, effects=drive.effects, probability=chance, why=drive.why, by="ratios")
+
+
+@_rule("two recordings without a case: the densities that both tell", revises=True)
+def _density_told(a: VerdictQuery) -> Decision | None:
+    """By definition: where the coefficients agree and the recorded densities do not, the density is what changed."""
+    if a.pair is None or a.answer.verdict != "none" or not (why := a.pair.by_density):
+        return None
+    what = Explanation.of("air_density")
+    return replace(
+        a.answer, verdict="named", effects=("air_density",), leading=what, probability=a.P[NONE], why=why, by="ratios"
+    )
+
+
+@_rule("two recordings without a case: thrust of the other sign", revises=True)
+def _thrust_turned(a: VerdictQuery) -> Decision | None:
+    """By definition: nothing but the cell or the sense of rotation turns thrust round."""
+    if a.pair is None or not a.pair.turned or a.answer.effects != ("unit_slip",):
+        return None
+    return replace(a.answer, why=REVERSED)
+
+
+@_rule("two recordings without a case: electrical power for torque", revises=True)
+def _by_proxy(a: VerdictQuery) -> Decision | None:
+    """Declared: no claim of something unlisted where the losses of a motor are in the readings."""
+    if a.pair is None or a.answer.verdict != "unknown" or not a.pair.by_proxy:
+        return None
+    why = "electrical power replaces torque and includes the losses of the motor"
+    return replace(a.answer, verdict="insufficient", classes=(), why=why)
+
+
+@_rule("two recordings without a case: nothing shared, or no one stand", revises=True)
+def _not_comparable(a: VerdictQuery) -> Decision | None:
+    """Declared: two extrapolations, an unstated wind or loads of two stands are no change of one rotor.
+
+    A ratio of pole pairs moves the speeds apart itself, a unit the loads.
+    """
+    if a.pair is None:
+        return None
+    said, why = a.answer, ""
+    if a.pair.apart and said.effects != ("rpm_scale",):
+        why = NOTHING_SHARED
+    elif a.pair.far_off and not set(said.effects) & {"rpm_scale", "unit_slip"}:
+        why = OTHER_STAND
+    if said.verdict != "none" and a.pair.wind:
+        why = a.pair.wind
+    return replace(said, verdict="insufficient", effects=(), classes=(), sets=(), why=why) if why else None

@@ -25,8 +25,8 @@ class AnotherPropeller(Effect):
     check = "compare label, blade count and weight"
     sign = "both loads change by large, different shares: pitch, blades, chord and section at once"
     parameters = (
-        Parameter("thrust", "1", -0.8, 4.0, "declared; propellers that one motor turns", 3, 0.0, 0.2),
-        Parameter("torque", "1", -0.8, 4.0, "the same", 3, 0.0, 0.2),
+        Parameter("thrust", "1", -0.8, 4.0, "declared; propellers that one motor turns", 3, 0.0, 0.4),
+        Parameter("torque", "1", -0.8, 4.0, "the same", 3, 0.0, 0.4),
     )
     diagnosed = False
     on_by_default = False
