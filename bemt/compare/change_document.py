@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from bemt.compare.drive_laws import FAMILY, Judgement, law
 from bemt.compare.invocation import Invocation
 from bemt.compare.matched import LOADS
 from bemt.compare.recordings import IN_WIND, RunChange
 from bemt.effects import catalogue
-from bemt.compare.drive_laws import FAMILY, Judgement, law
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 DAYS = (

@@ -35,7 +35,7 @@ _SIZES = (0.02, 0.07, 0.25)
 SURE = 0.85
 """Probability from which one cause in the drive is named."""
 NEAR = 20.0
-"""A cause this many times less likely than the leading one is still in its class: a law is rougher than its evidence."""
+"""A cause this many times less likely than the leading one is in its class: a law is rougher than its evidence."""
 RIVAL, DOUBT = 0.1, 0.3
 """A cause beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
 
@@ -178,7 +178,7 @@ def _columns(
 def weigh(
     channels: Mapping[str, MatchedChannel], scatters: Sequence[Mapping[str, Scatter]]
 ) -> dict[str, float]:  # fmt: skip
-    """Probability of every explanation, the likeliest first; ``scatters``: settings of the scatter of single readings."""
+    """Probability of every explanation, the likeliest first; ``scatters``: settings of that of single readings."""
     found = [_weighed(channels, scatter) for scatter in scatters]
     score = {k: float(log_sum([z[k] for z in found])) for k in found[0]}
     listed = [k for k in score if k not in _PRIOR]

@@ -134,8 +134,7 @@ def records_of(
 def _in_reach(test: Record, known: Record) -> Record:
     """Points of the test where the reference was, with a margin; all where they share no range."""
     keep = np.ones(len(test), dtype=bool)
-    for of in (lambda r: np.log(r.rpm), lambda r: r.V / r.rpm):
-        x, seen = of(test), of(known)
+    for x, seen in ((np.log(test.rpm), np.log(known.rpm)), (test.V / test.rpm, known.V / known.rpm)):
         low, high = log_range(seen, MARGIN)
         inside = (x >= low) & (x <= high)
         if (keep & inside).sum() >= _FEWEST:
@@ -174,7 +173,7 @@ def _record(
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
-    for k, v in measured.items():
+    for v in measured.values():
         size = np.abs(v) / (rho * n**2)
         usual = np.nanquantile(np.where(good, size, np.nan), 0.9)
         v[(V <= _STILL * n * D) & ~(size > _NEAR_ZERO * usual)] = np.nan

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,8 +24,8 @@ __all__ = ["BLADE_LAWS", "Curve", "LawPart", "LawRotor", "law_part"]
 
 Array = NDArray[np.float64]
 
-# Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust there,
-# a + b CP/CT over its ends, [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie within
+# Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
+# rest, a + b CP/CT between two ends [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie within
 # 0.2 of this line (declared).
 _NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
@@ -175,9 +174,10 @@ class LawRotor:
     def flow(self, record: Record) -> Flow:
         """Conditions of a recording with the loads of the curves."""
         nothing, air = np.zeros_like(record.rpm), record.air
+        rho, mu, a_sound = (np.asarray(v, float) for v in (air.rho, air.mu, air.a_sound))
         R = 0.5 * self.diameter_m
         flow = Flow(
-            record.rpm, record.V, air.rho, air.mu, air.a_sound, R, 0.1 * R, 0.15 * R, 2, False,
+            record.rpm, record.V, rho, mu, a_sound, R, 0.1 * R, 0.15 * R, 2, False,
             nothing, nothing, nothing, nothing, dict(record.extra),
         )  # fmt: skip
         flow.T0, flow.Q0, flow.dT_dV, flow.dQ_dV = self.loads(flow)
