@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
     from bemt.compare.smooth_change import Scatter
     from bemt.compare.stand_run import StandRun
+    from bemt.dataset import Dataset
     from bemt.diagnose.problem import Part
 
 __all__ = ["changed", "judged", "law_effects", "records_of", "weighed"]
@@ -37,7 +38,7 @@ MOST = 40
 _BY_POWER = 0.03
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
-_COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "sideslip_rad", "run")
+_COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
 # Where nothing tells: density [kg/m3], diameter [m] and speed [rev/min] that coefficients are turned into loads with.
 _RHO, _D, _RPM = 1.2, 0.25, 6000.0
 _FEWEST = 4
@@ -183,11 +184,26 @@ def _record(
     air = Air.from_density(_RHO)
     fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
     extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k]).all()}
+    angle = _angle(points)
+    if angle is not None and reference:  # its curves are over V cos(angle)
+        V = V * np.cos(angle)
+    elif angle is not None and np.any(angle != 0.0):
+        extra["sideslip_rad"] = angle
+    if "second_rotor_rad_s" in extra:  # what it changes is no scatter
+        u = {k: np.full(len(run), np.nan) for k in u}
     record = Record(
         points.name, rpm, V, air_of(fields), measured, u, extra, {}, zero, recorded,
         reference=reference, repeatability=repeatability,
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
+
+
+def _angle(points: Dataset) -> Array | None:
+    """Angle between wind and shaft, (P,) [rad]; None: not recorded."""
+    for name, unit in (("sideslip_rad", 1.0), ("sideslip_deg", math.pi / 180.0)):
+        if name in points and np.isfinite(points[name]).all():
+            return np.abs(points[name]) * unit
+    return None
 
 
 def _without_strays(record: Record, D: float) -> Record:

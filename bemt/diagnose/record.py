@@ -29,7 +29,7 @@ CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 
 COVARIATES = (
     "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "wall_distance_m",
-    "sideslip_rad", "run",
+    "sideslip_rad", "second_rotor_rad_s", "run",
 )  # fmt: skip
 """Channels of a series, besides the conditions, that an effect may know."""
 
@@ -390,7 +390,8 @@ def dense(record: Record) -> bool:
 def _alike(record: Record, run: Array) -> NDArray[np.intp]:
     """Order of the points that brings like conditions together, whatever the order of the rows."""
     bins = np.round(np.log(record.rpm) / _SAME_SPEED)
-    return np.lexsort((record.rpm, record.V / record.rpm, np.asarray(record.air.rho, dtype=float), bins, run))
+    beside = record.extra.get("second_rotor_rad_s", np.zeros(len(record)))
+    return np.lexsort((record.rpm, beside, record.V / record.rpm, np.asarray(record.air.rho, dtype=float), bins, run))
 
 
 def merged(records: Sequence[Record]) -> Record:
