@@ -34,8 +34,9 @@ Array = NDArray[np.float64]
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# What a motor's losses may differ by from run to run, share, where electrical power stands for torque.
-_BY_POWER = 0.03
+# What a motor's losses may differ by from run to run, and with the load, share, where electrical power stands for
+# torque.
+_BY_POWER, _EFFICIENCY = 0.03, 0.08
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
 _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
@@ -166,11 +167,11 @@ def _record(
         measured[k] = np.asarray(points[c], float) * unit[c]
         full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
         stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
-        u[k] = np.sqrt(stated**2 + (math.hypot(s.share, s.wiggle) * measured[k]) ** 2 + (s.floor * full) ** 2)
+        u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
         if run.shift.get(c):
             zero[k] = run.shift[c] * full
-        if c == "electrical_power_W":  # what a motor takes without load
-            zero[k] = max(zero.get(k, 0.0), _BY_POWER * full)
+        if c == "electrical_power_W":  # a motor's efficiency follows its load, and it takes power without any
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), _BY_POWER * full)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
@@ -183,7 +184,7 @@ def _record(
         return None
     air = Air.from_density(_RHO)
     fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
-    extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k]).all()}
+    extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k][good]).all()}
     angle = _angle(points)
     if angle is not None and reference:  # its curves are over V cos(angle)
         V = V * np.cos(angle)

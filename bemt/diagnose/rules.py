@@ -217,12 +217,12 @@ def _exact_relation(a: VerdictQuery) -> Decision | None:
 
 @_rule("nulls look like it", "GATE, LEVEL")
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
-    """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
-    if a.p_value > GATE and (
-        a.P[NONE] > 0.5
-        or (a.p_value > 5.0 * GATE and a.level < LEVEL)
-        or (not a.alone and not a.found.problem.by_laws and a.likeliest_none)
-    ):
+    """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it.
+
+    Two recordings without a case have little to be likelier with: there "none" is the likelier half or it is not said.
+    """
+    small = (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
+    if a.p_value > GATE and (a.P[NONE] > 0.5 or (small and not a.found.problem.by_laws)):
         return _nothing(a, _by_chance(a))
     return None
 
