@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from bemt.compare.stand_run import StandRun
     from bemt.dataset import Dataset
     from bemt.diagnose.problem import Part
+    from bemt.diagnose.signatures import Candidate
 
 __all__ = ["changed", "judged", "law_effects", "records_of", "weighed"]
 
@@ -37,6 +38,8 @@ MOST = 40
 # What a motor's losses may differ by from run to run, and with the load, share, where electrical power stands for
 # torque.
 _BY_POWER, _EFFICIENCY = 0.03, 0.08
+# Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
+_SAME_DRIVE = 0.06
 # Speed below this share of the largest: a rotor that has just set off.
 _STARTED = 0.15
 _COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
@@ -93,11 +96,31 @@ def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | 
 
     problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
     candidates, _ = signatures.candidates(problem, law_effects())
+    candidates = tuple(c for c in (_as_counted(c, pair) for c in candidates) if c is not None)
     found = evidence.weigh(problem, candidates)
     p = gate.p_value(found, nulls)
     for state in found.states:
         state.rivals.clear()
     return verdict.VerdictQuery(found, p, pair=pair)
+
+
+def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
+    """Candidate without ratios of speeds that the speed at equal command rules out; None where none is left.
+
+    One motor at one command turns as fast as before, whatever is indicated.
+    """
+    r = next((r for r in pair.ratios.values() if r["kind"] == "speed"), None)
+    if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
+        return candidate
+
+    def fits(setting: Mapping[str, Any]) -> bool:
+        if setting.get("channel", "rpm") != "rpm":
+            return True
+        ratio = abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))
+        unsure = _SAME_DRIVE + math.log(r["high95"] / r["ratio"])
+        return abs(math.log(r["ratio"] / ratio)) < unsure
+
+    return candidate.only(np.array([fits(s) for s in candidate.settings]))
 
 
 def records_of(

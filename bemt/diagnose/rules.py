@@ -392,7 +392,12 @@ def _another_blade_or_anything_that_scales_all_loads(a: VerdictQuery) -> Decisio
 
 @_rule("at the end of its range", "END")
 def _at_the_end_of_its_range(a: VerdictQuery) -> Decision | None:
-    """Declared: where one number cannot go further, another makes up for something else."""
+    """Declared: where one number cannot go further, another makes up for something else.
+
+    Among several that look alike under rough laws the number is as rough as they are.
+    """
+    if a.found.problem.by_laws and len(a.group) > 1:
+        return None
     if any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()):
         return a.says(
             "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
@@ -689,11 +694,11 @@ def _thrust_turned(a: VerdictQuery) -> Decision | None:
 
 @_rule("two recordings without a case: electrical power for torque", revises=True)
 def _by_proxy(a: VerdictQuery) -> Decision | None:
-    """Declared: no claim of something unlisted where the losses of a motor are in the readings."""
-    if a.pair is None or a.answer.verdict != "unknown" or not a.pair.by_proxy:
+    """Declared: nothing unlisted, and no single name, where the losses of a motor are in the readings."""
+    if a.pair is None or a.answer.verdict not in ("unknown", "named", "sensor") or not a.pair.by_proxy:
         return None
     why = "electrical power replaces torque and includes the losses of the motor"
-    return replace(a.answer, verdict="insufficient", classes=(), why=why)
+    return replace(a.answer, verdict="insufficient", effects=(), classes=(), sets=(), why=why)
 
 
 @_rule("two recordings without a case: nothing shared, or no one stand", revises=True)

@@ -64,6 +64,18 @@ class Candidate:
         """Kind of the effect: air, stand or drive."""
         return effects.catalogue()[self.id].kind
 
+    def only(self, keep: NDArray[np.bool_]) -> Candidate | None:
+        """Candidate with some of its settings; None without any."""
+        if keep.all():
+            return self
+        if not keep.any():
+            return None
+        settings = tuple(s for s, k in zip(self.settings, keep, strict=True) if k)
+        weight = self.weight[keep] / self.weight[keep].sum()
+        return Candidate(
+            self.id, settings, self.signatures[:, keep], weight, self.solved[keep], self.directions
+        )  # fmt: skip
+
     def between(self, g: int) -> Array:
         """Change of the signature within half the way to the neighbouring settings, one column per parameter.
 
