@@ -26,6 +26,8 @@ WORD = {
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
+# Families of causes, less one, from which a headline says the change first.
+_MANY = 2
 # Probability from which a cause is said as a guess.
 _GUESS = 0.1
 
@@ -122,6 +124,8 @@ def headline(doc: Mapping[str, Any]) -> str:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
     several = families(effects, doc["ranking"])
+    if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
+        return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
 

@@ -145,8 +145,10 @@ def records_of(
     apart = [r.session.get(c, 0.0) for r in (a, b) for c in channels.values()]
     apart += [SESSION["torque"], _BY_POWER if "electrical_power_W" in channels.values() else 0.0, unsure]
     D = diameter_m if math.isfinite(diameter_m) else _D
+    # what lags on the way up and down in one of them may be a zero of the other
+    shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
     out = [
-        _record(r, channels, D, rho, max(apart), reference, scatter)
+        _record(r, channels, D, rho, max(apart), reference, scatter, shift)
         for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
     ]
     known, test = out
@@ -169,7 +171,7 @@ def _in_reach(test: Record, known: Record) -> Record:
 
 def _record(
     run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool,
-    scatter: Mapping[str, Scatter],
+    scatter: Mapping[str, Scatter], shift: Mapping[str, float],
 ) -> Record | None:  # fmt: skip
     points = run.points
     rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
@@ -188,11 +190,13 @@ def _record(
     measured, u, zero = {}, {}, {}
     for k, c in channels.items():
         measured[k] = np.asarray(points[c], float) * unit[c]
+        if k == "torque_Nm":  # its sign is the sense of rotation
+            measured[k] *= np.sign(np.nansum(measured[k])) or 1.0
         full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
         stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
         u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
-        if run.shift.get(c):
-            zero[k] = run.shift[c] * full
+        if shift[c]:
+            zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor's efficiency follows its load, and it takes power without any
             u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), _BY_POWER * full)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)

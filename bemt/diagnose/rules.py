@@ -219,10 +219,11 @@ def _exact_relation(a: VerdictQuery) -> Decision | None:
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
     """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it.
 
-    Two recordings without a case have little to be likelier with: there "none" is the likelier half or it is not said.
+    Of two recordings without a case a load that clearly changed is not said to be none.
     """
     small = (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
-    if a.p_value > GATE and (a.P[NONE] > 0.5 or (small and not a.found.problem.by_laws)):
+    moved = a.pair is not None and ratio_check.clear_changes(a.pair)
+    if a.p_value > GATE and (a.P[NONE] > 0.5 or (small and not moved)):
         return _nothing(a, _by_chance(a))
     return None
 
@@ -710,7 +711,8 @@ def _not_comparable(a: VerdictQuery) -> Decision | None:
     if a.pair is None:
         return None
     said, why = a.answer, ""
-    if a.pair.apart and said.effects != ("rpm_scale",):
+    slips = set(said.effects) <= {"rpm_scale", "unit_slip"} and bool(said.effects)
+    if a.pair.apart and not slips:
         why = NOTHING_SHARED
     elif a.pair.far_off and not set(said.effects) & {"rpm_scale", "unit_slip"}:
         why = OTHER_STAND
