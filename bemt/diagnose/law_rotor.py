@@ -25,14 +25,16 @@ __all__ = ["BLADE_LAWS", "Curve", "LawPart", "LawRotor", "law_part"]
 Array = NDArray[np.float64]
 
 # Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
-# rest, a + b CP/CT between two ends [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie within
-# 0.2 of this line (declared).
+# rest, a + b CP/CT between two ends [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie
+# within 0.2 of this line (declared).
 _NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
 _OVER_J, _OVER_SPEED = (3.0, 3.0, 2.0), (0.15, 0.1)
 _STILL = 0.02
 # Scatter of single rows for the fit of a curve, share of the row and of full scale.
 _ROW, _FLOOR = 0.01, 0.003
+# Bends of a recording that are followed: lengths over J and ln n, size over scatter, fewest points.
+_NEAR_J, _NEAR_SPEED, _BENT, _ENOUGH = 0.1, 0.08, 1.5, 8
 # Coefficient of thrust by which a diameter is guessed where none is known: propellers of drones have 0.06 to 0.16.
 _CT = 0.1
 # Least share of profile drag in the torque (declared).
@@ -93,6 +95,8 @@ class Curve:
     J: tuple[float, float]
     speed: tuple[float, float]  # ln rpm, middle of the recording and half its range
     powers: int  # of J
+    # Points (J, ln rpm) of the recording and what they add near them: bends of the stand that no law has
+    near: tuple[Array, Array, Array] | None = None
 
     @classmethod
     def of(cls, coefficient: Array, J: Array, rpm: Array, at_rest: tuple[float, float, float]) -> Curve:
@@ -124,7 +128,18 @@ class Curve:
         found = np.linalg.lstsq(
             np.vstack([W, np.eye(sd.size)]), np.concatenate([(c - A @ mean) / noise, np.zeros(sd.size)]), rcond=None
         )[0]
-        return replace(out, weights=mean + sd * found)
+        return replace(out, weights=mean + sd * found)._bent(c, J, x)
+
+    def _bent(self, c: Array, J: Array, x: Array) -> Curve:
+        """With what neighbours in speed and J share beyond the line, where they scatter by less (kriging)."""
+        left = c - self(J, np.exp(x))
+        order = np.lexsort((x, np.round(J, 2)))
+        scatter, size = float(np.std(np.diff(left[order]))) / math.sqrt(2.0), float(np.std(left))
+        if x.size < _ENOUGH or size < _BENT * max(scatter, _FLOOR * float(np.max(np.abs(c)))):
+            return self
+        K = size**2 * _neighbours(J, x, J, x)
+        weights = np.linalg.solve(K + scatter**2 * np.eye(x.size), left) * size**2
+        return replace(self, near=(J, x, weights))
 
     def _columns(self, J: Array, x: Array) -> Array:
         at = np.clip((x - self.speed[0]) / self.speed[1], -1.0, 1.0) * min(1.0, self.speed[1] / 0.1)
@@ -134,12 +149,20 @@ class Curve:
         """Coefficient at points."""
         inside = np.clip(J, *self.J)
         line = self._columns(inside, np.log(rpm)) @ self.weights
+        if self.near is not None:
+            line = line + _neighbours(J, np.log(rpm), *self.near[:2]) @ self.near[2]
         return np.asarray(line + (J - inside) * self.slope(inside))
 
     def slope(self, J: Array) -> Array:
         """Its slope over J."""
         at = np.clip(J, *self.J)
         return np.asarray(sum((k + 1) * self.weights[1 + k] * at**k for k in range(self.powers)))
+
+
+def _neighbours(J: Array, x: Array, J_of: Array, x_of: Array) -> Array:
+    """How much points share with those of a recording, (P, N) [1]."""
+    apart = [(J[:, None] - J_of) / _NEAR_J, (x[:, None] - x_of) / _NEAR_SPEED]
+    return np.asarray(np.exp(-0.5 * sum(d * d for d in apart)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,6 +48,7 @@ from bemt.diagnose.verdict import (
     holds_off,
     levels_only,
     mass,
+    rough,
     twins,
     unsettled,
 )
@@ -281,13 +282,19 @@ def _unknown_is_likelier_than_all(a: VerdictQuery) -> Decision | None:
 @_rule("a smooth rest is left", "LEFT_OVER, SMALL, ENOUGH")
 def _a_smooth_rest_is_left(a: VerdictQuery) -> Decision | None:
     """Declared; the same rival beside the best effect, as sure as a name has to be; a real rotor leaves one beside a
-    proven slip of a unit, too.
+    proven slip of a unit, too. Without a case a rest is rather the law's: what is behind by no more is not ruled out.
     """
     if (
         a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first))
         and a.rest + a.found.log_bayes(a.first) >= ENOUGH
     ):
-        return _left(a)
+        if not a.found.problem.by_laws or a.P[UNKNOWN] > BESIDE or not all(map(rough, a.first)):
+            return _left(a)
+        least = a.found.log_bayes(a.first) - max(NEAR, a.rest)
+        members = [i for i in a.found.spans if i in a.first or a.found.log_bayes(Explanation.of(i)) > least]
+        if 1 < len(members) <= LARGEST:
+            why = "these are near, and the best of them leaves a smooth residual"
+            return replace(a.says("class", why, members, mass(a.found, members), leading=a.first), sets=())
     return None
 
 
