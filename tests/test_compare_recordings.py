@@ -19,8 +19,8 @@ from bemt.commands.cli import main
 from bemt.compare.change_document import document
 from bemt.compare.contrast_figure import picture
 from bemt.compare.contrast_text import text
-from bemt.compare.recordings import RunChange
 from bemt.compare.drive_laws import LAWS
+from bemt.compare.recordings import RunChange
 from bemt.compare.stand_run import StandRun
 from bemt.dataset import Dataset
 from bemt.diagnose.by_laws import changed

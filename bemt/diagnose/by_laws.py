@@ -187,9 +187,11 @@ def _record(
         "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
         "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,
     }  # fmt: skip
-    measured, u, zero = {}, {}, {}
+    measured: dict[str, Array] = {}
+    u: dict[str, Array] = {}
+    zero: dict[str, float] = {}
     for k, c in channels.items():
-        measured[k] = np.asarray(points[c], float) * unit[c]
+        measured[k] = np.asarray(points[c] * unit[c], dtype=float)
         if k == "torque_Nm":  # its sign is the sense of rotation
             measured[k] *= np.sign(np.nansum(measured[k])) or 1.0
         full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]

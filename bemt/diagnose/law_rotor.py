@@ -25,8 +25,8 @@ __all__ = ["BLADE_LAWS", "Curve", "LawPart", "LawRotor", "law_part"]
 Array = NDArray[np.float64]
 
 # Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
-# rest, a + b CP/CT between two ends [1]. The solver's of eight propellers by label, 8x3.8 to 18x12, and three others lie
-# within 0.2 of this line (declared).
+# rest, a + b CP/CT between two ends [1]. Those of the solver for eight propellers by label, 8x3.8 to 18x12, and three
+# others lie within 0.2 of this line (declared).
 _NO_THRUST, _AT_REST, _ENDS = 0.65, (-2.4, 3.9), (-1.8, -0.05)
 # How far a coefficient may bend over J and over ln n, share of its largest value.
 _OVER_J, _OVER_SPEED = (3.0, 3.0, 2.0), (0.15, 0.1)
@@ -139,7 +139,7 @@ class Curve:
             return self
         K = size**2 * _neighbours(J, x, J, x)
         weights = np.linalg.solve(K + scatter**2 * np.eye(x.size), left) * size**2
-        return replace(self, near=(J, x, weights))
+        return replace(self, near=(J, x, np.asarray(weights, float)))
 
     def _columns(self, J: Array, x: Array) -> Array:
         at = np.clip((x - self.speed[0]) / self.speed[1], -1.0, 1.0) * min(1.0, self.speed[1] / 0.1)

@@ -73,7 +73,7 @@ class CoaxialNeighbour(Effect):
 
     def _speed(self, flow: Flow) -> Array:
         """Induced speed of the neighbour, (P,) [m/s]."""
-        load = self.load
+        load: Array | float = self.load
         if "second_rotor_rad_s" in flow.extra:
             load = load * (np.nan_to_num(flow.extra["second_rotor_rad_s"]) / np.maximum(flow.omega, 1e-9)) ** 2
         disk = load * np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
