@@ -8,13 +8,13 @@ from bemt.effects.base import Effect, Flow, Loads, Parameter
 
 
 @dataclass(frozen=True)
-class AnotherPropeller(Effect):
+class Propeller(Effect):
     """Blades of another make: both loads change by shares of their own.
 
     Notes
     -----
     CT and CP of two propellers of one size have no common law; they differ by a share each, bent a little over speed
-    and advance ratio. The solver has a blade to change and needs no such effect: it is for recordings without a case.
+    and advance ratio (declared). The solver has a blade to change and needs no such effect: it is for recordings without a case.
     """
 
     thrust: float = 0.2
