@@ -426,12 +426,22 @@ def _on_already_and_no_reference(a: VerdictQuery) -> Decision | None:
 
 @_rule("two in the air, and no reference")
 def _two_in_the_air_and_no_reference(a: VerdictQuery) -> Decision | None:
-    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)."""
-    if a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading):
+    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99). The same of
+    two laws without any case.
+    """
+    if (
+        (a.real or a.found.problem.by_laws)
+        and a.leading.pair
+        and all(effects.catalogue()[i].kind == "air" for i in a.leading)
+    ):
         return a.says(
             "insufficient",
-            f"{' and '.join(a.leading)} together fit best; without a reference run the model's own error on this rotor "
-            "looks alike",
+            f"{' and '.join(a.leading)} together fit best; the error of "
+            + (
+                "their laws looks alike"
+                if a.found.problem.by_laws
+                else "the model on this rotor, without a reference run, looks alike"
+            ),
         )
     return None
 

@@ -278,6 +278,8 @@ class VerdictQuery:
         apart = all(any(v in recorded for v in e.along) for e in chosen)
         if self.real:
             return ENOUGH if apart else PROVEN
+        if self.found.problem.by_laws and any(map(rough, self.leading)):  # the error of such a law may look like it
+            return ENOUGH
         # noise with a memory looks like a drift
         creeps = any(e.fault == "drift" for e in chosen)
         return LEAST if not self.alone or (apart and not creeps) else ENOUGH
