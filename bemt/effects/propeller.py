@@ -14,7 +14,8 @@ class Propeller(Effect):
     Notes
     -----
     CT and CP of two propellers of one size have no common law; they differ by a share each, bent a little over speed
-    and advance ratio (declared). The solver has a blade to change and needs no such effect: it is for recordings without a case.
+    and advance ratio (declared). The solver has a blade to change and needs no such effect: it is for recordings
+    without a case.
     """
 
     thrust: float = 0.2
