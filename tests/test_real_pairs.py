@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bemt.case import load_case
-from bemt.compare.scaling_laws import LAWS
+from bemt.compare.drive_laws import LAWS
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
 from bemt.proof import follow, prove, score

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from bemt.compare.drive_laws import FAMILY, Judgement, law
 from bemt.compare.invocation import Invocation
 from bemt.compare.matched import LOADS
 from bemt.compare.recordings import IN_WIND, RunChange
-from bemt.compare.scaling import Judgement
-from bemt.compare.scaling_laws import FAMILY, law
+from bemt.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 DAYS = (
@@ -35,7 +35,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     """Run or reading that would settle the answer, and the command to give then, with all that was asked."""
     said = change.leading
     with_case = asked.command(case=asked.case or "CASE")
-    rows = [row for k in said.effects if (row := law(k)) is not None]
+    checks = {k: check for k in said.effects if (check := _check(k))}
     loads = [r for r in change.ratios.values() if r["kind"] in LOADS]
     if said.verdict == "none":
         text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
@@ -43,7 +43,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     if said.why.startswith(_TOLD):
         return {"text": "", "command": ""}
     if said.verdict in ("named", "sensor"):
-        text = rows[0].settles if rows else "read the label of the channel"
+        text = next(iter(checks.values()), "read the label of the channel")
         return {"text": f"to be sure, {text}", "command": with_case}
     if said.why.endswith(IN_WIND):
         letter = "a" if math.isfinite(change.a.zero_thrust_rpm) else "b"
@@ -64,7 +64,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
         text = f"choose the rows of {letter.upper()} in which nothing else changes{others}"
         return {"text": text, "command": asked.with_rows(letter, column)}
-    likely = {k: p for k, p in said.probability.items() if law(k) is not None}
+    likely = {k: p for k, p in said.probability.items() if k not in ("none", "unknown")}
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
     small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
     if density and small and math.isnan(change.density_ratio):
@@ -72,13 +72,19 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     if not _TORQUES & change.ratios.keys() and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
         return {"text": text, "command": asked.command(a="A_WITH_TORQUE.csv", b="B_WITH_TORQUE.csv")}
-    if rows:
-        firsts = {FAMILY.get(row.id, row.id): row.settles for row in reversed(rows)}
+    if checks:
+        firsts = {FAMILY.get(k, k): check for k, check in reversed(checks.items())}
         text = "; or ".join(reversed(firsts.values()))
         return {"text": text, "command": with_case}
     text = "repeat the run of A and compare it with A; their difference is not a cause"
     again = asked.command(b="A_AGAIN.csv", rows_b=asked.rows_a, air_b=asked.air_a)
     return {"text": text, "command": again}
+
+
+def _check(name: str) -> str:
+    """Measurement that distinguishes a cause from others."""
+    row = law(name)
+    return row.settles if row is not None else catalogue()[name].check if name in catalogue() else ""
 
 
 def _restless(change: RunChange) -> str:
@@ -99,7 +105,7 @@ def document(change: RunChange) -> dict[str, Any]:
         "schema": SCHEMA,
         "verdict": said.verdict,
         "effects": list(said.effects),
-        "probability": sum(said.probability.get(k, 0.0) for k in said.effects) or said.probability.get(said.verdict),
+        "probability": said.mass,
         "rule": said.why,
         "ranking": _ranking(said),
         "subsystems": {
@@ -124,17 +130,7 @@ def _finite(x: float) -> float | None:
 
 
 def _ranking(said: Judgement) -> list[dict[str, Any]]:
-    out = []
-    for name, p in list(said.probability.items())[:12]:
-        parameters = {}
-        if name in said.size and p > 1e-3:
-            value, error = said.size[name]
-            unit = "of full scale" if name.endswith("_zero") or name == "nacelle" else "1"
-            ends = [value + k * 1.645 * error for k in (-1.0, 1.0)]
-            if unit == "1":
-                value, ends = math.exp(value), [math.exp(e) for e in ends]
-            parameters = {
-                "ratio" if unit == "1" else "share": {"value": value, "low": ends[0], "high": ends[1], "unit": unit}
-            }
-        out.append({"effect": name, "probability": p, "parameters": parameters})
-    return out
+    return [
+        {"effect": k, "probability": p, "parameters": {n: dict(v) for n, v in said.parameters.get(k, {}).items()}}
+        for k, p in list(said.probability.items())[:12]
+    ]

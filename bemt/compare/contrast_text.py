@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.recordings import ERROR_IN, IN_WIND, NOT_ALONE, NOTHING_SHARED, OTHER_STAND, REVERSED
-from bemt.compare.scaling_laws import FAMILY, law
+from bemt.compare.drive_laws import FAMILY, law
+from bemt.compare.recordings import ERROR_IN, IN_WIND, NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.effects import catalogue
 
 WORD = {
@@ -26,6 +26,8 @@ WORD = {
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4
+# Families of causes, less one, from which a headline says the change first.
+_MANY = 2
 # Probability from which a cause is said as a guess.
 _GUESS = 0.1
 
@@ -113,8 +115,7 @@ def headline(doc: Mapping[str, Any]) -> str:
         if doc["rule"].endswith((IN_WIND, NOTHING_SHARED)):
             return f"These recordings cannot be compared: {doc['rule']}."
         likely = [r["effect"] for r in doc["ranking"] if r["probability"] >= _GUESS]
-        no_guess = doc["rule"] == OTHER_STAND or doc["rule"].endswith(NOT_ALONE)
-        guess = "" if no_guess else families(likely, doc["ranking"])
+        guess = "" if doc["rule"] == OTHER_STAND else families(likely, doc["ranking"])
         size = f" ({moved})" if moved else ""
         return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
     if doc["rule"] == REVERSED:
@@ -123,6 +124,8 @@ def headline(doc: Mapping[str, Any]) -> str:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
     several = families(effects, doc["ranking"])
+    if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
+        return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
 
 
@@ -197,8 +200,7 @@ def sentence(doc: Mapping[str, Any]) -> str:
     first = [r["effect"] for r in doc["ranking"] if r["effect"] not in ("none", "unknown")][:4]
     if doc["rule"] == OTHER_STAND or doc["rule"].endswith((IN_WIND, NOTHING_SHARED)):
         return f"No cause can be given: {doc['rule']}."
-    lead = "Still possible" if doc["rule"].endswith(NOT_ALONE) else "Likeliest"
-    return f"There is a change, but {doc['rule']}" + (f". {lead}: {', '.join(first)}" if first else "") + "."
+    return f"There is a change, but {doc['rule']}" + (f". Likeliest: {', '.join(first)}" if first else "") + "."
 
 
 def _tables(doc: Mapping[str, Any]) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.compare.selection import NUMBERED, ROTOR, rotors_of
+from bemt.compare.selection import NUMBERED, ROTOR, SECOND_ROTOR, rotors_of
 from bemt.dataset import Dataset
 from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.recordings.channels import in_one_step, named
@@ -86,7 +86,11 @@ def wind_of(imported: Dataset) -> float | None:
     One of several rotors may be in the slipstream of another.
     """
     told = named(imported).values
-    if ROTOR in imported.provenance or {"airspeed_m_s", "J"} & told.keys() or not {"rpm", "thrust_N"} <= told.keys():
+    if (
+        ROTOR in imported.provenance
+        or {"airspeed_m_s", "J", SECOND_ROTOR} & told.keys()
+        or not {"rpm", "thrust_N"} <= told.keys()
+    ):
         return None
     return zero_thrust_speed(told["rpm"], told["thrust_N"])
 

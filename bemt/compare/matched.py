@@ -85,7 +85,7 @@ class MatchedChannel:
         return bool(np.ptp(self.x[:, 1]) > 1e-9)
 
 
-def _like_voltage(a: StandRun, b: StandRun) -> bool:
+def like_voltage(a: StandRun, b: StandRun) -> bool:
     """Whether motor and controller work at like voltages, so that electrical power may stand for torque."""
     v = [np.nanmedian(r.points["voltage_V"]) if "voltage_V" in r.points else math.nan for r in (a, b)]
     return bool(abs(math.log(v[1] / v[0])) < _LIKE) if all(x > 0.0 for x in v) else False
@@ -162,7 +162,7 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     if name in ("speed", "voltage") and (a.command != b.command or not a.command):
         return None
     for channel in choices:
-        if name in LOADS and channel == "electrical_power_W" and not _like_voltage(a, b):
+        if name in LOADS and channel == "electrical_power_W" and not like_voltage(a, b):
             continue
         one, two = _readings(a, name, channel, diameter), _readings(b, name, channel, diameter)
         if one is not None and two is not None:
@@ -197,6 +197,12 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
         np.repeat([a.shift.get(channel, 0.0), b.shift.get(channel, 0.0)], [p["y"].size for p in parts]),
         turned,
     )
+
+
+def log_range(x: Array, margin: float) -> tuple[float, float]:
+    """Range of a coordinate, widened by a margin of its width."""
+    wider = margin * max(float(np.ptp(x)), 1e-12)
+    return float(x.min()) - wider, float(x.max()) + wider
 
 
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:

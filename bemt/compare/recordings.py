@@ -6,8 +6,9 @@ No case and no blade is needed. What is not recorded is assumed to be equal in b
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,8 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.compare import smooth_change as fits
+from bemt.compare.drive_laws import Judgement, judge_drive, weigh
 from bemt.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
-from bemt.compare.scaling import CLEAR, OWN_SHAPE, UNKNOWN, Judgement, judge, weigh
-from bemt.compare.scaling_laws import law
 from bemt.compare.smooth_change import Scatter
 from bemt.compare.stand_run import StandRun
 
@@ -26,23 +26,18 @@ REVERSED = "thrust has the other sign in B, and its size is the same"
 ERROR_IN = "error in "
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
-_TOLD_DENSITY, _BAROMETER, _SURE = 0.012, 0.004, 2.0
+_TOLD_DENSITY, _SURE = 0.012, 2.0
 # A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
 _TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
-_NO_TALK = Judgement("insufficient", (), {}, {}, "not recorded in both")
+NO_VERDICT = Judgement("insufficient", (), {}, {}, "not recorded in both")
+"""Of what was not recorded in both."""
 _MOVED, _WIDE = 2.5, 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
 # Share of misread speeds from which the sensor is doubtful, and from which the others are no good either.
 _DOUBTFUL, _NOISE = 0.05, 0.3
-# Odds (ln) of any smooth change over one factor from which a load did not change by one.
-_BENT = 3.0
 # Difference of the mean advance ratios, share of the largest, from which the drive has another load.
 _OTHER_WIND = 0.1
-# Standard deviations, set-up included, from which a load has changed.
-_CHANGED = 3.0
-NOT_ALONE = "alone, which changed as well"
-"""End of the reason where the likeliest cause is ruled out; what is left was unlikely beside it."""
 NOTHING_SHARED = "the two runs have no common speed and advance ratio"
 """Reason where every ratio would be one of two extrapolations."""
 IN_WIND = "as in wind, and no airspeed is recorded"
@@ -61,11 +56,28 @@ class RunChange:
     channels: Mapping[str, MatchedChannel]  # What both recorded
     # B over A by channel: of :func:`bemt.compare.smooth_change.ratio_of`, and ``density_ratio``
     ratios: Mapping[str, Mapping[str, Any]]
-    # Verdict on what acts on the rotor, and on motor, controller and battery
-    loads: Judgement
-    drive: Judgement
+    rotor: fits.MatchedRuns
+    behind: fits.MatchedRuns  # Motor, controller and battery
+    judge: Callable[[RunChange], Judgement]  # Of the loads
     assumed: tuple[str, ...] = ()  # What neither recording says
     notes: tuple[str, ...] = field(default=())  # What was left out
+
+    @cached_property
+    def loads(self) -> Judgement:
+        """Verdict on what acts on the rotor, worked out when it is asked for."""
+        return self.judge(self) if self.loads_by_name else NO_VERDICT
+
+    @cached_property
+    def drive(self) -> Judgement:
+        """Verdict on motor, controller and battery."""
+        if not self.behind.channels:
+            return NO_VERDICT
+        if _unloaded(self.a, self.b, self.diameter_m):
+            return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
+        if not self.near and self.loads.verdict != "none":
+            return replace(NO_VERDICT, why="the load changed or may have changed, and the drive follows it")
+        motor = judge_drive(weigh(self.behind.channels, (self.behind.free, self.behind.steady)))
+        return _with_voltage(motor, self.ratios)
 
     @property
     def density_ratio(self) -> float:
@@ -90,17 +102,63 @@ class RunChange:
         loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in LOADS]
         return bool(loads) and max(loads) < _SAME_LOAD
 
+    @property
+    def apart(self) -> bool:
+        """Whether every ratio of a load would be one of two extrapolations."""
+        loads = [r for r in self.ratios.values() if r["kind"] in LOADS]
+        wide = (r["extrapolated"] and (r["apart"] or r["high95"] / r["low95"] > _WIDE) for r in loads)
+        return bool(loads) and all(wide)
 
-def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
-    """Compare two recordings."""
+    @property
+    def far_off(self) -> bool:
+        """Whether loads differ by more than one stand can measure."""
+        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in LOADS]
+        return min(loads, default=0.0) >= math.log(_FAR_OFF)
+
+    @property
+    def wind(self) -> str:
+        """Why the runs cannot be compared where one windmills, the other does not, and nobody says in what wind."""
+        runs = (("A", self.a), ("B", self.b))
+        zero = {letter: run.zero_thrust_rpm for letter, run in runs if math.isfinite(run.zero_thrust_rpm)}
+        if len(zero) != 1:
+            return ""
+        ((letter, rpm),) = zero.items()
+        return f"thrust of {letter} is negative below {rpm:.0f} rev/min, {IN_WIND}"
+
+    @property
+    def by_density(self) -> str:
+        """Why the densities, where both recordings tell them and they differ, are a cause of their own."""
+        size = max((abs(c.log_density) for c in self.loads_by_name.values()), default=0.0)
+        unsure = density_change(self.a, self.b)[1]
+        if size < max(_TOLD_DENSITY, _SURE * unsure):
+            return ""
+        if unsure:
+            warm = f"{self.a.temperature_K - ZERO_CELSIUS:.1f} to {self.b.temperature_K - ZERO_CELSIUS:.1f} C"
+            return f"by the thermometers, {warm}, and one pressure; the coefficients agree"
+        return f"density as recorded, {self.a.density:.4g} to {self.b.density:.4g} kg/m3; the coefficients agree"
+
+    @property
+    def by_proxy(self) -> bool:
+        """Whether electrical power stands for torque, with the losses of the motor in it."""
+        return any(c.channel == "electrical_power_W" for c in self.loads_by_name.values())
+
+    @property
+    def turned(self) -> bool:
+        """Whether thrust has the other sign in B."""
+        return any(c.turned for c in self.channels.values() if c.name == "thrust")
+
+
+def changed(
+    a: StandRun, b: StandRun, diameter_m: float, judge: Callable[[RunChange], Judgement]
+) -> RunChange:  # fmt: skip
+    """Compare two recordings; ``judge`` says what acts on the rotor."""
     told = [d for d in (diameter_m, a.diameter_m, b.diameter_m) if math.isfinite(d)]
     diameter = told[0] if told else math.nan
     rotor = fits.prepared(a, b, tuple(LOADS), diameter)
-    loads = rotor.channels
-    spoken = {c.channel for c in loads.values()}
-    behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not spoken & set(names)], diameter)
-    drive = behind.channels
-    if not loads and not drive:
+    used = {c.channel for c in rotor.channels.values()}
+    behind = fits.prepared(a, b, [k for k, names in DRIVE.items() if not used & set(names)], diameter)
+    channels = {**rotor.channels, **behind.channels}
+    if not channels:
         silent = [r for r in (a, b) if not {"rpm", "J"} & r.points.values.keys()]
         if silent:
             hint = "Head the column rpm; nothing can be compared but at equal speed"
@@ -116,43 +174,11 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
                 "Name units in the headings, or use a recording.toml",
             )
         )
-    told_density, unsure = density_change(a, b)
-    known = math.hypot(_BAROMETER, unsure) if told_density or math.isfinite(a.density + b.density) else None
     scatter = {**rotor.likelier, **behind.likelier}
-    ratios = {c.channel: _ratio(c, scatter[n]) for n, c in {**loads, **drive}.items()}
-    verdict = _NO_TALK
-    if loads:
-        weighed = weigh(loads, (rotor.free, rotor.steady), ("air", "stand"), known, _speeds(ratios))
-        largest = max(abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in LOADS)
-        if largest >= CLEAR and max(rotor.bent[n] for n in loads) < _BENT:
-            weighed = (_by_factors(weighed[0]), weighed[1])
-        verdict = judge(*weighed, largest)
-        verdict = _far_off(_far_apart(_with_density(_by_proxy(verdict, loads), a, b, loads), ratios), ratios)
-        verdict = _all_loads(verdict, loads, ratios)
-        verdict = _wind(verdict, a, b)
-        if verdict.verdict == "none" and any(c.turned for c in loads.values() if c.name == "thrust"):
-            verdict = Judgement("sensor", ("unit_slip",), {"unit_slip": 1.0}, {}, REVERSED)
-    found = RunChange(
-        a,
-        b,
-        diameter,
-        {**loads, **drive},
-        ratios,
-        verdict,
-        _NO_TALK,
-        tuple(_assumed(a, b, diameter, loads)),
-        tuple(_notes(a, b, {**loads, **drive}, {**rotor.strays, **behind.strays})),
-    )
-    if drive and _unloaded(a, b, diameter):
-        found = replace(found, drive=replace(_NO_TALK, why="the advance ratios differ, and the drive follows the load"))
-    elif drive and (verdict.verdict == "none" or found.near):
-        motor = judge(*weigh(drive, (behind.free, behind.steady), ("drive",)))
-        found = replace(found, drive=_with_voltage(motor, ratios))
-    elif drive:
-        found = replace(
-            found, drive=replace(_NO_TALK, why="the load changed or may have changed, and the drive follows it")
-        )
-    return found
+    ratios = {c.channel: _ratio(c, scatter[n]) for n, c in channels.items()}
+    assumed = tuple(_assumed(a, b, diameter, rotor.channels))
+    notes = tuple(_notes(a, b, channels, {**rotor.strays, **behind.strays}))
+    return RunChange(a, b, diameter, channels, ratios, rotor, behind, judge, assumed, notes)
 
 
 def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
@@ -179,85 +205,8 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
     why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
     probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
     left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
-    return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": (volts, 0.0)}, why)
-
-
-def _by_proxy(said: Judgement, loads: Mapping[str, MatchedChannel]) -> Judgement:
-    """No claim of something unlisted where electrical power stands for torque: the motor's losses are in it."""
-    if said.verdict != "unknown" or "torque" not in loads or loads["torque"].channel != "electrical_power_W":
-        return said
-    return replace(
-        said, verdict="insufficient", why="electrical power replaces torque and includes the losses of the motor"
-    )
-
-
-def _far_apart(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """No answer where the runs share no advance ratio or no speed, unless a ratio of pole pairs explains just that."""
-    loads = [r for r in ratios.values() if r["kind"] in LOADS]
-    wide = all(r["extrapolated"] and (r["apart"] or r["high95"] / r["low95"] > _WIDE) for r in loads)
-    if not loads or not wide or said.effects == ("rpm_scale",):
-        return said
-    return Judgement("insufficient", (), said.probability, said.size, NOTHING_SHARED)
-
-
-def _wind(said: Judgement, a: StandRun, b: StandRun) -> Judgement:
-    """No answer where one of the runs windmills, the other does not, and nobody says in what wind."""
-    zero = {letter: run.zero_thrust_rpm for letter, run in (("A", a), ("B", b)) if math.isfinite(run.zero_thrust_rpm)}
-    if len(zero) != 1 or said.verdict == "none":
-        return said
-    ((letter, rpm),) = zero.items()
-    why = f"thrust of {letter} is negative below {rpm:.0f} rev/min, {IN_WIND}"
-    return Judgement("insufficient", (), said.probability, said.size, why)
-
-
-def _far_off(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """No answer where loads differ by more than one stand can measure."""
-    loads = [abs(math.log(r["ratio"])) for r in ratios.values() if r["kind"] in LOADS]
-    if min(loads) < math.log(_FAR_OFF) or said.effects in (("rpm_scale",), ("unit_slip",)):
-        return said
-    return Judgement("insufficient", (), said.probability, said.size, OTHER_STAND)
-
-
-def _by_factors(probability: Mapping[str, float]) -> dict[str, float]:
-    """Probabilities where every load changed by one large factor: that is another propeller, and nothing unlisted."""
-    if OWN_SHAPE not in probability:
-        return dict(probability)
-    moved = {OWN_SHAPE: probability[OWN_SHAPE] + probability[UNKNOWN], UNKNOWN: 0.0}
-    return dict(sorted({**probability, **moved}.items(), key=lambda kv: -kv[1]))
-
-
-def _all_loads(
-    said: Judgement, loads: Mapping[str, MatchedChannel], ratios: Mapping[str, Mapping[str, Any]]
-) -> Judgement:
-    """No cause that leaves a load alone which has clearly changed; probabilities are those of the others then."""
-    moved = _moved(said.effects)
-    if not moved:
-        return said
-    changed_too = []
-    for name, c in loads.items():
-        r = ratios[c.channel]
-        unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
-        if abs(math.log(r["ratio"])) > _CHANGED * unsure:
-            changed_too.append(name)
-    missed = next((name for name in changed_too if name not in moved), None)
-    if missed is None:
-        return said
-    why = f"{' and '.join(said.effects)} would leave the {missed} {NOT_ALONE}"
-    left = {k: p for k, p in said.probability.items() if not (of := _moved((k,))) or of.issuperset(changed_too)}
-    total = sum(left.values())
-    return Judgement("insufficient", (), {k: p / total for k, p in left.items()} if total else left, said.size, why)
-
-
-def _moved(effects: Sequence[str]) -> set[str]:
-    """Loads that effects move by their laws; empty where there is no law of one of them."""
-    rows = [law(k) for k in effects]
-    return set() if None in rows else {name for row in rows if row for _, term in row.terms for name in term}
-
-
-def _speeds(ratios: Mapping[str, Mapping[str, Any]]) -> tuple[float, float] | None:
-    """Logarithm of the speed of B over A at equal command, and its 95 % error."""
-    found = next((r for r in ratios.values() if r["kind"] == "speed"), None)
-    return None if found is None else (math.log(found["ratio"]), math.log(found["high95"] / found["ratio"]))
+    size = {"value": math.exp(volts), "low": math.exp(volts), "high": math.exp(volts), "unit": "1"}
+    return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": {"ratio": size}}, why)
 
 
 def _told(run: StandRun) -> str:
@@ -278,26 +227,6 @@ def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     along = abs(float(out.get("advance_slope", 0.0))) / max(float(out.get("advance_slope_error", math.inf)), 1e-9)
     out["depends_on"] = [n for n, z in (("speed", moved), ("advance", along)) if z > _MOVED]
     return out
-
-
-def _with_density(said: Judgement, a: StandRun, b: StandRun, loads: Mapping[str, MatchedChannel]) -> Judgement:
-    """The recorded densities as the cause, where nothing else is left."""
-    size = max((abs(c.log_density) for c in loads.values()), default=0.0)
-    log_ratio, unsure = density_change(a, b)
-    if said.verdict != "none" or size < max(_TOLD_DENSITY, _SURE * unsure):
-        return said
-    why = f"density as recorded, {a.density:.4g} to {b.density:.4g} kg/m3; the coefficients agree"
-    if unsure:
-        why = (
-            f"by the thermometers, {a.temperature_K - ZERO_CELSIUS:.1f} to {b.temperature_K - ZERO_CELSIUS:.1f} C, and "
-            "one pressure; the coefficients agree"
-        )
-    probability = {
-        "air_density": said.probability["none"],
-        **{k: p for k, p in said.probability.items() if k not in ("none", "air_density")},
-    }
-    sizes = {"air_density": (log_ratio, unsure)}
-    return Judgement("named", ("air_density",), probability, sizes, why)
 
 
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:

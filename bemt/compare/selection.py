@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.air import Air
 from bemt.base.errors import Fault, InputError
-from bemt.base.units import KNOT, MPH, ZERO_CELSIUS, split_suffix
+from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.dataset import Dataset
 from bemt.recordings.channels import MEASURED, named
 
@@ -22,6 +22,8 @@ _AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mp
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")
 _RANGE = re.compile(r"([-+.\deE]+):([-+.\deE]+)")
 ROTOR = "rotor"
+SECOND_ROTOR = "second_rotor_rad_s"
+"""Channel of the speed of the other one of two rotors."""
 # Two numbers of a table that differ by less are the same number.
 _SAME_NUMBER = 1e-6
 # Temperatures that air of a stand can have [K].
@@ -92,8 +94,12 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
             kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
         elif not others & set(own):
             kept.setdefault(name, name)
+    turning = [name for name in imported.values if others & set(_words(name)) and imported.unit(name) == "rpm"]
+    turning = turning or [name for name in imported.values if others & set(name.split("_")) and name.endswith("_rpm")]
     values = {new: imported[old] for new, old in kept.items()}
     units = {new: imported.unit(old) for new, old in kept.items()}
+    if len(turning) == 1:  # its slipstream is recorded with it
+        values[SECOND_ROTOR], units[SECOND_ROTOR] = imported[turning[0]] * RPM, "rad_s"
     return replace(imported, values=values, u={}, u_by={}, units=units, provenance={**imported.provenance, ROTOR: word})
 
 

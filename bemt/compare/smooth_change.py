@@ -212,7 +212,6 @@ class MatchedRuns:
     steady: Mapping[str, Scatter]
     likelier: Mapping[str, Scatter]  # The better of the two
     strays: Mapping[str, int]  # Readings that were left out
-    bent: Mapping[str, float]  # Logarithm of the likelihood of any smooth change over that of one factor
 
 
 def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) -> MatchedRuns:
@@ -222,7 +221,6 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
     steady: dict[str, Scatter] = {}
     likelier: dict[str, Scatter] = {}
     strays: dict[str, int] = {}
-    bent: dict[str, float] = {}
     for name in names:
         found = matched(a, b, name, diameter)
         if found is not None:
@@ -230,7 +228,6 @@ def prepared(a: StandRun, b: StandRun, names: Sequence[str], diameter: float) ->
             free[name], loose = scatter_of(channels[name])
             steady[name], stiff = scatter_of(channels[name], steady_change(channels[name]))
             likelier[name] = free[name] if loose > stiff else steady[name]
-            bent[name] = loose - stiff
             if n:
                 strays[name] = n
-    return MatchedRuns(channels, free, steady, likelier, strays, bent)
+    return MatchedRuns(channels, free, steady, likelier, strays)

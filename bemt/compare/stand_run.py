@@ -29,6 +29,12 @@ _WANTED = (
     "throttle",
     "run",
     "temperature_K",
+    "time_s",
+    "tip_gap_m",
+    "wall_distance_m",
+    "sideslip_rad",
+    "sideslip_deg",
+    "second_rotor_rad_s",
 )
 # A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.compare.scaling_laws import law
 from bemt.diagnose import prior, verdict
 from bemt.diagnose.explanation import UNKNOWN, Explanation
 from bemt.diagnose.record import CHANNELS
@@ -205,8 +204,5 @@ class Diagnosis:
 
 
 def _kind(name: str) -> str:
-    """Sub-system of an effect; of a cause that only the comparison knows, that of its scaling law."""
-    if name in effects.catalogue():
-        return effects.catalogue()[name].kind
-    row = law(name)
-    return "air" if row is None else row.kind
+    """Sub-system of an effect, or of a cause in the drive that is none."""
+    return effects.catalogue()[name].kind if name in effects.catalogue() else "drive"

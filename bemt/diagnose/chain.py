@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bemt import effects
 from bemt.diagnose import (
     blocks,
+    by_laws,
     confusion,
     evidence,
     gate,
@@ -71,7 +72,7 @@ def diagnose(
         def ratios(absent: Collection[str]) -> RunChange | None:
             if not (compared and free):
                 return None
-            return change or ratio_check.change_of(records, each[0].diameter_m, absent, files)
+            return change or ratio_check.change_of(records, each[0].diameter_m, absent, by_laws.judged, files)
 
         return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, nulls, baseline,
                          given or suggestion.Given(), motor, ratios)  # fmt: skip

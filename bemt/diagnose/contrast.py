@@ -16,9 +16,10 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.compare.change_document import document, next_step
 from bemt.compare.invocation import Invocation
-from bemt.compare.recordings import ERROR_IN, IN_WIND, RunChange, changed
+from bemt.compare.recordings import ERROR_IN, RunChange
 from bemt.compare.selection import conditions_of, selected, with_air
 from bemt.compare.stand_run import stand_run
+from bemt.diagnose.by_laws import changed
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -149,7 +150,7 @@ def compare(
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
     doc["notes"] = [*_errors(findings), *doc["notes"]]
-    if case is not None and not found.loads.why.endswith(IN_WIND):
+    if case is not None and not found.wind:
         doc |= _diagnosed(asked, read, case, found, progress)
     step = _after(doc) if "diagnosis" in doc else next_step(found, asked)
     doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step

@@ -13,7 +13,7 @@ from bemt.base.tables import text_table
 from bemt.compare.change_document import document as change_document
 from bemt.compare.contrast_text import families
 from bemt.compare.contrast_text import headline as change_headline
-from bemt.compare.scaling_laws import law
+from bemt.compare.drive_laws import law
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import wrong_rotor_check
 from bemt.diagnose.confusion import nearest

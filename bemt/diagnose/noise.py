@@ -69,7 +69,8 @@ _BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.002, 4
 # nothing to it.
 _FLOW = {"rpm": 0.5, "J": 0.5, "density_kg_m3": 0.2}
 # What some laws depend on besides, as they say themselves.
-_BESIDES = {"tip_gap_m": 0.5, "wall_distance_m": 0.5, "sideslip_rad": 0.3, "time_s": 1.0}
+_BESIDES = {"tip_gap_m": 0.5, "wall_distance_m": 0.5, "sideslip_rad": 0.3, "time_s": 1.0,
+            "second_rotor_rad_s": 100.0}  # fmt: skip
 _LOGARITHMIC = ("rpm", "density_kg_m3", "tip_gap_m", "wall_distance_m")
 
 

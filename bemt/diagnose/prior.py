@@ -24,6 +24,8 @@ parameters, beside 1 for all others [1]."""
 BOTH = 0.01
 """The same of what blade and air do in every run, where the baseline has it and a reference is given: two runs do not
 differ in it [1]."""
+# Recorded conditions that differ by less are the same, share.
+_SAME = 0.1
 EVIDENT = 0.2
 """The same of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
 
@@ -32,11 +34,26 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
     on = present(problem)
-    rest = {i: EVIDENT if effects.catalogue()[i].evident else 1.0 for i in ids}
+    # between two recordings the change is often one that was made and is known
+    rest = {i: EVIDENT if effects.catalogue()[i].evident and not problem.by_laws else 1.0 for i in ids}
+    usual |= {i for i in ids if recorded_change(problem, i)}
     there = dict.fromkeys(on, PRESENT)
     if any(p.record.reference for p in problem.parts):
         there |= {e.id: BOTH for e in effects.standard() if e.id in on and not e.along}
     return {i: there[i] if i in on else LEFT_OUT if i in usual else rest[i] for i in ids}
+
+
+def recorded_change(problem: Problem, name: str) -> bool:
+    """Whether two recordings without a case tell themselves that what an effect follows differs between them."""
+    if not problem.by_laws:
+        return False
+    test, known = ([p.record.extra for p in problem.parts if p.record.reference is which] for which in (False, True))
+    for v in (v for v in effects.catalogue()[name].along if v != "time_s"):
+        now = [float(np.median(x[v])) for x in test if v in x]
+        before = [float(np.median(x[v])) for x in known if v in x]
+        if now and (not before or abs(now[0] - before[0]) > _SAME * max(abs(now[0]), abs(before[0]))):
+            return True
+    return False
 
 
 def present(problem: Problem) -> set[str]:

@@ -136,6 +136,11 @@ class Part:
         return (*(e for e in self.baseline if e.id != blade.id), blade)
 
     @property
+    def by_laws(self) -> bool:
+        """Whether its rotor is known by its reference alone (:mod:`bemt.diagnose.law_rotor`)."""
+        return False
+
+    @property
     def channels(self) -> tuple[str, ...]:
         """Channels that were measured, in the order of :data:`CHANNELS`."""
         return tuple(c for c in CHANNELS if c in self.record.measured)
@@ -195,6 +200,8 @@ class Problem:
         What is believed of the rotor's blade, and the point of its tangents.
     offset : (M,) float
         Change of the readings from the centre of the blade's prior to that point [units of the readings].
+    variants : tuple of tuple of Part
+        The parts under other laws, each off by about its uncertainty in one number.
     predicted : dict
         Readings that were solved already, by the effects added.
     """
@@ -219,7 +226,13 @@ class Problem:
     scatter: dict[str, float] = field(default_factory=dict)
     blade: CalibratedBlade = PLAIN
     offset: Array = field(default_factory=lambda: np.zeros(0))
+    variants: tuple[tuple[Part, ...], ...] = ()
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
+
+    @property
+    def by_laws(self) -> bool:
+        """Whether there is no case, and signatures are those of scaling laws."""
+        return any(p.by_laws for p in self.parts)
 
     @property
     def findings(self) -> tuple[str, ...]:
@@ -294,6 +307,16 @@ class Problem:
             ]
             self.predicted[key] = np.concatenate(full)[self.kept]
         return self.predicted[key]
+
+    def directions(self, effect: Effect) -> Array:
+        """What the signature of an effect is off by in each of the other laws, (M, D) [units of the readings]."""
+        if not self.variants or effect.kind == "stand" or effect.exact:
+            return np.zeros((self.y.size, 0))
+        mine, out = self.signature((effect,)), []
+        for parts in self.variants:
+            other = replace(self, parts=parts, predicted={}, variants=())
+            out.append(other.predict((effect,)) - other.predict(()) - mine)
+        return np.stack(out, axis=1)
 
     def signature(self, extra: Sequence[Effect]) -> Array:
         """Change of the readings when effects are added: solve(with) - solve(without), (M,)."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,7 @@ from bemt.diagnose.suggest import Suggestion
 from bemt.recordings.load import import_file
 
 if TYPE_CHECKING:
+    from bemt.compare.drive_laws import Judgement
     from bemt.diagnose.record import Record
 
 __all__ = ["change_of", "clear_changes", "next_of"]
@@ -38,11 +39,12 @@ _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
 def change_of(
-    records: Sequence[Record], diameter_m: float, absent: Collection[str], files: Sequence[str] | None = None
+    records: Sequence[Record], diameter_m: float, absent: Collection[str], judge: Callable[[RunChange], Judgement],
+    files: Sequence[str] | None = None,
 ) -> RunChange | None:
     """Change of the one recording from its references; None where ratios are no measure of it.
 
-    ``absent``: effects that cannot show; ``files``: reference and test as a command names them.
+    ``absent``: effects that cannot show; ``judge`` of the loads; ``files``: reference and test as a command names them.
     """
     known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
     if len(tested) != 1 or not known or _transient(absent):
@@ -53,7 +55,7 @@ def change_of(
     try:
         whole = _paths(files) if len(known) == 1 else []
         runs = [_run(r, diameter_m, f) for r, f in zip(pair, whole or (None, None), strict=True)]
-        return changed(runs[0], runs[1], diameter_m)
+        return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from bemt.recordings.findings import Finding
 
-__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners"]
+__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners", "thinned"]
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 
 COVARIATES = (
     "time_s", "temperature_K", "pressure_Pa", "voltage_V", "current_A", "pwm_s", "tip_gap_m", "wall_distance_m",
-    "sideslip_rad", "run",
+    "sideslip_rad", "second_rotor_rad_s", "run",
 )  # fmt: skip
 """Channels of a series, besides the conditions, that an effect may know."""
 
@@ -197,7 +197,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         {k: float(v["gain"]) for k, v in correlated.items() if v.get("gain")},
         {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
     ).take(np.flatnonzero(keep))  # fmt: skip
-    return _thinned(record)
+    return thinned(record)
 
 
 def _without_flicker(series: Dataset, notes: list[str]) -> Dataset:
@@ -305,25 +305,25 @@ def _plausible(values: Mapping[str, Array], file: str) -> None:
         raise InputError(faults)
 
 
-def _thinned(record: Record) -> Record:
+def thinned(record: Record, most: int = MAX_POINTS) -> Record:
     """Average alike points when there are too many, never over the ends of a run.
 
     Samples close in time stay with their neighbours; anything else with points of the same speed and wind, so that the
     order of the rows does not matter.  Loads are averaged as coefficients: they go with the square of the speed.
     """
     P = len(record)
-    if P <= MAX_POINTS:
+    if P <= most:
         return record
-    size = -(-P // MAX_POINTS)
+    size = -(-P // most)
     run = record.extra.get("run", np.zeros(P))
     if dense(record):
         block = _blocks(np.arange(P), record.rpm, run, size, np.inf)
     else:
         order = _alike(record, run)
         loose = [(same * _SAME_SPEED, size) for same in (1, 3, 10)] + [(np.inf, size * k) for k in (1, 2, 4)]
-        for same, most in loose:
-            block = _blocks(order, record.rpm, run, most, same)
-            if block.max() < 1.5 * MAX_POINTS:
+        for same, largest in loose:
+            block = _blocks(order, record.rpm, run, largest, same)
+            if block.max() < 1.5 * most:
                 break
     # in the order of the rows: noise may be correlated along it
     _, block = np.unique(block, return_inverse=True)
@@ -390,7 +390,8 @@ def dense(record: Record) -> bool:
 def _alike(record: Record, run: Array) -> NDArray[np.intp]:
     """Order of the points that brings like conditions together, whatever the order of the rows."""
     bins = np.round(np.log(record.rpm) / _SAME_SPEED)
-    return np.lexsort((record.rpm, record.V / record.rpm, np.asarray(record.air.rho, dtype=float), bins, run))
+    beside = record.extra.get("second_rotor_rad_s", np.zeros(len(record)))
+    return np.lexsort((record.rpm, beside, record.V / record.rpm, np.asarray(record.air.rho, dtype=float), bins, run))
 
 
 def merged(records: Sequence[Record]) -> Record:
@@ -404,7 +405,7 @@ def merged(records: Sequence[Record]) -> Record:
 
     names = list(dict.fromkeys(n for r in records for n in r.measured))
     notes = tuple(dict.fromkeys(note for r in records for note in r.notes))
-    return _thinned(Record(
+    return thinned(Record(
         ", ".join(r.name for r in records), join([r.rpm for r in records]), join([r.V for r in records]),
         air_of({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
         {n: channel("measured", n) for n in names}, {n: channel("u", n) for n in names}, concatenated(records),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
-from bemt.compare.scaling_laws import LAWS
+from bemt.compare.recordings import NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.diagnose import blocks, ratio_check, wrong_rotor_check
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
@@ -48,6 +48,7 @@ from bemt.diagnose.verdict import (
     holds_off,
     levels_only,
     mass,
+    rough,
     twins,
     unsettled,
 )
@@ -217,10 +218,13 @@ def _exact_relation(a: VerdictQuery) -> Decision | None:
 
 @_rule("nulls look like it", "GATE, LEVEL")
 def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
-    """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it."""
-    if a.p_value > GATE and (
-        a.P[NONE] > 0.5 or (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
-    ):
+    """DIAGNOSIS 2.3: p-value of the whole chain, 1 in 100; a reference has the level in it.
+
+    Of two recordings without a case a load that clearly changed is not said to be none.
+    """
+    small = (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
+    moved = a.pair is not None and ratio_check.clear_changes(a.pair)
+    if a.p_value > GATE and (a.P[NONE] > 0.5 or (small and not moved)):
         return _nothing(a, _by_chance(a))
     return None
 
@@ -278,13 +282,19 @@ def _unknown_is_likelier_than_all(a: VerdictQuery) -> Decision | None:
 @_rule("a smooth rest is left", "LEFT_OVER, SMALL, ENOUGH")
 def _a_smooth_rest_is_left(a: VerdictQuery) -> Decision | None:
     """Declared; the same rival beside the best effect, as sure as a name has to be; a real rotor leaves one beside a
-    proven slip of a unit, too.
+    proven slip of a unit, too. Without a case a rest is rather the law's: what is behind by no more is not ruled out.
     """
     if (
         a.rest > max(LEFT_OVER, (1.0 if a.factor else SMALL) * a.found.log_bayes(a.first))
         and a.rest + a.found.log_bayes(a.first) >= ENOUGH
     ):
-        return _left(a)
+        if not a.found.problem.by_laws or a.P[UNKNOWN] > BESIDE or not all(map(rough, a.first)):
+            return _left(a)
+        least = a.found.log_bayes(a.first) - max(NEAR, a.rest)
+        members = [i for i in a.found.spans if i in a.first or a.found.log_bayes(Explanation.of(i)) > least]
+        if 1 < len(members) <= LARGEST:
+            why = "these are near, and the best of them leaves a smooth residual"
+            return replace(a.says("class", why, members, mass(a.found, members), leading=a.first), sets=())
     return None
 
 
@@ -390,7 +400,12 @@ def _another_blade_or_anything_that_scales_all_loads(a: VerdictQuery) -> Decisio
 
 @_rule("at the end of its range", "END")
 def _at_the_end_of_its_range(a: VerdictQuery) -> Decision | None:
-    """Declared: where one number cannot go further, another makes up for something else."""
+    """Declared: where one number cannot go further, another makes up for something else.
+
+    Among several that look alike under rough laws the number is as rough as they are.
+    """
+    if a.found.problem.by_laws and len(a.group) > 1:
+        return None
     if any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()):
         return a.says(
             "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
@@ -411,12 +426,22 @@ def _on_already_and_no_reference(a: VerdictQuery) -> Decision | None:
 
 @_rule("two in the air, and no reference")
 def _two_in_the_air_and_no_reference(a: VerdictQuery) -> Decision | None:
-    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99)."""
-    if a.real and a.leading.pair and all(effects.catalogue()[i].kind == "air" for i in a.leading):
+    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99). The same of
+    two laws without any case.
+    """
+    if (
+        (a.real or a.found.problem.by_laws)
+        and a.leading.pair
+        and all(effects.catalogue()[i].kind == "air" for i in a.leading)
+    ):
         return a.says(
             "insufficient",
-            f"{' and '.join(a.leading)} together fit best; without a reference run the model's own error on this rotor "
-            "looks alike",
+            f"{' and '.join(a.leading)} together fit best; the error of "
+            + (
+                "their laws looks alike"
+                if a.found.problem.by_laws
+                else "the model on this rotor, without a reference run, looks alike"
+            ),
         )
     return None
 
@@ -538,6 +563,8 @@ def _many_are_left(a: VerdictQuery) -> Decision | None:
 def _wrong_rotor_check(a: VerdictQuery) -> Decision | None:
     """Declared: loads off by a factor of three are those of another rotor, unit or speed before any physics."""
     said, problem = a.answer, a.found.problem
+    if problem.by_laws:
+        return None
     sure = said.effects[:1] if said.rule == BESIDE_IT else said.effects
     slip = (
         set(sure) & set(wrong_rotor_check.SLIPS)
@@ -641,7 +668,7 @@ def _ratios_fill(a: VerdictQuery) -> Decision | None:
     likely = {i: sum(p for k, p in a.P.items() if i in k.ids) for i in a.found.spans}
     # a single name is not for the ratios to give: they know no blade, and what the diagnosis holds likely may be it
     several = ratios.verdict == "class"
-    weighed = {*ratios.probability, *(row.id for row in LAWS)} if several else set(ratios.effects)
+    weighed = set(ratios.probability) if several else set(ratios.effects)
     least = LIKELY if several else RARE
     lone = [i for i, p in sorted(likely.items(), key=lambda kv: -kv[1]) if p >= least and i not in weighed]
     chance = sum(ratios.probability.get(k, 0.0) for k in ratios.effects)
@@ -662,3 +689,50 @@ def _drive_by_ratios(a: VerdictQuery) -> Decision | None:
     drive = change.drive
     chance = sum(drive.probability.get(k, 0.0) for k in drive.effects)
     return replace(said, verdict=drive.verdict, effects=drive.effects, probability=chance, why=drive.why, by="ratios")
+
+
+@_rule("two recordings without a case: the densities that both tell", revises=True)
+def _density_told(a: VerdictQuery) -> Decision | None:
+    """By definition: where the coefficients agree and the recorded densities do not, the density is what changed."""
+    if a.pair is None or a.answer.verdict != "none" or not (why := a.pair.by_density):
+        return None
+    what = Explanation.of("air_density")
+    return replace(
+        a.answer, verdict="named", effects=("air_density",), leading=what, probability=a.P[NONE], why=why, by="ratios"
+    )
+
+
+@_rule("two recordings without a case: thrust of the other sign", revises=True)
+def _thrust_turned(a: VerdictQuery) -> Decision | None:
+    """By definition: nothing but the cell or the sense of rotation turns thrust round."""
+    if a.pair is None or not a.pair.turned or a.answer.effects != ("unit_slip",):
+        return None
+    return replace(a.answer, why=REVERSED)
+
+
+@_rule("two recordings without a case: electrical power for torque", revises=True)
+def _by_proxy(a: VerdictQuery) -> Decision | None:
+    """Declared: nothing unlisted, and no single name, where the losses of a motor are in the readings."""
+    if a.pair is None or a.answer.verdict not in ("unknown", "named", "sensor") or not a.pair.by_proxy:
+        return None
+    why = "electrical power replaces torque and includes the losses of the motor"
+    return replace(a.answer, verdict="insufficient", effects=(), classes=(), sets=(), why=why)
+
+
+@_rule("two recordings without a case: nothing shared, or no one stand", revises=True)
+def _not_comparable(a: VerdictQuery) -> Decision | None:
+    """Declared: two extrapolations, an unstated wind or loads of two stands are no change of one rotor.
+
+    A ratio of pole pairs moves the speeds apart itself, a unit the loads.
+    """
+    if a.pair is None:
+        return None
+    said, why = a.answer, ""
+    slips = set(said.effects) <= {"rpm_scale", "unit_slip"} and bool(said.effects)
+    if a.pair.apart and not slips:
+        why = NOTHING_SHARED
+    elif a.pair.far_off and not set(said.effects) & {"rpm_scale", "unit_slip"}:
+        why = OTHER_STAND
+    if said.verdict != "none" and a.pair.wind:
+        why = a.pair.wind
+    return replace(said, verdict="insufficient", effects=(), classes=(), sets=(), why=why) if why else None

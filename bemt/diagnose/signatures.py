@@ -47,6 +47,8 @@ class Candidate:
         Prior probability of each setting, adds up to 1 [1].
     solved : (G,) bool
         Whether the setting was solved rather than interpolated.
+    directions : callable or None
+        Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings].
     """
 
     id: str
@@ -54,6 +56,7 @@ class Candidate:
     signatures: Array
     weight: Array
     solved: NDArray[np.bool_]
+    directions: Callable[[Effect], Array] | None = None
     _between: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @property
@@ -61,10 +64,29 @@ class Candidate:
         """Kind of the effect: air, stand or drive."""
         return effects.catalogue()[self.id].kind
 
+    def only(self, keep: NDArray[np.bool_]) -> Candidate | None:
+        """Candidate with some of its settings; None without any."""
+        if keep.all():
+            return self
+        if not keep.any():
+            return None
+        settings = tuple(s for s, k in zip(self.settings, keep, strict=True) if k)
+        weight = self.weight[keep] / self.weight[keep].sum()
+        return Candidate(
+            self.id, settings, self.signatures[:, keep], weight, self.solved[keep], self.directions
+        )  # fmt: skip
+
     def between(self, g: int) -> Array:
-        """Change of the signature within half the way to the neighbouring settings, one column per parameter."""
+        """Change of the signature within half the way to the neighbouring settings, one column per parameter.
+
+        Columns of other laws beside.
+        """
         if g not in self._between:
-            self._between[g] = self._steps(g)
+            steps = self._steps(g)
+            if self.directions is not None:
+                other = self.directions(effect_of(self.id, self.settings[g]))
+                steps = np.concatenate([steps, other[:, np.any(other != 0.0, axis=0)]], axis=1)
+            self._between[g] = steps
         return self._between[g]
 
     def _steps(self, g: int) -> Array:
@@ -123,7 +145,7 @@ def candidates(
     found: list[Candidate] = []
     absent: dict[str, str] = {}
     for name, cls in effects.catalogue().items():
-        if not cls.diagnosed or (only is not None and name not in only):
+        if not cls.diagnosed if only is None else name not in only:
             continue
         if progress:
             progress(name)
@@ -166,7 +188,7 @@ def _candidate(problem: Problem, name: str, cls: type[Effect]) -> Candidate | No
     weight = np.array([c[3] for c in kept])
     return Candidate(
         name, tuple(c[0] for c in kept), np.stack([c[1] for c in kept], axis=1), weight / weight.sum(),
-        np.array([c[2] for c in kept]),
+        np.array([c[2] for c in kept]), problem.directions if problem.variants else None,
     )  # fmt: skip
 
 

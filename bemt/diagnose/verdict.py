@@ -119,6 +119,8 @@ class VerdictQuery:
         On the speed over pulse width, where it was recorded.
     ratios : callable or None
         Gives the change from the reference, where there is one recording and one reference.
+    pair : RunChange or None
+        The two recordings themselves, where there is no case.
     steps : list of Decision
         Answers of the rules so far, the last one in force.
     """
@@ -127,6 +129,7 @@ class VerdictQuery:
     p_value: float
     drive: Decision | None = None
     ratios: Callable[[], RunChange | None] | None = None
+    pair: RunChange | None = None
     steps: list[Decision] = field(default_factory=list)
     _refined: dict[Explanation, tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]] = field(default_factory=dict)
 
@@ -275,6 +278,8 @@ class VerdictQuery:
         apart = all(any(v in recorded for v in e.along) for e in chosen)
         if self.real:
             return ENOUGH if apart else PROVEN
+        if self.found.problem.by_laws and any(map(rough, self.leading)):  # the error of such a law may look like it
+            return ENOUGH
         # noise with a memory looks like a drift
         creeps = any(e.fault == "drift" for e in chosen)
         return LEAST if not self.alone or (apart and not creeps) else ENOUGH
@@ -398,17 +403,28 @@ def inclusion(found: Evidence) -> dict[str, float]:
 
 
 def alike(found: Evidence, name: str) -> tuple[str, ...]:
-    """Single effects that explain what an effect explains, within noise and evidence, itself left out."""
+    """Single effects that explain what an effect explains, within noise and evidence, itself left out.
+
+    Without a case the laws of flow and blade are rougher than any noise: as of a smooth rest, what they miss by a small
+    share of all that is explained is a detail.
+    """
     state, what = found.states[0], Explanation.of(name)
     s = state.white.changes(fitting.fit(found, what).signature)
-    limit = found.log_bayes(what) - NEAR
-    return tuple(
-        i
-        for i, span in found.spans.items()
-        if i != name
-        and look.distance(state, s, span, state.forms[name]) < look.ALIKE
-        and found.log_bayes(Explanation.of(i)) > limit
-    )
+    best = found.log_bayes(what)
+
+    def near(i: str) -> bool:
+        behind = best - found.log_bayes(Explanation.of(i))
+        if found.problem.by_laws and rough(i) and rough(name):
+            return behind < max(NEAR, SMALL * best)
+        return behind < NEAR and look.distance(state, s, found.spans[i], state.forms[name]) < look.ALIKE
+
+    return tuple(i for i in found.spans if i != name and near(i))
+
+
+def rough(name: str) -> bool:
+    """Whether the law of an effect may be off, as that of no instrument is."""
+    cls = effects.catalogue()[name]
+    return cls.kind != "stand" and not cls.exact
 
 
 def twins(what: Explanation) -> bool:
@@ -471,7 +487,11 @@ def _earned(
 
 def _class(found: Evidence, first: str, share: Mapping[str, float]) -> tuple[str, ...]:
     P = {i: found.probability[Explanation.of(i)] for i in found.spans}
-    others = [i for i in alike(found, first) if P[i] > RARE * P[first]]
+    others = [
+        i
+        for i in alike(found, first)
+        if P[i] > RARE * P[first] or (found.problem.by_laws and rough(i) and rough(first))
+    ]
     return (first, *sorted(others, key=lambda i: -share[i]))
 
 

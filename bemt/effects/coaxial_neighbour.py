@@ -23,8 +23,9 @@ class CoaxialNeighbour(Effect):
     wake to the share a^2 = 1 / (1 + s / sqrt(1 + s^2)) of the disk. A rotor downstream sees that speed inside the wake
     and none outside. Its loads are computed at the mean, weighted by r^2 like blade loads (declared): v a. A rotor
     upstream sees v (1 - s / sqrt(1 + s^2)). ``load`` is the neighbour's thrust over that of this rotor; its v follows
-    from momentum theory of the open disk, `Flow.induced`. The swirl of the neighbour is neglected; a contra-rotating
-    pair gains a few per cent from it.
+    from momentum theory of the open disk, `Flow.induced`; where ``second_rotor_rad_s`` is recorded, ``load`` holds at
+    equal speeds, and the neighbour's thrust goes with the square of its own. The swirl of the neighbour is neglected; a
+    contra-rotating pair gains a few per cent from it.
     """
 
     side: str = "upstream"
@@ -34,6 +35,7 @@ class CoaxialNeighbour(Effect):
     id = "coaxial_neighbour"
     evident = True
     inviscid = True
+    along = ("second_rotor_rad_s",)
     title = "second rotor on the same axis"
     sign = (
         "less thrust at the same speed, as in the wake of another rotor; strongest in static runs, fading with "
@@ -72,7 +74,10 @@ class CoaxialNeighbour(Effect):
 
     def _speed(self, flow: Flow) -> Array:
         """Induced speed of the neighbour, (P,) [m/s]."""
-        disk = self.load * np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
+        load: Array | float = self.load
+        if "second_rotor_rad_s" in flow.extra:
+            load = load * (np.nan_to_num(flow.extra["second_rotor_rad_s"]) / np.maximum(flow.omega, 1e-9)) ** 2
+        disk = load * np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
         half = 0.5 * np.abs(flow.V)
         return np.asarray(np.sqrt(half**2 + disk) - half)
 

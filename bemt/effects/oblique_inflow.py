@@ -32,7 +32,9 @@ class ObliqueInflow(Effect):
         "thrust and torque rise with airspeed as if J were lower, with a force in the plane of the disk; no change "
         "in static runs; a pitot that reads high by 1 / cos(angle) looks the same"
     )
-    parameters = (Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand", 7, 0.0),)
+    parameters = (
+        Parameter("angle_deg", "deg", 0.0, 90.0, "full turn of the stand; seldom unnoticed (declared)", 7, 0.0, 20.0),
+    )
     on_by_default = False
 
     def applies(self, flow: Flow) -> str:

@@ -24,7 +24,8 @@ __all__ = ["Followed", "PairOf", "draw_pairs", "followed", "pair_files", "pairs"
 
 Array = NDArray[np.float64]
 
-_KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V", "run")
+_KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
+         "second_rotor_rad_s", "run")  # fmt: skip
 _PROPELLERS = 4
 
 

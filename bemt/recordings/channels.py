@@ -29,7 +29,7 @@ MEASURED = (
     "time_s", "run", "pwm_s", "throttle", "rpm", "electrical_rpm", "optical_rpm", "airspeed_m_s", "J", "thrust_N",
     "duct_thrust_N", "torque_Nm", "power_W", "electrical_power_W", "voltage_V", "current_A", "temperature_K",
     "pressure_Pa", "humidity", "density_kg_m3", "tip_gap_m", "wall_distance_m", "sideslip_rad",
-    "sideslip_deg", "CT", "CP", "CQ", "eta",
+    "sideslip_deg", "second_rotor_rad_s", "CT", "CP", "CQ", "eta",
 )  # fmt: skip
 """Channels that a reduced recording may have."""
 _ALIASES = {

@@ -1,0 +1,263 @@
+"""Which change of motor, controller or battery makes the ratios of two recordings at equal command or load.
+
+How speed and electrical power move together is a table, its sources in the rows; each row is a linear Gaussian model on
+top of :func:`bemt.compare.smooth_change.covariance`, so its evidence has a closed form (Rasmussen and Williams 2006,
+eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change of every channel on its own. What
+acts on the rotor is judged by :mod:`bemt.diagnose.by_laws`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.compare import smooth_change as fits
+from bemt.compare.matched import MatchedChannel
+from bemt.compare.smooth_change import Scatter
+from bemt.gaussian.evidence import LinearTerms, log_sum, shares
+from bemt.gaussian.whitening import log_density, whitener
+
+Array = NDArray[np.float64]
+
+NONE, UNKNOWN = "none", "unknown"
+_PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
+# A smooth change of each channel on its own, as (size, and its level, bend and local shape over it): nobody knows what
+# makes it.
+_UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 1.0, 0.1, 0.06))
+# What a change may rise or bow with the command, share of the change, with its prior weight, as of every law.
+_FORM = {0.15: 0.7, 0.45: 0.3}
+_SIZES = (0.02, 0.07, 0.25)
+SURE = 0.85
+"""Probability from which one cause in the drive is named."""
+NEAR = 20.0
+"""A cause this many times less likely than the leading one is in its class: a law is rougher than its evidence."""
+RIVAL, DOUBT = 0.1, 0.3
+"""A cause beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
+
+FAMILY = {
+    **dict.fromkeys(("diameter", "pitch_offset", "section", "propeller", "untwist", "tip_cut"), "blade"),
+    **dict.fromkeys(("duct", "ground_effect", "coaxial_neighbour", "recirculation"), "surroundings"),
+    **dict.fromkeys(("airspeed_offset", "airspeed_gain", "nacelle", "oblique_inflow", "tunnel_blockage"), "airspeed"),
+    **dict.fromkeys(("thrust_gain", "torque_gain", "thrust_zero", "torque_zero", "cross_talk", "thrust_drift",
+                     "torque_drift"), "load cell"),
+    **dict.fromkeys(("battery_sag", "motor_heating", "motor"), "drive"),
+}  # fmt: skip
+"""What an engineer would look at, at once; an effect that is not listed is a family of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What is said of one sub-system."""
+
+    verdict: str  # none, named, sensor, class, unknown or insufficient
+    effects: tuple[str, ...]  # Of the verdict
+    probability: Mapping[str, float]  # Of every explanation, the likeliest first
+    # Effect to parameter to value, low and high (90 %) and unit, as far as it was worked out
+    parameters: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
+    why: str = ""  # The rule that decided
+    chance: float = math.nan  # Of the verdict
+
+    @property
+    def mass(self) -> float | None:
+        """Probability of the verdict."""
+        if math.isfinite(self.chance):
+            return self.chance
+        return sum(self.probability.get(k, 0.0) for k in self.effects) or self.probability.get(self.verdict)
+
+
+@dataclass(frozen=True)
+class DriveLaw:
+    """How one cause moves speed at equal command and electrical power at equal speed."""
+
+    id: str  # Of the effect, as in the catalogue of effects where it is there
+    title: str  # In words
+    # Size relative to the first term, and channel to basis to weight. Bases: ``all`` 1; ``ramp`` along the command;
+    # ``volts`` ln of the voltage ratio at equal command, or 1 where it is not recorded.
+    terms: tuple[tuple[float, Mapping[str, Mapping[str, float]]], ...]
+    says: str  # Why this cause, in a sentence
+    settles: str  # Measurement that distinguishes it from others
+    source: str  # Of the scaling
+    sizes: tuple[float, ...] = _SIZES  # Standard deviations of the first term, share; they share the prior [1]
+
+
+LAWS: tuple[DriveLaw, ...] = (
+    DriveLaw(
+        "battery_sag",
+        "supply or battery voltage",
+        ((1.0, {"speed": {"volts": 1.0}}), (0.5, {"electrical": {"volts": 1.0}})),
+        "speed at one command follows the voltage; loads at the measured speed are unchanged",
+        "log voltage at the controller",
+        "n ~ command x V less I R",
+        (*_SIZES, 0.8),
+    ),
+    DriveLaw(
+        "motor_heating",
+        "motor heating (winding and magnets)",
+        ((1.0, {"speed": {"all": -0.5}, "electrical": {"all": 1.0}}), (0.4, {"electrical": {"all": 1.0}})),
+        "more electrical power for the same speed and load, and less speed at one command",
+        "repeat after a pause",
+        "R = R0 (1 + 0.0039 dT)",
+        (0.03, 0.1),
+    ),
+    DriveLaw(
+        "motor",
+        "different motor, controller or setting",
+        (
+            (1.0, {"speed": {"all": 1.0}}),
+            (1.0, {"electrical": {"all": 1.0}}),
+            (0.5, {"speed": {"ramp": 1.0}}),
+            (0.5, {"electrical": {"ramp": 1.0}}),
+        ),
+        "speed at one command and electrical power change, loads at the measured speed are unchanged",
+        "compare motor, controller and its settings",
+        "shares of their own",
+    ),
+)
+"""Causes behind the rotor."""
+
+
+def law(name: str) -> DriveLaw | None:
+    """Row of a cause; None for effects on the rotor."""
+    return next((row for row in LAWS if row.id == name), None)
+
+
+def _bases(c: MatchedChannel, volts: float | Array) -> dict[str, Array]:
+    """Columns that a law may use, for the points of B."""
+    b = c.second.astype(float)
+    ramp = fits.unit_coordinates(c)[:, 0]
+    ramp = ramp / max(float(np.abs(ramp).max()), 1e-12)
+    return {"all": b, "ramp": b * ramp, "bow": b * (ramp**2 - 0.5), "volts": b * volts}
+
+
+def _volts(channels: Mapping[str, MatchedChannel]) -> dict[str, float | Array]:
+    """Logarithm of B's voltage over A's at the command of every point of the drive; empty without voltages."""
+    v = channels.get("voltage")
+    if v is None:
+        return {}
+    order = np.argsort(v.x[:, 0], kind="stable")
+    at, y, second = v.x[order, 0], v.y[order], v.second[order]
+    out: dict[str, float | Array] = {}
+    for name, c in channels.items():
+        if name == "speed":
+            out[name] = np.asarray(
+                np.interp(c.x[:, 0], at[second], y[second]) - np.interp(c.x[:, 0], at[~second], y[~second])
+            )
+        elif name == "electrical":
+            out[name] = float(y[second].mean() - y[~second].mean())
+    return out
+
+
+def _columns(
+    row: DriveLaw, channels: Mapping[str, MatchedChannel], form: float, volts: Mapping[str, float | Array]
+) -> Array | None:  # fmt: skip
+    """Columns of a law over all channels, (M, terms and form), each of unit size; None where nothing moves."""
+    parts = []
+    for name, c in channels.items():
+        basis = _bases(c, volts.get(name, 1.0))
+        columns = [
+            w * sum((f * basis[k] for k, f in term.get(name, {}).items()), np.zeros(c.y.size)) for w, term in row.terms
+        ]
+        moved = sum((np.abs(v) for v, (w, _) in zip(columns, row.terms, strict=True) if w >= 1.0), np.zeros(c.y.size))
+        scale = form * float(moved.max())
+        for which in channels:
+            columns += [scale * (which == name) * basis[k] for k in ("ramp", "bow")]
+        parts.append(np.column_stack(columns))
+    joined = np.vstack(parts)
+    if np.abs(joined[:, 0]).max() <= 1e-9:
+        return None
+    used = np.abs(joined).max(axis=0) > 1e-12
+    used[: len(row.terms)] = True
+    return joined[:, used]
+
+
+def weigh(
+    channels: Mapping[str, MatchedChannel], scatters: Sequence[Mapping[str, Scatter]]
+) -> dict[str, float]:  # fmt: skip
+    """Probability of every explanation, the likeliest first; ``scatters``: settings of that of single readings."""
+    found = [_weighed(channels, scatter) for scatter in scatters]
+    score = {k: float(log_sum([z[k] for z in found])) for k in found[0]}
+    listed = [k for k in score if k not in _PRIOR]
+    log_prior = {k: math.log(_PRIOR.get(k, (1.0 - sum(_PRIOR.values())) / max(len(listed), 1))) for k in score}
+    share = shares([score[k] + log_prior[k] for k in score]).tolist()
+    return dict(sorted(zip(score, share, strict=True), key=lambda kv: -kv[1]))
+
+
+def _weighed(channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatter]) -> dict[str, float]:
+    """Log evidence of every explanation at one setting of the scatter."""
+    from scipy.linalg import block_diag
+
+    volts = _volts(channels)
+    if volts:  # a condition then, no answer
+        channels = {k: c for k, c in channels.items() if k != "voltage"}
+    base = {k: fits.covariance(c, scatter[k]) for k, c in channels.items()}
+    white = whitener(block_diag(*base.values()))
+    r = white(np.concatenate([c.y - c.y.mean() for c in channels.values()]))
+    none = -0.5 * float(r @ r) - white.log_det
+    score = {NONE: none}
+    for row in LAWS:
+        found = []
+        for form, prior in _FORM.items():
+            columns = _columns(row, channels, form, volts)
+            if columns is not None:
+                A, weight = white(columns), math.log(prior / len(row.sizes))
+                found += [_evidence(row, A, r, s) + weight for s in row.sizes]
+        if found:
+            score[row.id] = none + float(log_sum(found))
+    score[UNKNOWN] = _any_change(channels, base, none)
+    return score
+
+
+def _evidence(row: DriveLaw, A: Array, r: Array, size: float) -> float:
+    """Log evidence over that of none.
+
+    Terms of weight 1 or more stand on their own; the others are shares of what these turn out to be.
+    """
+    free = np.array([w >= 1.0 for w, _ in row.terms] + [False] * (A.shape[1] - len(row.terms)))
+    b = np.where(free, size, 0.0)
+    for _ in range(3):
+        sd = np.where(free, size, np.maximum(float(np.abs(b[free]).max()), 1e-5))
+        terms = LinearTerms.of(A * sd)
+        b = sd * terms.posterior(r)[0]
+    return float(terms.gain(r))
+
+
+def _any_change(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array], none: float) -> float:
+    """Log evidence of a smooth change of every channel on its own, on the scale of the others."""
+    found = []
+    for size, level, bend, local in _UNKNOWN_KINDS:
+        total = none
+        for name, c in channels.items():
+            y, free = c.y - c.y.mean(), size**2 * fits.free_change(c, level, bend, local)
+            total += log_density(base[name] + free, y) - log_density(base[name], y)
+        found.append(total)
+    return float(log_sum(found)) - math.log(len(found))
+
+
+def judge_drive(probability: Mapping[str, float]) -> Judgement:
+    """Say what the evidence allows: the order of the questions is the order of caution."""
+
+    def answer(verdict: str, effects: Sequence[str], why: str) -> Judgement:
+        return Judgement(verdict, tuple(effects), probability, {}, why)
+
+    if probability[NONE] >= 0.5:
+        return answer("none", (), f"no change beyond scatter and set-up (probability {probability[NONE]:.2f})")
+    listed = {k: p for k, p in probability.items() if k not in _PRIOR}
+    mass, unknown = sum(listed.values()), probability[UNKNOWN]
+    if unknown > 0.5:
+        return answer("unknown", (), f"no listed cause changes these channels like that (probability {unknown:.2f})")
+    if mass <= 0.5:
+        return answer("insufficient", (), "the change is too small to be distinguished from none")
+    best = max(listed.values())
+    credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
+    first = credible[0]
+    row = law(first)
+    if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL and row is not None:
+        return answer("named", (first,), row.says)
+    if len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
+        return answer("class", credible, f"the data cannot tell these apart (probability {mass:.2f})")
+    return answer("insufficient", (), f"{first} fits best (probability {listed[first]:.2f}), but is not sure")

@@ -1,0 +1,253 @@
+"""Two recordings without a case: the same judge, with signatures from the laws of a rotor that its reference shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import effects
+from bemt.air import Air
+from bemt.bem.model import acts_on_rotor
+from bemt.compare import recordings
+from bemt.compare.drive_laws import Judgement
+from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
+from bemt.diagnose import evidence, gate, rules, signatures, verdict
+from bemt.diagnose.assemble import assemble
+from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, Curve, LawRotor, Laws, law_part
+from bemt.diagnose.record import Record, air_of, thinned
+
+if TYPE_CHECKING:
+    from bemt.compare.recordings import RunChange
+    from bemt.compare.smooth_change import Scatter
+    from bemt.compare.stand_run import StandRun
+    from bemt.dataset import Dataset
+    from bemt.diagnose.problem import Part
+    from bemt.diagnose.signatures import Candidate
+
+__all__ = ["changed", "judged", "law_effects", "records_of", "weighed"]
+
+Array = NDArray[np.float64]
+
+MOST = 40
+"""Points of a recording that are weighed; more are averaged with alike ones [1]."""
+# What a motor's losses may differ by from run to run, and with the load, share, where electrical power stands for
+# torque.
+_BY_POWER, _EFFICIENCY = 0.03, 0.08
+# Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
+_SAME_DRIVE = 0.06
+# Speed below this share of the largest: a rotor that has just set off.
+_STARTED = 0.15
+_COVARIATES = ("time_s", "temperature_K", "tip_gap_m", "wall_distance_m", "second_rotor_rad_s", "run")
+# Where nothing tells: density [kg/m3], diameter [m] and speed [rev/min] that coefficients are turned into loads with.
+_RHO, _D, _RPM = 1.2, 0.25, 6000.0
+_FEWEST = 4
+# At rest a coefficient below this share of the usual one is no reading of a turning rotor.
+_NEAR_ZERO, _STILL = 0.15, 0.02
+# Rows this many robust standard deviations off the curve through all of them are strays, and at least this share off.
+_FAR, _FAR_SHARE, _STRAYS = 5.0, 0.05, 0.1
+
+
+def law_effects() -> list[str]:
+    """Effects whose signature needs no blade.
+
+    >>> {"thrust_zero", "oblique_inflow", "propeller"} <= set(law_effects()), "stall_delay" in law_effects()
+    (True, False)
+    """
+    return [
+        i for i, cls in effects.catalogue().items()
+        if cls.kind != "drive" and not cls.on_by_default and (i in BLADE_LAWS or not acts_on_rotor(cls()))
+    ]  # fmt: skip
+
+
+def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange:
+    """Compare two recordings; what acts on the rotor is judged when it is asked for."""
+    return recordings.changed(a, b, diameter_m, judged)
+
+
+def judged(pair: RunChange) -> Judgement:
+    """What changed the loads from A to B."""
+    with evidence.one_thread():
+        query = weighed(pair)
+        if query is None:
+            return recordings.NO_VERDICT
+        said = rules.decide(query)
+    P = sorted(query.P.items(), key=lambda kv: -kv[1])
+    parameters = query.refined(said.leading)[1] if said.leading and said.effects else {}
+    return Judgement(
+        said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability
+    )  # fmt: skip
+
+
+def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | None:
+    """Explanations of what changed from A to B, weighed; None where nothing can be."""
+    both = records_of(pair.a, pair.b, pair.diameter_m, pair.rotor.likelier)
+    if both is None:
+        return None
+    known, test = both
+
+    def parts(laws: Laws) -> tuple[Part, ...]:
+        rotor = LawRotor.of(known, pair.diameter_m, laws)
+        return law_part(test, rotor), law_part(known, rotor)
+
+    problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
+    candidates, _ = signatures.candidates(problem, law_effects())
+    candidates = tuple(c for c in (_as_counted(c, pair) for c in candidates) if c is not None)
+    found = evidence.weigh(problem, candidates)
+    p = gate.p_value(found, nulls)
+    for state in found.states:
+        state.rivals.clear()
+    return verdict.VerdictQuery(found, p, pair=pair)
+
+
+def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
+    """Candidate without ratios of speeds that the speed at equal command rules out; None where none is left.
+
+    One motor at one command turns as fast as before, whatever is indicated.
+    """
+    r = next((r for r in pair.ratios.values() if r["kind"] == "speed"), None)
+    if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
+        return candidate
+
+    def fits(setting: Mapping[str, Any]) -> bool:
+        if setting.get("channel", "rpm") != "rpm":
+            return True
+        ratio = abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))
+        unsure = _SAME_DRIVE + math.log(r["high95"] / r["ratio"])
+        return abs(math.log(r["ratio"] / ratio)) < unsure
+
+    return candidate.only(np.array([fits(s) for s in candidate.settings]))
+
+
+def records_of(
+    a: StandRun, b: StandRun, diameter_m: float, scatter: Mapping[str, Scatter]
+) -> tuple[Record, Record] | None:  # fmt: skip
+    """Both recordings with the same channels, A as reference, in the air that both tell.
+
+    ``scatter`` of single readings as both recordings show it, by thrust and torque.
+    """
+    channels = {}
+    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
+        for c in LOADS[name]:
+            if c == "electrical_power_W" and not like_voltage(a, b):
+                continue
+            if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b)):
+                channels[quantity] = c
+                break
+    channels = {k: c for k, c in channels.items() if c in ("CT", "CP", "CQ") or all("rpm" in r.points for r in (a, b))}
+    if not channels:
+        return None
+    log_ratio, unsure = density_change(a, b)
+    apart = [r.session.get(c, 0.0) for r in (a, b) for c in channels.values()]
+    apart += [SESSION["torque"], _BY_POWER if "electrical_power_W" in channels.values() else 0.0, unsure]
+    D = diameter_m if math.isfinite(diameter_m) else _D
+    # what lags on the way up and down in one of them may be a zero of the other
+    shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
+    out = [
+        _record(r, channels, D, rho, max(apart), reference, scatter, shift)
+        for r, rho, reference in ((a, 1.0, True), (b, math.exp(log_ratio), False))
+    ]
+    known, test = out
+    if known is None or test is None:
+        return None
+    known, test = (_without_strays(r, D) for r in (known, test))
+    return thinned(known, MOST), thinned(_in_reach(test, known), MOST)
+
+
+def _in_reach(test: Record, known: Record) -> Record:
+    """Points of the test where the reference was, with a margin; all where they share no range."""
+    keep = np.ones(len(test), dtype=bool)
+    for x, seen in ((np.log(test.rpm), np.log(known.rpm)), (test.V / test.rpm, known.V / known.rpm)):
+        low, high = log_range(seen, MARGIN)
+        inside = (x >= low) & (x <= high)
+        if (keep & inside).sum() >= _FEWEST:
+            keep &= inside
+    return test.take(np.flatnonzero(keep))
+
+
+def _record(
+    run: StandRun, channels: dict[str, str], D: float, density: float, repeatability: float, reference: bool,
+    scatter: Mapping[str, Scatter], shift: Mapping[str, float],
+) -> Record | None:  # fmt: skip
+    points = run.points
+    rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
+    n = rpm / 60.0
+    recorded = math.isfinite(run.density)
+    rho = np.asarray(points["density_kg_m3"], float) if "density_kg_m3" in points else np.full(len(run), np.nan)
+    rho = np.where(np.isfinite(rho), rho, run.density if recorded else _RHO * density)
+    V = np.nan_to_num(points["airspeed_m_s"]) if "airspeed_m_s" in points else np.zeros(len(run))
+    if "J" in points:
+        V = np.nan_to_num(points["J"]) * n * D
+    unit: dict[str, Any] = {
+        "thrust_N": 1.0, "torque_Nm": 1.0, "power_W": 1.0 / (2.0 * np.pi * n),
+        "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
+        "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,
+    }  # fmt: skip
+    measured: dict[str, Array] = {}
+    u: dict[str, Array] = {}
+    zero: dict[str, float] = {}
+    for k, c in channels.items():
+        measured[k] = np.asarray(points[c] * unit[c], dtype=float)
+        if k == "torque_Nm":  # its sign is the sense of rotation
+            measured[k] *= np.sign(np.nansum(measured[k])) or 1.0
+        full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
+        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
+        u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
+        if shift[c]:
+            zero[k] = shift[c] * full
+        if c == "electrical_power_W":  # a motor's efficiency follows its load, and it takes power without any
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), _BY_POWER * full)
+    good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
+    good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
+    good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
+    for v in measured.values():
+        size = np.abs(v) / (rho * n**2)
+        usual = np.nanquantile(np.where(good, size, np.nan), 0.9)
+        v[(V <= _STILL * n * D) & ~(size > _NEAR_ZERO * usual)] = np.nan
+    good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
+    if good.sum() < 2:
+        return None
+    air = Air.from_density(_RHO)
+    fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
+    extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k][good]).all()}
+    angle = _angle(points)
+    if angle is not None and reference:  # its curves are over V cos(angle)
+        V = V * np.cos(angle)
+    elif angle is not None and np.any(angle != 0.0):
+        extra["sideslip_rad"] = angle
+    if "second_rotor_rad_s" in extra:  # what it changes is no scatter
+        u = {k: np.full(len(run), np.nan) for k in u}
+    record = Record(
+        points.name, rpm, V, air_of(fields), measured, u, extra, {}, zero, recorded,
+        reference=reference, repeatability=repeatability,
+    )  # fmt: skip
+    return record.take(np.flatnonzero(good))
+
+
+def _angle(points: Dataset) -> Array | None:
+    """Angle between wind and shaft, (P,) [rad]; None: not recorded."""
+    for name, unit in (("sideslip_rad", 1.0), ("sideslip_deg", math.pi / 180.0)):
+        if name in points and np.isfinite(points[name]).all():
+            return np.abs(points[name]) * unit
+    return None
+
+
+def _without_strays(record: Record, D: float) -> Record:
+    """Record without readings that all others of it contradict."""
+    n = record.rpm / 60.0
+    unit, J = np.asarray(record.air.rho) * n**2, record.V / (n * D)
+    measured = {}
+    for channel, v in record.measured.items():
+        y = v / unit
+        good = np.isfinite(y)
+        off = np.where(good, y - Curve.of(y, J, record.rpm, (-1.0, 0.0, 0.5))(J, record.rpm), 0.0)
+        middle = float(np.median(off[good]))
+        spread = 1.48 * float(np.median(np.abs(off[good] - middle)))
+        far = np.abs(off - middle) > max(_FAR * spread, _FAR_SHARE * float(np.max(np.abs(y[good]))))
+        measured[channel] = np.where(far, np.nan, v) if far.sum() <= _STRAYS * good.sum() else v
+    kept = np.any([np.isfinite(v) for v in measured.values()], axis=0)
+    return replace(record, measured=measured).take(np.flatnonzero(kept))
