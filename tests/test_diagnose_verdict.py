@@ -182,13 +182,14 @@ def asked(**changed: Any) -> Any:
         "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
-        "parameters": {"reynolds": {}},
+        "parameters": {"reynolds": {}}, "pair": None, "likeliest_none": False,
     }  # fmt: skip
 
     def says(word: str, why: str = "", ids: Any = (), *_: Any, **__: Any) -> verdict.Decision:
         return verdict.Decision(word, tuple(ids), lead, 0.95, 0.0, (), why)
 
-    found = SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0}, problem=SimpleNamespace(parts=()))
+    found = SimpleNamespace(log_bayes=lambda _: 100.0, probability={lead: 1.0},
+                            problem=SimpleNamespace(parts=(), by_laws=False))  # fmt: skip
     return SimpleNamespace(**({"found": found, "says": says, "names": lambda ids, _: says("named", "", ids),
                                "known_sets": (("reynolds",), ("duct",))} | plain | changed))  # fmt: skip
 
@@ -302,10 +303,11 @@ def _said(word: str, *ids: str, by: str = "model") -> verdict.Decision:
 def revised(name: str, said: verdict.Decision, **changed: Any) -> verdict.Decision | None:
     """What one revising rule makes of an answer, all else being in order."""
     part = SimpleNamespace(record=SimpleNamespace(reference=False, air_recorded=False))
-    problem = SimpleNamespace(level={"thrust_N": 0.0}, scatter={}, findings=(), parts=(part,))
+    problem = SimpleNamespace(level={"thrust_N": 0.0}, scatter={}, findings=(), parts=(part,), by_laws=False)
     slip = {"unit_slip": {"channel": {"value": "density_kg_m3"}}}
     plain: dict[str, Any] = {
         "answer": said, "of_loads": said, "drive": None, "load_moves": False, "change": None, "alone": False,
+        "pair": None,
         "P": {NONE: 0.1, Explanation.of("oblique_inflow"): 0.4},
         "refined": lambda _: (SimpleNamespace(signature=np.array([0.2])), slip),
         "found": SimpleNamespace(problem=problem, spans={"oblique_inflow": None}),
@@ -323,6 +325,12 @@ def ratios(word: str, *ids: str, drive: str = "") -> Any:
     return SimpleNamespace(loads=loads, drive=motor, leading=motor if drive else loads, ratios={}, channels={})
 
 
+def pair(**changed: Any) -> Any:
+    """Two recordings of one rotor and stand, without a case."""
+    plain = {"by_density": "", "turned": False, "by_proxy": False, "apart": False, "far_off": False, "wind": ""}
+    return SimpleNamespace(**(plain | changed))
+
+
 REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
     "another rotor than the case's": (_said("named", "duct"), {"level": {"thrust_N": 4.0}}, "insufficient"),
     "repeats differ as those of no stand": (_said("named", "duct"), {"scatter": {"thrust_N": 0.3}}, "insufficient"),
@@ -337,7 +345,19 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
         {"change": ratios("class", "duct")},
         "class",
     ),
-}
+    "two recordings without a case: thrust of the other sign": (
+        _said("sensor", "unit_slip"), {"pair": pair(turned=True)}, "sensor",
+    ),
+    "two recordings without a case: electrical power for torque": (
+        _said("named", "untwist"), {"pair": pair(by_proxy=True)}, "insufficient",
+    ),
+    "two recordings without a case: nothing shared, or no one stand": (
+        _said("named", "duct"), {"pair": pair(apart=True)}, "insufficient",
+    ),
+    "two recordings without a case: the densities that both tell": (
+        _said("none"), {"pair": pair(by_density="thinner air")}, "named",
+    ),
+}  # fmt: skip
 # Rules that need a solved problem or a file: tested on one.
 BY_MODEL = (
     "an exact relation in the file",
@@ -352,6 +372,12 @@ def test_each_revision_answers_when_it_alone_holds(name: str) -> None:
     found = revised(name, said, **changed)
     assert found is not None and found.verdict == word
     assert revised(name, _said("none")) is None
+
+
+def test_a_change_of_pole_pairs_is_one_though_the_speeds_share_nothing() -> None:
+    rule = "two recordings without a case: nothing shared, or no one stand"
+    assert revised(rule, _said("sensor", "rpm_scale"), pair=pair(apart=True, far_off=True)) is None
+    assert revised(rule, _said("none"), pair=pair(wind="no airspeed")) is None
 
 
 def test_a_factor_of_three_that_is_a_slip_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
