@@ -100,7 +100,7 @@ def settled(rotor: Rotor, printed: Printed) -> Printed:
     >>> from geometry.laws import helix
     >>> two = Rotor(helix(0.2, 0.12, anchors=naca("4412")), 2)
     >>> round(settled(two, Printed()).blend, 4)
-    0.0022
+    0.0016
     """
     if printed.blend is not None or not rotor.blade.anchors:
         return printed

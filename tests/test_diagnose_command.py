@@ -177,7 +177,7 @@ def test_what_cannot_be_is_refused(
         ({"vibration_V": 3.0}, "not used: vibration_V"),
         ({"Power (W)": 30.0}, "power_W: taken as shaft power; if a wattmeter read it"),
         ({"CT": 0.05}, "CT: thrust_N is used, which is"),
-        ({"airspeed_kmh": 30.0}, "no unit known, none assumed, for 'airspeed_kmh'"),
+        ({"airspeed_furlong": 30.0}, "no unit known, none assumed, for 'airspeed_furlong'"),
     ],
 )
 def test_nothing_of_a_file_goes_unmentioned(tmp_path: Path, change: dict[str, object], words: str) -> None:
@@ -356,8 +356,8 @@ def test_faults_of_all_files_and_the_case_are_said_at_once(tmp_path: Path, capsy
     said = capsys.readouterr().err
     told = (
         "column Drehzahl: got a speed",
-        "column Schub: got a thrust",
-        "column Moment: got a torque",
+        "--unit Schub=UNIT",
+        "--unit Moment=UNIT",
         "slow.csv: rpm: got no speed of rotation",
         "windy.csv: airspeed_m_s: got thrust that is negative",
     )

@@ -105,10 +105,13 @@ def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | 
 
 
 def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
-    """Candidate without ratios of speeds that the speed at equal command rules out; None where none is left.
+    """Candidate without what the recordings rule out besides the loads; None where nothing is left.
 
-    One motor at one command turns as fast as before, whatever is indicated.
+    One motor at one command turns as fast as before, whatever is indicated. What two thermometers leave open of the
+    density counts as repeatability.
     """
+    if candidate.id == "air_density" and density_change(pair.a, pair.b)[1]:
+        return None
     r = next((r for r in pair.ratios.values() if r["kind"] == "speed"), None)
     if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
         return candidate

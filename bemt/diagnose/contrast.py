@@ -237,8 +237,9 @@ def _given(asked: Invocation) -> Given:
 
     class _Pair(Given):
         def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
-            if not asked.chosen or ruled_out:  # a comparison does not rule out: the diagnosis does
+            if not asked.chosen:
                 return super().command(run, reference, ruled_out)
+            # a comparison of chosen rows has no way to rule out: it is asked again as it was
             return asked.command(a=reference) if reference else asked.command(b=run or asked.b)
 
         def comparison(self, reference: str) -> str:

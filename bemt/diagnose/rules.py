@@ -125,6 +125,10 @@ def _leaves_its_range(a: VerdictQuery) -> bool:
     return False
 
 
+# Range of a share over what it is at most, within which it is the same everywhere.
+_SAME = 0.2
+
+
 def _predicts(a: VerdictQuery) -> bool:
     """Whether an explanation brings left-out blocks nearer than calibration alone does, along some variable.
 
@@ -138,6 +142,15 @@ def _predicts(a: VerdictQuery) -> bool:
         return float(np.sqrt(np.mean(d**2)))
 
     return any(error(a.leading, s) < PREDICTS * error(NONE, s) for s in blocks.partitions(problem))
+
+
+def _level(a: VerdictQuery) -> bool:
+    """Whether the leading explanation changes each channel by the same share everywhere, to a fifth of that share."""
+    problem = a.found.problem
+    share = (fitting.fit(a.found, a.leading).signature / problem.centre)[problem.free]
+    of = problem.channel[problem.free]
+    largest = float(np.max(np.abs(share)))
+    return all(np.ptp(share[of == c]) <= _SAME * largest for c in np.unique(of))
 
 
 def at_end(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
@@ -310,8 +323,12 @@ def _not_much_better_than_nothing(a: VerdictQuery) -> Decision | None:
 
 @_rule("does not predict", "PROVEN, VAGUE, PREDICTS")
 def _does_not_predict(a: VerdictQuery) -> Decision | None:
-    """Declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7)."""
-    if not a.expected and a.odds < PROVEN and a.vague > VAGUE and not _predicts(a):
+    """Declared; left-out blocks, DIAGNOSIS 2.9; in any case it cost right names (7).
+
+    Without a case, a share that is the same everywhere is learnt from any block as the session's gain: it is not asked.
+    """
+    level = a.found.problem.by_laws and _level(a)
+    if not a.expected and a.odds < PROVEN and a.vague > VAGUE and not level and not _predicts(a):
         return a.says("insufficient", "the best explanation does not predict held-out readings")
     return None
 

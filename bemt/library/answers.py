@@ -323,9 +323,9 @@ def compare(
     ...     _ = file.write_text("\n".join(lines))
     >>> found = bemt.compare(a, b)
     >>> found.verdict, found.effects
-    ('class', ('thrust_gain', 'ground_effect', 'recirculation', 'coaxial_neighbour', 'duct'))
+    ('class', ('thrust_gain', 'coaxial_neighbour'))
     >>> print(found.text.splitlines()[0])
-    Gain of the thrust cell, or the surroundings of the rotor (thrust -10.0% and torque +0.0%).
+    Gain error of the thrust cell, or second rotor on the same axis (thrust -10.0% and torque +0.0%).
     """
     from bemt.diagnose import contrast
 

@@ -528,10 +528,10 @@ def propeller(
     --------
     >>> propeller("8x4.5x3").blades
     3
-    >>> propeller("10 by 5")  # doctest: +ELLIPSIS
+    >>> propeller("ten by five")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: LABEL: '10 by 5': got unreadable text; expected ...
+    bemt.base.errors.InputError: LABEL: 'ten by five': got unreadable text; expected ...
     """
     faults = []
     if (label is None) == (stations is None):

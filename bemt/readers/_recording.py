@@ -30,8 +30,8 @@ from bemt.readers._words import english, quantities
 Array = NDArray[np.float64]
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
 """Throttle beyond which it is no fraction; greatest one from which it is percent. [1]"""
-HOTTEST_AIR, MOST_AIR_VARIES = 323.0, 20.0
-"""Temperature above which, and range over which, no air around a stand is. [K]"""
+HOTTEST_AIR, MOST_AIR_VARIES, COLDEST_PART = 323.0, 20.0, 200.0
+"""Temperature above which, and range over which, no air around a stand is; below which no part of it is. [K]"""
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 BLOCK = 1 << 17
 """Samples that are searched for spikes at once."""
@@ -222,7 +222,8 @@ class Builder:
         if channel is None or stated:
             return
         v = channel.values[np.isfinite(channel.values)]
-        if v.size and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):
+        slip = v.size and np.min(v) < COLDEST_PART  # degrees Celsius under a heading of kelvin, say
+        if v.size and not slip and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):
             label = self.headings.pop("temperature_K")
             name = self.free("part_temperature_K")
             self.channels = {name if k == "temperature_K" else k: c for k, c in self.channels.items()}
