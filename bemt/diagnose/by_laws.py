@@ -77,7 +77,8 @@ def judged(pair: RunChange) -> Judgement:
             return recordings.NO_VERDICT
         said = rules.decide(query)
     P = sorted(query.P.items(), key=lambda kv: -kv[1])
-    parameters = query.refined(said.leading)[1] if said.leading and said.effects else {}
+    solved = bool(said.effects) and bool(said.leading) and all(i in query.found.spans for i in said.leading)
+    parameters = query.refined(said.leading)[1] if solved else {}
     return Judgement(
         said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability
     )  # fmt: skip
