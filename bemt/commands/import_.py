@@ -51,7 +51,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
     run.add_argument(
-        "--out", metavar="RUN.TOML", help="write the run here; every command takes it in place of the files"
+        "--out",
+        dest="run_toml",
+        metavar="RUN.TOML",
+        help="write the run here; every command takes it in place of the files",
     )
 
 
@@ -66,7 +69,19 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     choice = asked(args.rpm, args.period, args.revolutions)
     load.check_format(args.format)
-    names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup", "out")
+    names = (
+        "unit",
+        "column",
+        "sign",
+        "sector",
+        "zones",
+        "axis",
+        "airspeed",
+        "density",
+        "reference",
+        "setup",
+        "run_toml",
+    )
     insist = any(getattr(args, name) for name in names)
     made = cfd_options.run_from(
         args.files, rpm=None if choice.period is None else 60.0 / choice.period, revolutions=args.revolutions,
@@ -75,9 +90,9 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     found = load.document(args.files, args.format, choice, made, insist)
     wrote = ""
-    if args.out and found["runs"]:
+    if args.run_toml and found["runs"]:
         made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
-        wrote = cfd_options.write_run(made, args.out).as_posix()
+        wrote = cfd_options.write_run(made, args.run_toml).as_posix()
     view = _beside(args, wrote)
     if view is not None:
         found["prediction"] = view.document()
