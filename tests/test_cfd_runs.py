@@ -514,3 +514,14 @@ def test_the_shared_exports_become_runs(shared_data: Path) -> None:
     with pytest.raises(InputError, match="another clock"):
         files = ("screw/report-def-0-rfile.out", "screw/report-def-0-rfile_1_1.out")
         assemble(RunToml.model_validate({"run": {"files": files, "rpm": 130.2}, **screw}), folder)
+
+
+def test_a_run_is_replaced_and_no_other_file(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    files = fluent(put)
+    args = ["import", *files, "--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m", "--airspeed", "0"]
+    assert main([*args, "--out", "run.toml"]) == 0
+    first = Path("run.toml").read_text()
+    assert main([*args, "--density", "1.1", "--out", "run.toml"]) == 0 and Path("run.toml").read_text() != first
+    case = put("case.toml", 'schema = "bemt.case/1"\n')
+    assert main([*args, "--out", "case.toml"]) == 2 and "no run" in capsys.readouterr().err
+    assert case.read_text() == 'schema = "bemt.case/1"\n'

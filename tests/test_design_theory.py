@@ -10,6 +10,7 @@ import pytest
 from bemt.air import Air
 from bemt.bem import gradient
 from bemt.bem.model import Model
+from bemt.bem.solver import solve
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.design import optimise as search
@@ -158,6 +159,16 @@ def test_gradients_are_those_of_whole_evaluations(which: str, project) -> None:
         high, low = (np.r_[one.objective, one.margins] for one in ends)
         assert ((high - low) / 2e-6 - slopes[:, j]) / scale == pytest.approx(0.0, abs=1e-6), j
     assert x.size == 2 * CONTROLS + (2 if which == "open" else 0)
+
+
+@pytest.mark.parametrize("which", ["open", "ducted"])
+def test_the_search_has_the_thrust_and_torque_of_the_solver_in_flight(which: str, project) -> None:
+    problem, x = _open_problem() if which == "open" else _ducted_problem(project)
+    v = problem.values(x)
+    prepared = gradient.only(problem.model, problem.variants[0], problem.shape.stations(x))
+    found = solve(prepared, v.rpm, np.array([p.airspeed_m_s for p in problem.need.points]), problem.need.air)
+    assert np.all(found.converged) and v.thrust_N == pytest.approx(found.T, rel=1e-9)
+    assert v.power_W == pytest.approx(found.P, rel=1e-9)
 
 
 def test_stress_of_a_spinning_bar_and_of_a_cantilever() -> None:

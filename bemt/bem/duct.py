@@ -145,6 +145,13 @@ class DuctFlow:
     area: float = float("nan")
     exit_hub: float = float("nan")
 
+    def jet_speed(self, w: Array, V: Array) -> Array:
+        """Speed of the jet far behind for a mean speed w through the disk; as the kernel's. [m/s]"""
+        y = w / (self.wake_ratio * self.contraction)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bend = np.where(V > 0.0, self.bend * V / np.hypot(y, V), 0.0)
+        return np.asarray(V + (y - self.capture / self.contraction * V) * (1.0 + bend))
+
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together."""
         mdot, jet, stator = out[:, 2], out[:, 3], out[:, 4]

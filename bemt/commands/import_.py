@@ -51,7 +51,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "how it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2"
     )
     run.add_argument("--setup", default=[], metavar="NAME=X", help=setup, **_options.MANY)
-    run.add_argument("--out", metavar="RUN.TOML", help="write it here; every command takes it in place of the files")
+    out = "write it here; every command takes it in place of the files"
+    run.add_argument("--out", dest="run_toml", metavar="RUN.TOML", help=out)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,17 +66,17 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
     choice = asked(args.rpm, args.period, args.revolutions)
     load.check_format(args.format)
-    names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup", "out")
-    insist = any(getattr(args, name) for name in names)
+    names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup")
+    insist = any(getattr(args, name) for name in (*names, "run_toml"))
     if insist and (table := _table(args)):
         from bemt.recordings.stated import write_recording
 
-        if not args.out:
+        if not args.run_toml:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
-        wrote = write_recording(table, args.out, args.unit, args.column, args.sign).as_posix()
+        wrote = write_recording(table, args.run_toml, args.unit, args.column, args.sign).as_posix()
         print(f"{wrote} written\n\n", end="")
-        args.files, args.unit, args.column, args.sign, args.out, insist = [wrote], [], [], [], None, False
+        args.files, args.unit, args.column, args.sign, args.run_toml, insist = [wrote], [], [], [], None, False
     made = cfd_options.run_from(
         args.files, rpm=None if choice.period is None else 60.0 / choice.period, revolutions=args.revolutions,
         airspeed_m_s=args.airspeed, density_kg_m3=args.density, sector=args.sector, axis=args.axis, zones=args.zones,
@@ -83,9 +84,9 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     found = load.document(args.files, args.format, choice, made, insist)
     wrote = ""
-    if args.out and found["runs"]:
+    if args.run_toml and found["runs"]:
         made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
-        wrote = cfd_options.write_run(made, args.out).as_posix()
+        wrote = cfd_options.write_run(made, args.run_toml).as_posix()
     view = _beside(args, wrote)
     if view is not None:
         found["prediction"] = view.document()

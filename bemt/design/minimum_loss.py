@@ -141,14 +141,15 @@ def ducted_disk(thrust_N: float, airspeed_m_s: float, flow: DuctFlow, rho: float
     """
     from scipy.optimize import brentq
 
-    V = airspeed_m_s
+    V, k = airspeed_m_s, flow.wake_ratio * flow.contraction
+    idle = flow.wake_ratio * flow.capture * V
 
-    def mass(jet: float) -> float:
-        return rho * flow.area * flow.wake_ratio * (flow.capture * V + flow.contraction * (jet - V))
+    def jet(w: float) -> float:
+        return float(flow.jet_speed(np.asarray(w), np.asarray(V)))
 
-    fast = V + math.sqrt(thrust_N / (rho * flow.area * flow.wake_ratio * flow.contraction)) + 1e-6
-    jet = float(brentq(lambda v: mass(v) * (v - V) - thrust_N, V, 2.0 * fast))
-    return 0.5 * mass(jet) * (jet**2 - V**2)
+    fast = idle + math.sqrt(k * thrust_N / (rho * flow.area)) + 1e-6
+    w = float(brentq(lambda w: rho * flow.area * w * (jet(w) - V) - thrust_N, idle, 2.0 * fast))
+    return 0.5 * rho * flow.area * w * (jet(w) ** 2 - V**2)
 
 
 def sheet_speed(circulation: ArrayLike, r: ArrayLike, blades: int, phi: ArrayLike, F: ArrayLike) -> Array:

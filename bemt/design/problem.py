@@ -318,12 +318,10 @@ class Problem:
         """What each element adds to the duct's sums, (5, P, N): mass, jet, stator, spin, whirl; as the kernel does."""
         flow, s, rho = self.flow, self.shape, float(self.need.air.rho)
         assert flow is not None
-        wake = 1.0 / (flow.wake_ratio * flow.contraction)
-        stream = flow.capture / flow.contraction - 1.0
         area = 2.0 * math.pi * s.r * s.dr
         w, v_t = e[_AXIAL], e[_SWIRL]
         mass = rho * np.abs(w) * area
-        jet = mass * (wake * w - stream * V[:, None])
+        jet = mass * flow.jet_speed(w, V[:, None])
         stator = flow.stator * 2.0 * rho * np.maximum(v_t, 0.0) ** 2 * area
         return np.stack([mass, jet, stator, 4.0 * v_t**2 * s.dr / s.r, 4.0 * mass * v_t**2])
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bemt import readers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
@@ -148,10 +149,20 @@ def _setup(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
     return out
 
 
+def _is_run(path: Path) -> bool:
+    """Whether a file is one that `write_run` may replace."""
+    try:
+        return readers.detect(path) == "cfd_run"
+    except InputError:
+        return False
+
+
 def write_run(run: RunToml, out: str) -> Path:
     """Write ``run.toml``; its files are named relative to it."""
     path = Path(out)
     path = path if path.suffix == ".toml" else path / "run.toml"
+    if path.is_file() and not _is_run(path):
+        raise InputError(Fault("--out", "", f"{path.as_posix()}, which is no run", "a new name, or a run to replace"))
     path.parent.mkdir(parents=True, exist_ok=True)
     files = tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in run.run.files)
     document: Mapping[str, Any] = run.model_dump(exclude_unset=True) | {
