@@ -13,7 +13,7 @@ from typing import Any
 from bemt.base.units import INCH
 from bemt.case import load_case
 from bemt.design.blade_design import Design, design_blade
-from bemt.design.requirement import Point
+from bemt.design.requirement import DesignPoint
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / "design.md"
@@ -24,23 +24,23 @@ class Target:
     """A request in words, as points and as options."""
 
     words: str
-    points: tuple[Point, ...]
+    points: tuple[DesignPoint, ...]
     diameter_in: float | None
     more: dict[str, Any] = field(default_factory=dict)
 
 
 TARGETS = (
-    Target("6 N at 15 m/s, 10 in", (Point(6.0, 15.0),), 10.0),
-    Target("6 N static, 10 in", (Point(6.0, 0.0),), 10.0),
-    Target("1.5 N at 10 m/s, 5 in, 3 blades", (Point(1.5, 10.0),), 5.0, {"blades": 3}),
-    Target("27 N static, 18 in", (Point(27.0, 0.0),), 18.0),
-    Target("20 N at 25 m/s, 14 in", (Point(20.0, 25.0),), 14.0),
-    Target("8 N at 30 m/s, 9 in", (Point(8.0, 30.0),), 9.0),
-    Target("60 N at 20 m/s, 22 in, 3 blades", (Point(60.0, 20.0),), 22.0, {"blades": 3}),
-    Target("4 N at 12 m/s, 10.5 in, at 5000 rev/min", (Point(4.0, 12.0, 5000.0),), 10.5),
+    Target("6 N at 15 m/s, 10 in", (DesignPoint(6.0, 15.0),), 10.0),
+    Target("6 N static, 10 in", (DesignPoint(6.0, 0.0),), 10.0),
+    Target("1.5 N at 10 m/s, 5 in, 3 blades", (DesignPoint(1.5, 10.0),), 5.0, {"blades": 3}),
+    Target("27 N static, 18 in", (DesignPoint(27.0, 0.0),), 18.0),
+    Target("20 N at 25 m/s, 14 in", (DesignPoint(20.0, 25.0),), 14.0),
+    Target("8 N at 30 m/s, 9 in", (DesignPoint(8.0, 30.0),), 9.0),
+    Target("60 N at 20 m/s, 22 in, 3 blades", (DesignPoint(60.0, 20.0),), 22.0, {"blades": 3}),
+    Target("4 N at 12 m/s, 10.5 in, at 5000 rev/min", (DesignPoint(4.0, 12.0, 5000.0),), 10.5),
     Target("6 N at 15 m/s for 80 % of the time, 10 N static for 20 %, 11 in",
-           (Point(6.0, 15.0, None, 0.8), Point(10.0, 0.0, None, 0.2)), 11.0),
-    Target("10 N static in the duct of `cases/ds30`", (Point(10.0, 0.0),), None, {"duct": "ds30"}),
+           (DesignPoint(6.0, 15.0, None, 0.8), DesignPoint(10.0, 0.0, None, 0.2)), 11.0),
+    Target("10 N static in the duct of `cases/ds30`", (DesignPoint(10.0, 0.0),), None, {"duct": "ds30"}),
 )  # fmt: skip
 LIKE_A_LABEL = {"material": "pa6_gf", "stall_margin": 0.0}
 """What propellers on sale are made of, and the only limit of lift that they keep."""

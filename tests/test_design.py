@@ -16,7 +16,7 @@ from bemt.commands.cli import main
 from bemt.design import design_answer
 from bemt.design.best_label import standard
 from bemt.design.optimise import optimise
-from bemt.design.requirement import Point, point_of
+from bemt.design.requirement import DesignPoint, point_of
 from bemt.design.shape import CONTROLS
 
 T, V, RPM, D_IN = 6.0, 15.0, 7000.0, 10.0
@@ -178,7 +178,7 @@ def test_all_faults_come_at_once(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("text", ["thrust=6,airspeed", "thrust=6,thrust=7", "airspeed=5", "speed=3", "thrust=six", ""])
 def test_points_are_read_or_refused(text: str) -> None:
-    assert point_of(" thrust = 6 , rpm=7000") == Point(6.0, 0.0, 7000.0, 1.0)
+    assert point_of(" thrust = 6 , rpm=7000") == DesignPoint(6.0, 0.0, 7000.0, 1.0)
     with pytest.raises(InputError):
         point_of(text)
 

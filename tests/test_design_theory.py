@@ -17,7 +17,7 @@ from bemt.design import optimise as search
 from bemt.design.materials import MATERIALS, SectionStrength, stress
 from bemt.design.minimum_loss import actuator_disk, minimum_loss, sheet_speed, without_drag
 from bemt.design.problem import _CL, _W, Problem
-from bemt.design.requirement import Point, required
+from bemt.design.requirement import DesignPoint, required
 from bemt.design.shape import CONTROLS
 from bemt.effects import from_text
 from bemt.effects.tip_loss import TipLoss
@@ -113,7 +113,7 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     model = Model(
         Rotor(blade, B), [(0.75, linear_polar(cd=1e-6))], effects=(from_text("swirl"), TipLoss(sheets="disk"))
     )
-    need = required([Point(T, V, rpm)], 2 * R, 0.1, B, Air.from_density(), material="al6061", stall_margin=0.0)
+    need = required([DesignPoint(T, V, rpm)], 2 * R, 0.1, B, Air.from_density(), material="al6061", stall_margin=0.0)
     problem, x = search.problem_of(model, need, blade)
     found = search.optimise(problem, x)
     ideal = minimum_loss(T, V, rpm, B, R, 0.1 * R, without_drag)
@@ -135,7 +135,7 @@ def _open_problem() -> tuple[Problem, np.ndarray]:
     from bemt.sections.neuralfoil import neuralfoil_polar
 
     model = Model(Rotor(blade, 2), [(0.75, neuralfoil_polar(naca("4412")))])
-    points = [Point(6.0, 20.0), Point(8.0, 5.0, 9000.0)]
+    points = [DesignPoint(6.0, 20.0), DesignPoint(8.0, 5.0, 9000.0)]
     need = required(points, 2 * R, 0.15, 2, Air.from_density(), static_thrust_N=12.0)
     return search.problem_of(model, need, blade)
 
@@ -143,7 +143,7 @@ def _open_problem() -> tuple[Problem, np.ndarray]:
 def _ducted_problem(project) -> tuple[Problem, np.ndarray]:
     case = load_case(project / "cases/ds30/case.toml")
     model = prepare_case(case)
-    need = required([Point(15.0, 10.0, 45_000.0)], case.diameter_m, 0.368, 11, case.air(), material="pa12")
+    need = required([DesignPoint(15.0, 10.0, 45_000.0)], case.diameter_m, 0.368, 11, case.air(), material="pa12")
     return search.problem_of(model, need, model.rotor.blade)
 
 

@@ -61,11 +61,11 @@ def run(args: argparse.Namespace) -> int:
     from bemt.case import load_case, new_folder
     from bemt.design import design_answer
     from bemt.design.blade_design import design_blade, name_of
-    from bemt.design.requirement import Point, point_of
+    from bemt.design.requirement import DesignPoint, point_of
 
     points = [point_of(text) for text in args.point]
     if args.thrust is not None:
-        points.insert(0, Point(args.thrust, args.airspeed, args.rpm))
+        points.insert(0, DesignPoint(args.thrust, args.airspeed, args.rpm))
     elif args.rpm is not None or args.airspeed:
         raise InputError(Fault("--thrust", "", "nothing", "a thrust [N] with --airspeed and --rpm"))
     duct = load_case(args.duct) if args.duct else None

@@ -24,7 +24,7 @@ from bemt.design import optimise as search
 from bemt.design.best_label import Label, best_labels
 from bemt.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
 from bemt.design.problem import Values
-from bemt.design.requirement import Point, Requirement, required
+from bemt.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
     from bemt.bem.model import Model
@@ -137,17 +137,17 @@ class Design:
         return text(self)
 
 
-def name_of(point: Point, diameter_m: float) -> str:
+def name_of(point: DesignPoint, diameter_m: float) -> str:
     """Name of the case of a blade.
 
-    >>> name_of(Point(6.5, 15.0), 0.254)
+    >>> name_of(DesignPoint(6.5, 15.0), 0.254)
     'design_10in_6p5N'
     """
     return f"design_{diameter_m / INCH:.3g}in_{point.thrust_N:.3g}N".replace(".", "p")
 
 
 def design_blade(
-    points: Sequence[Point], diameter_m: float | None = None, blades: int | None = None, *,
+    points: Sequence[DesignPoint], diameter_m: float | None = None, blades: int | None = None, *,
     section: str | None = None, hub_ratio: float | None = None, density_kg_m3: float | None = None,
     duct: Case | None = None, robust: bool = False, progress: Progress | None = None, **limits: Any,
 ) -> Design:  # fmt: skip
@@ -364,7 +364,7 @@ def _settled(key: str, changes: Mapping[str, Any]) -> bool:
     return any(key == done or key.startswith(f"{done}.") for done in changes)
 
 
-def case_files(base: Case, found: search.Found, points: Sequence[Point]) -> dict[str, bytes]:
+def case_files(base: Case, found: search.Found, points: Sequence[DesignPoint]) -> dict[str, bytes]:
     """Folder of the blade that was found."""
     import tomlkit
 

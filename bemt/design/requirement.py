@@ -25,7 +25,7 @@ WIDEST = 0.3
 
 
 @dataclass(frozen=True)
-class Point:
+class DesignPoint:
     """One operating point.
 
     Parameters
@@ -90,7 +90,7 @@ class Requirement:
         State of the air.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[DesignPoint, ...]
     R: float
     Rhub: float
     blades: int
@@ -105,11 +105,11 @@ class Requirement:
         return 60.0 * tip / (2.0 * math.pi * self.R)
 
 
-def point_of(text: str) -> Point:
+def point_of(text: str) -> DesignPoint:
     """Read ``thrust=6,airspeed=15,rpm=7000,weight=1``; rpm and weight may be left out.
 
     >>> point_of("thrust=6,airspeed=15")
-    Point(thrust_N=6.0, airspeed_m_s=15.0, rpm=None, weight=1.0)
+    DesignPoint(thrust_N=6.0, airspeed_m_s=15.0, rpm=None, weight=1.0)
     """
     names = {"thrust": "thrust_N", "airspeed": "airspeed_m_s", "rpm": "rpm", "weight": "weight"}
     found: dict[str, float] = {}
@@ -128,11 +128,11 @@ def point_of(text: str) -> Point:
         faults.append(Fault("--point", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
     if faults:
         raise InputError(faults)
-    return Point(**found)
+    return DesignPoint(**found)
 
 
 def required(
-    points: Sequence[Point], diameter_m: float, hub_ratio: float, blades: int, air: Air, *,
+    points: Sequence[DesignPoint], diameter_m: float, hub_ratio: float, blades: int, air: Air, *,
     static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float | None = None,
     min_thickness_mm: float = 0.0, max_tip_mach: float = 0.8, stall_margin: float = STALL_MARGIN,
     material: str = "pla", safety: float = SAFETY,
@@ -185,7 +185,7 @@ def required(
         raise InputError(list(dict.fromkeys(faults)))
     every = tuple(points)
     if static_thrust_N is not None:
-        every = (*every, Point(static_thrust_N, 0.0, static_rpm, 0.0))
+        every = (*every, DesignPoint(static_thrust_N, 0.0, static_rpm, 0.0))
     limits = Limits(
         min_chord_mm * 1e-3, min_thickness_mm * 1e-3, max_tip_mach, stall_margin, MATERIALS[material], safety
     )

@@ -18,7 +18,7 @@ from bemt.compare.drive_laws import Judgement
 from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.diagnose import evidence, gate, rules, signatures, verdict
 from bemt.diagnose.assemble import assemble
-from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, Curve, LawRotor, Laws, law_part
+from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
 from bemt.diagnose.record import Record, air_of, thinned
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def _without_strays(record: Record, D: float) -> Record:
     for channel, v in record.measured.items():
         y = v / unit
         good = np.isfinite(y)
-        off = np.where(good, y - Curve.of(y, J, record.rpm, (-1.0, 0.0, 0.5))(J, record.rpm), 0.0)
+        off = np.where(good, y - CoefficientCurve.of(y, J, record.rpm, (-1.0, 0.0, 0.5))(J, record.rpm), 0.0)
         middle = float(np.median(off[good]))
         spread = 1.48 * float(np.median(np.abs(off[good] - middle)))
         far = np.abs(off - middle) > max(_FAR * spread, _FAR_SHARE * float(np.max(np.abs(y[good]))))

@@ -20,7 +20,7 @@ from bemt.diagnose.problem import Part
 from bemt.diagnose.record import Record
 from bemt.effects.base import Effect, Flow, Loads, Reading
 
-__all__ = ["BLADE_LAWS", "Curve", "LawPart", "LawRotor", "law_part"]
+__all__ = ["BLADE_LAWS", "CoefficientCurve", "LawPart", "LawRotor", "law_part"]
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ VARIANTS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class CoefficientCurve:
     """Coefficient over V/(n D) and ln n, fitted to one recording; beyond it a straight line over J, level over n."""
 
     weights: Array
@@ -99,7 +99,7 @@ class Curve:
     near: tuple[Array, Array, Array] | None = None
 
     @classmethod
-    def of(cls, coefficient: Array, J: Array, rpm: Array, at_rest: tuple[float, float, float]) -> Curve:
+    def of(cls, coefficient: Array, J: Array, rpm: Array, at_rest: tuple[float, float, float]) -> CoefficientCurve:
         """Least squares with weak priors for slopes and bends (ridge).
 
         ``at_rest``: slope and bend over J, shares of the coefficient, of a rotor whose recording has no airspeed, and
@@ -130,7 +130,7 @@ class Curve:
         )[0]
         return replace(out, weights=mean + sd * found)._bent(c, J, x)
 
-    def _bent(self, c: Array, J: Array, x: Array) -> Curve:
+    def _bent(self, c: Array, J: Array, x: Array) -> CoefficientCurve:
         """With what neighbours in speed and J share beyond the line, where they scatter by less (kriging)."""
         left = c - self(J, np.exp(x))
         order = np.lexsort((x, np.round(J, 2)))
@@ -170,7 +170,7 @@ class LawRotor:
     """Stands for the solver's rotor: loads at points with effects on."""
 
     diameter_m: float
-    curves: Mapping[str, Curve]
+    curves: Mapping[str, CoefficientCurve]
     laws: Laws = LAWS
     duct: Any = None  # as of `bemt.bem.Model`: a recording does not say whether there is one
 
@@ -192,7 +192,7 @@ class LawRotor:
             "torque_Nm": (-falls / last, (laws.last_torque - 1.0 + falls) / last**2, last),
         }
         J = record.V / (n * D)
-        return cls(D, {k: Curve.of(v, J, record.rpm, at_rest[k]) for k, v in c.items()}, laws)
+        return cls(D, {k: CoefficientCurve.of(v, J, record.rpm, at_rest[k]) for k, v in c.items()}, laws)
 
     def flow(self, record: Record) -> Flow:
         """Conditions of a recording with the loads of the curves."""

@@ -8,7 +8,7 @@ from bemt.effects.base import Effect, Flow, Loads, Parameter
 
 
 @dataclass(frozen=True)
-class Propeller(Effect):
+class AnotherPropeller(Effect):
     """Blades of another make: both loads change by shares of their own.
 
     Notes

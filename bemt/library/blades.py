@@ -83,16 +83,16 @@ def design(
     """
     from bemt.case import load_case
     from bemt.design.blade_design import design_blade
-    from bemt.design.requirement import Point
+    from bemt.design.requirement import DesignPoint
 
     with in_words_of_the_library():
-        asked = [] if thrust_N is None else [Point(thrust_N, airspeed_m_s, rpm)]
+        asked = [] if thrust_N is None else [DesignPoint(thrust_N, airspeed_m_s, rpm)]
         for i, point in enumerate(points):
             if len(point) != 4:
                 raise InputError(
                     Fault("", f"points[{i}]", repr(point), "(thrust_N, airspeed_m_s, rpm or None, weight)")
                 )
-            asked.append(Point(*point))
+            asked.append(DesignPoint(*point))
         return design_blade(
             asked, None if diameter_in is None else diameter_in * INCH, blades, section=section, hub_ratio=hub_ratio,
             density_kg_m3=density_kg_m3, duct=None if duct is None else load_case(path_text("duct", duct)),
