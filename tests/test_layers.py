@@ -69,7 +69,6 @@ MAY: dict[str, set[str]] = {
     "bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
     "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.folder": {"files"},
     "bemt.sweep.batch": {"files", "environment"},
-    "bemt.compare.bench.*": {"files", "clock", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
     "bemt.diagnose.interval_scales": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},

@@ -49,7 +49,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
     thesis = (
         "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
-        "bemt reproduce where those data are."
+        "reports/studies/reproduce.py where those data are."
     )
     told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
     for key, title, top, found in (

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import bemt
 from bemt.base.errors import InputError
 from bemt.case import Case, find_cases, load_case
-from bemt.compare.thesis import ORIGIN
 from bemt.report import curves, trends
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.fidelity import fidelities
@@ -25,6 +23,7 @@ __all__ = ["attach_diagnoses", "gather"]
 Progress = Callable[[str], None]
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
+REPRODUCED = {"section", "quantity", "stated", "ours", "unit", "status", "note"}
 ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
 
@@ -43,12 +42,12 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         if case is not None and result["rows"]:
             solved.append((case, page))
     tell("report: trends")
-    of_thesis = any(result.get("origin") == ORIGIN for result in document["cases"])
+    of_thesis = any(result.get("origin") == trends.ORIGIN for result in document["cases"])
     book = {
         "version": bemt.__version__,
         "cases": pages,
         "trends": _trends(solved, document["cases"]),
-        "reproduction": _reproduction() if of_thesis else [],
+        "reproduction": _reproduction(out) if of_thesis else [],
         "exit_code": document["exit_code"],
         "cfd": cfd_runs(out),
         "fidelities": fidelities(out, [str(page["result"]["name"]) for page in pages]),
@@ -101,15 +100,17 @@ def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Map
             family = trends.families(base)
         except (InputError, GeometryError, ValueError):
             family = {}
-    thesis = [result for result in results if result.get("origin") == ORIGIN]  # the robot is that of the thesis
+    thesis = [result for result in results if result.get("origin") == trends.ORIGIN]  # the robot is that of the thesis
     return {"family": family, "choice": trends.choice(thesis), "moments": trends.moments(thesis)}
 
 
-def _reproduction() -> list[dict[str, Any]]:
-    """Give the numbers of the thesis beside ours, without the database statistics, which need data from outside."""
-    from bemt.compare import reproduce
-
-    return [asdict(item) for item in reproduce.items(None) if not item.status.startswith("not checked")]
+def _reproduction(out: Path) -> list[Mapping[str, Any]]:
+    """Numbers of the thesis beside ours, of a study in the folder of results; the database statistics left out."""
+    document = read_json(out / "reproduction.json")
+    if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.reproduce/"):
+        return []
+    rows = [item for item in document.get("items", []) if isinstance(item, Mapping) and item.keys() >= REPRODUCED]
+    return [item for item in rows if not str(item["status"]).startswith("not checked")]
 
 
 def attach_diagnoses(book: dict[str, Any], out: Path) -> None:

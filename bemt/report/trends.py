@@ -21,6 +21,8 @@ from geometry.common import GeometryError
 
 __all__ = ["ROBOT", "choice", "families", "moments"]
 
+ORIGIN = "Cahill 2025"
+"""What a case of the source thesis states as its ``origin``."""
 ROBOT = {"mass_kg": 6.5, "drives": 2, "wanted_kgf": 6.0, "arm_m": 0.2, "fan_mass_kg": 0.4}
 """Of the source thesis; `fan_mass_kg` is the DS-30 (duct 100 g, motor 300 g), the only drive whose mass it gives."""
 N, COARSE = 15, 20

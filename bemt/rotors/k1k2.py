@@ -50,14 +50,14 @@ U_CLAIMED = 0.13
 """Relative standard uncertainty claimed by [1]: 68 % of static points within 13 % [-]."""
 U_MEASURED = 0.196
 """Standard deviation of F/measured on 4122 static points of 248 UIUC propellers, nominal D and p, nothing fitted [-];
-`bemt.compare.reproduce` recomputes it where the data are."""
+`reports/studies/reproduce.py` recomputes it where the data are."""
 M_TIP_LIMIT = 0.9
 """Tip Mach number above which a model without Mach number is flagged [-]: upper end of the tests of [3]."""
 ZERO_THRUST_MEASURED = 1.19
 """Measured zero-thrust J over P/D, mean over UIUC propellers [-]; the formula says 1."""
 FLIGHT_RATIO = ((0.1, 0.3, 0.5, 0.7, 0.9), (0.86, 0.77, 0.64, 0.53, 0.31))
 """Median F/measured in flight [-] over J/(P/D) [-], bins of 0.2, 9257 points of 128 UIUC propellers of volumes 1-2,
-nominal D and p; `bemt.compare.reproduce` recomputes it where the data are."""
+nominal D and p; `reports/studies/reproduce.py` recomputes it where the data are."""
 
 
 def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:

@@ -4,8 +4,8 @@ A reading is f(z) + bias + rest + noise. The latent numbers z of `bemt.rotors.la
 with a size that differs from rotor to rotor (a mixture of sizes at quantiles of Student's t: heavy tails). The rest is
 a Gaussian process over the angle of attack at 0.75 R and ln Re: errors of the section tables, which enter as a change
 of zero-lift angle and of ln(drag) through the solver's own slopes, a remainder of CT and CP, and a part at rest that
-flight does not share. All numbers are fitted by maximum likelihood to measured propellers (`bemt.rotors.fit`); the file
-beside this module holds them and where they come from.
+flight does not share. All numbers are fitted by maximum likelihood to measured propellers
+(`reports/studies/population_fit.py`); the file beside this module holds them and where they come from.
 
 What the label says of the blade angle is weighed against the stations by their variances: stations err by s, the label
 lies below the blade angle by the offset usual for its family (known to tau where the family is unknown) and errs by l.

@@ -11,23 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.readers._uiuc_names import class_of
-from bemt.rotors.conditioning import condition
-from bemt.rotors.fit import MeasuredRotor, law
-from bemt.rotors.latents import Prior
+from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside
-from bemt.rotors.population import WEIGHTS, Population, label_angle_deg
+from bemt.rotors.population import Population, label_angle_deg
 from bemt.rotors.predict import predict, sense
-from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.rotors.reference import ReferenceRun
 from bemt.sections import rule as section_rule
-from bemt.validate.points import J_SHARE, Rows, Solver, Stations, counted, rows
+from bemt.validate.points import Rows, Solver, Stations, counted, rows
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
     from bemt.readers.uiuc import UiucPropeller
 
 Array = NDArray[np.float64]
-RUN_POINTS = 24
-"""Points of a run on which a rotor is conditioned [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRotor(Sensed):
+    """One measured propeller beside the solver at P readings; ``y`` (2, P) are CT and CP measured [1]."""
+
+    name: str
+    family: str
+    section: str
+    gap_deg: float
+    static: NDArray[np.bool_]
+    y: Array
+    blade_class: str | None = None
+    known_from: str = "stations"
+
+
+def law(p: Population, m: MeasuredRotor) -> Prior:
+    """What is known of a propeller before it is measured."""
+    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,40 +88,12 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     return Observed(propeller, solve, drawn, record)
 
 
-def conditioned(seen: Observed, p: Population, on: str) -> Expected:
-    """Expectation after conditioning on points of one kind; those of the other count.
-
-    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
-    too.
-    """
-    m, drawn = seen.record, seen.drawn
-    good = counted(drawn)
-    here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
-    rpm, J = drawn.rpm[here], drawn.J[here]
-    run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
-    run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
-    if on.endswith("_and_one"):
-        middle = 0.5 * (drawn.J0_bemt if math.isfinite(drawn.J0_bemt) else float(m.J.max()) / J_SHARE)
-        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
-    prior, at, y = law(p, m), m.part(run), m.y[:, run]
-    still = m.static[run]
-    rough = np.array([[scatter(a, at.Re[still])] for a in (y - at.f)[:, still]]) * still
-    noise = noise_of_run(p, at, y, np.hypot(p.noise_sd(at), rough))
-    bias = p.bias(m)[:, run].reshape(-1)
-    found = condition(
-        lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
-    )
-    reference = ReferenceRun.given(at, noise, y.reshape(-1), found)
-    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
-    return _lying(seen, p, posterior, reference)
-
-
 def expect(seen: Observed, p: Population) -> Expected:
     """Expectation of a propeller and how its points lie in it."""
-    return _lying(seen, p, law(p, seen.record))
+    return lying(seen, p, law(p, seen.record))
 
 
-def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
+def lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
     """How the points lie in a prediction."""
     m = seen.record
     now = rows(seen.propeller, seen.solve, prior.mean)

@@ -2,7 +2,7 @@
 
 Only facts and figures of T. Cahill, "System Identification of Thrust and Torque Characteristics for a Bipedal Robot
 with Integrated Propulsion", MS thesis, Northeastern University, April 2025, and of public data they were checked with.
-Nothing here prints; `bemt.compare.reproduce` does.
+Nothing here prints; `reproduce.py` does.
 """
 
 from __future__ import annotations
@@ -20,9 +20,6 @@ from bemt import coefficients as co
 from bemt.base import unit_errors
 from bemt.base.units import G0, INCH, KGF, LBF
 from bemt.rotors import k1k2 as k
-
-ORIGIN = "Cahill 2025"
-"""What a case of the thesis states as its ``origin``."""
 
 REPRODUCED = "reproduced"
 ROUNDING = "reproduced within rounding"

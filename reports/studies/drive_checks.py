@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import drive_identify as identify
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
-from bemt.drive import identify, transient
+from bemt.drive import transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import quadratic
 
