@@ -37,25 +37,16 @@ _RAD_PER_RPM = math.pi / 30.0
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Loads at one point, and how they change.
+    """Loads at one point, and how they change."""
 
-    Attributes
-    ----------
-    stations : Stations
-        Blade elements. [m], [rad]
-    thrust_N, torque_Nm : float
-        Rotor thrust (without duct and stator) [N] and shaft torque [N m].
-    chord, beta : (2, N) float
-        Derivatives of thrust and torque by each element's chord [N/m], [N m/m] and blade angle [N/rad], [N m/rad].
-    rpm, airspeed, density : (2,) float
-        Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity, speed of sound held) [N/unit], [N m/unit].
-    """
-
-    stations: Stations
+    stations: Stations  # Blade elements. [m], [rad]
+    # Rotor thrust (without duct and stator) [N] and shaft torque [N m]
     thrust_N: float
     torque_Nm: float
+    # (2, N) Derivatives of thrust and torque by each element's chord [N/m], [N m/m] and blade angle [N/rad], [N m/rad]
     chord: Array
     beta: Array
+    # (2,) Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity, speed of sound held) [N/unit], [N m/unit]
     rpm: Array
     airspeed: Array
     density: Array

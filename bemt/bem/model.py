@@ -55,39 +55,18 @@ PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept (:data:`PREPARED`).
-
-    Parameters
-    ----------
-    rotor : geometry.rotor.Rotor
-        Rotor.
-    polars : sequence of (float, Polar)
-        Section tables at r/R.
-    duct : DuctFlow or None
-        Duct.
-    n_stations : int
-        Blade elements [1].
-    mach_max : float
-        Largest section Mach number that occurs [1].
-    re_range : tuple of float or None
-        Section Reynolds numbers that occur; None: any [1].
-    effects : tuple of Effect
-        Physics that is on.
-    notes : tuple of str
-        Remarks of the section tables.
-    learned : callable or None
-        What a run of this rotor adds to CT and CP, (2, P), at advance ratios along the shaft and Reynolds numbers at
-        0.75 R of the rotation alone, (P,) each [1].
-    """
+    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept (:data:`PREPARED`)."""
 
     rotor: Rotor
-    polars: Sequence[tuple[float, Polar]]
+    polars: Sequence[tuple[float, Polar]]  # Section tables at r/R
     duct: DuctFlow | None = None
-    n_stations: int = 40
-    mach_max: float = 1.25
-    re_range: tuple[float, float] | None = None
-    effects: tuple[Effect, ...] = field(default_factory=standard)
-    notes: tuple[str, ...] = ()
+    n_stations: int = 40  # Blade elements [1]
+    mach_max: float = 1.25  # Largest section Mach number that occurs [1]
+    re_range: tuple[float, float] | None = None  # Section Reynolds numbers that occur; None: any [1]
+    effects: tuple[Effect, ...] = field(default_factory=standard)  # Physics that is on
+    notes: tuple[str, ...] = ()  # Remarks of the section tables
+    # What a run of this rotor adds to CT and CP, (2, P), at advance ratios along the shaft and Reynolds numbers at 0.75
+    # R of the rotation alone, (P,) each [1]
     learned: Callable[[Array, Array], Array] | None = None
     _reaching: dict[Any, Model] = field(default_factory=dict, init=False, repr=False)
 

@@ -136,18 +136,7 @@ def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any
 
 
 class CampaignRecord:
-    """Files of one campaign; every change is written whole.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-
-    Raises
-    ------
-    InputError
-        When the recording that is there is not one of ours.
-    """
+    """Files of one campaign; every change is written whole. A recording that is not one of ours is refused."""
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign

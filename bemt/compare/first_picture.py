@@ -41,33 +41,15 @@ _MARKS = (("o", canvas.BLACK), ("s", canvas.RED), ("^", canvas.GREEN), ("D", can
 
 @dataclass(frozen=True, eq=False)
 class PredictionView:
-    """Recordings beside the prediction of a case.
-
-    Attributes
-    ----------
-    case : str
-        Name of the case.
-    over : str
-        ``rpm``, or ``J`` where the advance ratio moves.
-    channels : tuple of str
-        What is drawn: thrust_N, torque_Nm; CT, CP over J.
-    recorded : tuple of Dataset
-        The points, with x, value and u under the names of the axes.
-    model : tuple of Dataset
-        The prediction at the same points; u is half the 95 % width.
-    curve : Dataset
-        The prediction along the drawn line; u is half the 95 % width.
-    notes : tuple of str
-        What the picture leaves out or simplifies.
-    """
+    """Recordings beside the prediction of a case."""
 
     case: str
-    over: str
-    channels: tuple[str, ...]
-    recorded: tuple[Dataset, ...]
-    model: tuple[Dataset, ...]
-    curve: Dataset
-    notes: tuple[str, ...]
+    over: str  # ``rpm``, or ``J`` where the advance ratio moves
+    channels: tuple[str, ...]  # What is drawn: thrust_N, torque_Nm; CT, CP over J
+    recorded: tuple[Dataset, ...]  # The points, with x, value and u under the names of the axes
+    model: tuple[Dataset, ...]  # The prediction at the same points; u is half the 95 % width
+    curve: Dataset  # The prediction along the drawn line; u is half the 95 % width
+    notes: tuple[str, ...]  # What the picture leaves out or simplifies
 
     def inside(self, channel: str) -> tuple[int, int, float]:
         """Points inside the band, points judged, and the median of recorded over predicted, less 1 [1]."""
@@ -140,25 +122,9 @@ class PredictionView:
 
 
 def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
-    """Put recordings inside the prediction band of a case.
+    """Put recordings inside the prediction band of a case; refused where no point has a speed and a load.
 
-    Parameters
-    ----------
-    case : Case
-        Case of the rotor.
-    recordings : sequence of Dataset
-        Each with ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as
-        bars.
-
-    Returns
-    -------
-    PredictionView
-        The points, the prediction at them and along a line; `sentence`, `document()` and `png()` show it.
-
-    Raises
-    ------
-    InputError
-        If no point has a speed and a load.
+    Each has ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as bars.
     """
     parts = [_usable(d) for d in recordings]
     parts = [d for d in parts if len(d)]

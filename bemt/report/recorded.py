@@ -16,23 +16,9 @@ __all__ = ["diagnose_into"]
 def diagnose_into(
     paths: Sequence[str | Path], recordings: Sequence[str], out: Path, progress: Callable[[str], None] | None = None
 ) -> None:
-    """Diagnose recordings of one case into ``out/NAME/diagnosis``; too few readings are shown beside the model.
+    """Diagnose recordings of the one case of a report into ``out/NAME/diagnosis``.
 
-    Parameters
-    ----------
-    paths : sequence of path
-        The cases of the report: one.
-    recordings : sequence of str
-        Tables, logs or CFD runs of its rotor, analysed together.
-    out : Path
-        Folder of the report.
-    progress : callable, optional
-        Told what is being done.
-
-    Raises
-    ------
-    InputError
-        If there are several cases, or a file cannot be used.
+    They are analysed together; too few readings are shown beside the model.
     """
     from bemt.compare.one_run import compare_run
     from bemt.diagnose import folder

@@ -28,21 +28,11 @@ _PAST_RUN = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """Change of CT and CP over advance ratio and Reynolds number; beyond the table as at its end.
+    """Change of CT and CP over advance ratio and Reynolds number; beyond the table as at its end."""
 
-    Attributes
-    ----------
-    J : (N,) float
-        Advance ratios [1].
-    ln_Re : (M,) float
-        Logarithm of the Reynolds number at 0.75 R of the rotation alone [1].
-    change : (2, M, N) float
-        What is added to CT and CP [1].
-    """
-
-    J: Array
-    ln_Re: Array
-    change: Array
+    J: Array  # (N,) Advance ratios [1]
+    ln_Re: Array  # (M,) Logarithm of the Reynolds number at 0.75 R of the rotation alone [1]
+    change: Array  # (2, M, N) What is added to CT and CP [1]
 
     def __call__(self, J: Array, Re: Array) -> Array:
         """Change of CT and CP at points (P,), bilinear, (2, P)."""

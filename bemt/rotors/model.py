@@ -64,31 +64,19 @@ def beta75_deg(model: Model) -> float:
 class RealRotor:
     """A real rotor at any points: expectation, tangents and covariance of CT and CP, before or after a run of it.
 
-    Attributes
-    ----------
-    solve : Solve
-        The solver with any latent numbers.
-    diameter_m, beta75_deg : float
-        Diameter [m]; blade angle at 0.75 R as drawn [deg].
-    prior : Prior
-        What is known of the latent numbers, after the run if there is one.
-    drawn : (K,) float
-        Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`].
-    reference : ReferenceRun or None
-        The run's rows.
-
     Notes
     -----
     Readings of rotors of this description have the mean `expected` and, at size 1 of the heavy tails (`Prior.sizes`,
     `Population.rest_sizes`), the covariance ``T prior.cov T^T + rest``, T and rest as `tangents` and `rest` give them.
     """
 
-    solve: Solve
+    solve: Solve  # The solver with any latent numbers
+    # Diameter [m]; blade angle at 0.75 R as drawn [deg]
     diameter_m: float
     beta75_deg: float
-    prior: Prior
-    drawn: Array
-    reference: ReferenceRun | None = None
+    prior: Prior  # What is known of the latent numbers, after the run if there is one
+    drawn: Array  # (K,) Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`]
+    reference: ReferenceRun | None = None  # The run's rows
 
     @staticmethod
     def of(model: Model, air: Air, prior: Prior, drawn: Array, reference: ReferenceRun | None = None) -> RealRotor:

@@ -24,22 +24,14 @@ _SCAN = np.linspace(0.05, 2.5, 50)
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Expectation and scatter of CT and CP of a rotor as built.
+    """Expectation and scatter of CT and CP of a rotor as built."""
 
-    Attributes
-    ----------
-    mean : (2, P) float
-        Expectation of CT and CP [1].
-    latent_sd, rest_sd, noise_sd : (2, P) float
-        Standard deviations from the latent numbers at size 1, from the solver's rest, from single readings [1].
-    sizes, weights, rest_sizes, rest_weights : (S,), (S,), (R,), (R,) float
-        Heavy tails of the latent part and of rest and readings.
-    """
-
-    mean: Array
+    mean: Array  # (2, P) Expectation of CT and CP [1]
+    # (2, P) Standard deviations from the latent numbers at size 1, from the solver's rest, from single readings [1]
     latent_sd: Array
     rest_sd: Array
     noise_sd: Array
+    # (S,), (S,), (R,), (R,) Heavy tails of the latent part and of rest and readings
     sizes: Array
     weights: Array
     rest_sizes: Array
