@@ -80,7 +80,7 @@ MAY: dict[str, set[str]] = {
     "bemt.design.motors_file": {"files"},
     "bemt.drive.*_file|bemt.drive.*_folder|bemt.drive.*_result": {"files"},
     "bemt.report|bemt.report.*": {"files"},
-    "geometry.export|geometry.picture*": {"files"},
+    "geometry.export": {"files"},
 }
 
 # What makes the data of the proof must know nothing of what is proved, not even through others.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "Moved", "elements", "gradient", "loads", "moved", "only"]
+__all__ = ["Gradient", "PerturbedRotors", "elements", "gradient", "loads", "moved", "only"]
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def loads(
     return float(both[0].sum()), float(both[1].sum())
 
 
-class Moved(NamedTuple):
+class PerturbedRotors(NamedTuple):
     """The rotor, and rotors whose chords (angles) are all a little smaller and larger, with the distance between."""
 
     base: Prepared
@@ -116,7 +116,9 @@ class Moved(NamedTuple):
     beta: tuple[Prepared, Prepared, Array]
 
 
-def moved(model: Model, effects: Sequence[Effect], stations: Stations | None = None, step: float = STEP) -> Moved:
+def moved(
+    model: Model, effects: Sequence[Effect], stations: Stations | None = None, step: float = STEP
+) -> PerturbedRotors:
     """Rotors around the one to be differentiated: what differs between them is the derivative, element by element."""
     chosen = _inside(effects)
     s = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
@@ -128,7 +130,7 @@ def moved(model: Model, effects: Sequence[Effect], stations: Stations | None = N
         low, high = (made(s._replace(**{key: getattr(s, key) + sign * width})) for sign in (-1.0, 1.0))
         return low, high, 2.0 * width
 
-    return Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
+    return PerturbedRotors(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
 
 
 def only(model: Model, effects: Sequence[Effect], stations: Stations) -> Prepared:
