@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.common import Array, GeometryError
-from geometry.cylinder_cut import blades
 from geometry.section_fit import nose_first
+from geometry.slicing import blades
 
 Faces = NDArray[np.int64]
 PROBES = (0.45, 0.6, 0.75, 0.88, 0.955)  # r/R at which candidates for the axis are tried

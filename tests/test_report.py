@@ -820,7 +820,7 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
 
 
 def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.report.fidelity import fidelities, fidelity_sections
+    from bemt.report.cfd import fidelities, fidelity_sections
 
     folder = tmp_path / "disk"
     folder.mkdir()

@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.base.cache import content_key
-from bemt.base.kept import Kept
+from bemt.base.cache import Kept, content_key
 from bemt.bem import packing as arrays
 from bemt.bem import solver
 from bemt.bem.duct import DuctFlow, duct_flow

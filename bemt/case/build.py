@@ -14,8 +14,7 @@ from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case.schema import AirTable, CaseFile
-from geometry.airfoil import Airfoil, naca, naca4
-from geometry.airfoil_file import parse_dat
+from geometry.airfoil import Airfoil, naca, naca4, parse_dat
 from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around

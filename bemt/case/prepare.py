@@ -19,7 +19,7 @@ from bemt.bem.model import Model, acts_on_points
 from bemt.case.load import Assumption
 from bemt.effects.tip_gap import GAP_LOSS, TipGap
 from bemt.rotors import k1k2
-from bemt.rotors.learned import with_run
+from bemt.rotors.model import with_run
 from bemt.sections import polars
 from bemt.sections.neuralfoil import neuralfoil_polar
 

@@ -42,8 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare; 1 when points did not converge."""
     from bemt.base.tables import json_text
-    from bemt.validate.propellers import effects_without, validate, where, write
-    from bemt.validate.text import text
+    from bemt.validate.propellers import effects_without, text, validate, where, write
 
     effects = effects_without(args.off)
     found = [where(name) for name in args.folders]

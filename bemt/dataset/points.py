@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import plot as pictures
 from bemt.dataset import tables
 from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
@@ -455,7 +454,7 @@ class Dataset:
         >>> d.plot().get_xlabel()
         'rpm'
         """
-        return pictures.plot(self, x, y, ax)
+        return tables.plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Convert to one plain dictionary per point, for JSON.

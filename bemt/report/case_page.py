@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.audit_block import audit_parts
+from bemt.report.cfd import audit_parts
 from bemt.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.report.rotor_view import viewer

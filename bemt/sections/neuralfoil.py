@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import cache
+from bemt.base.cache import Kept
 from bemt.base.errors import needs
-from bemt.base.kept import Kept
 from bemt.sections import four_digit, rule
 from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
 from bemt.sections.four_digit import RawPolar
