@@ -17,7 +17,8 @@ from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws, helix
 from geometry.mesh import MeshModel, Options, build, rotor_mesh
 from geometry.rotor import Rotor
-from geometry.slicing import FoundRotor, blades, find_rotor
+from geometry.rotor_axis import blades
+from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
 from geometry.surface import surfaces
 
