@@ -26,13 +26,19 @@ FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)
 
 
+def coefficients(CT: float, CQ: float, D: float, *more: float) -> rotor_table.RotorMap:
+    """Rotor of constant coefficients in 1.225 kg/m3; more: inertia, solidity."""
+    turn = (2.0 * math.pi) ** 2
+    return rotor_table.quadratic(1.225 * CT * D**4 / turn, 1.225 * CQ * D**5 / turn, D, 1.225, *more)
+
+
 def drive(**changes: object) -> Drive:
     """Ordinary 4S drive of an 8 in propeller."""
     parts = {
         "battery": Battery(4, 0.02, 2.2),
         "esc": Esc(resistance_ohm=0.005, idle_A=0.05),
         "motor": Motor(1100.0, 0.06, 0.8, 1.2e-5, 25.0, 4.0),
-        "rotor": rotor_table.from_coefficients(0.11, 0.0082, 0.2032, 1.225, 1.5e-5, 0.09),
+        "rotor": coefficients(0.11, 0.0082, 0.2032, 1.5e-5, 0.09),
     }
     return Drive(**{**parts, **changes})  # type: ignore[arg-type]
 
@@ -274,7 +280,7 @@ def test_faults_of_the_drive_come_all_at_once(
 
 def test_steps_need_something_that_turns() -> None:
     with pytest.raises(InputError, match="inertia_kg_m2"):
-        still = drive(motor=Motor(1100.0, 0.06), rotor=rotor_table.from_coefficients(0.1, 0.01, 0.2))
+        still = drive(motor=Motor(1100.0, 0.06), rotor=coefficients(0.1, 0.01, 0.2))
         transient.simulate(still, [(0.0, 1200.0)], 1.0)
 
 

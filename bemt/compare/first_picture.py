@@ -6,7 +6,6 @@ numerics). Every point is judged at its own speed, airspeed and density; the dra
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -99,9 +98,7 @@ class PredictionView:
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
             words = (self.sentence.replace(" %", "\N{NO-BREAK SPACE}%"), *self.notes[:2])
             figure.suptitle("\n".join(line for w in words for line in textwrap.wrap(w, _WIDE)), fontsize=9)
-            page = io.BytesIO()
-            figure.savefig(page, format="png", dpi=canvas.DPI, metadata={"Software": None})
-        return page.getvalue()
+            return canvas.png(figure, canvas.DPI)
 
     def _panel(self, axis: Any, channel: str) -> None:
         x, y, half = self.curve[self.over], self.curve[channel], self.curve.u[channel]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base import units
+from bemt.base.canvas import CYCLE
 from bemt.base.errors import Fault, InputError, needs
 
 if TYPE_CHECKING:
@@ -73,10 +74,6 @@ def to_html(d: Dataset) -> str:
     return f'{what}<div style="overflow-x:auto"><table class="bemt"><tr>{head}</tr>{rows}</table></div>{notes}'
 
 
-OKABE_ITO = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-"""Colours that colour-blind readers tell apart (Okabe and Ito 2008)."""
-
-
 def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
     """Draw channels over another one, with bands where uncertainties are known: :meth:`Dataset.plot`."""
     import matplotlib.pyplot as plt
@@ -92,7 +89,7 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
     beside, points = ax is not None, d.kind in ("bench", "cfd", "vendor")
     if ax is None:
         ax = plt.subplots(layout="constrained")[1]
-        ax.set_prop_cycle(color=OKABE_ITO)
+        ax.set_prop_cycle(color=CYCLE)
     drawn = [line.get_gid() for line in ax.lines]
     colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
     speeds = np.unique(d["rpm"]) if "rpm" in d and x != "rpm" else np.array([np.nan])

@@ -95,8 +95,8 @@ def _model(f: th.ThesisFacts, uiuc: dict[str, Any] | None) -> None:
     f.given("best D/p, to", "1.8")
     f.check("zero-thrust J over P/D, by the formula", "1.00", _zero_thrust())
     defect = {
-        name: k.unit_defect(g, length=INCH)
-        for name, g in (("right", k.corrected_equation), ("printed", k.printed_equation))
+        name: th.unit_defect(g, length=INCH)
+        for name, g in (("right", k.corrected_equation), ("printed", th.printed_equation))
     }
     f.word(
         "printed final equation",
@@ -311,8 +311,8 @@ def findings() -> dict[str, Any]:
         "mach": th.mach_blindness(),
         "k1k2_print": [{"variant": n, "kgf": list(v)} for n, v in th.k1k2_variants()],
         "printed_equation": {
-            "inch_for_metre_changes_thrust_by": k.unit_defect(k.printed_equation, length=INCH),
-            "right_form_changes_by": k.unit_defect(k.corrected_equation, length=INCH),
+            "inch_for_metre_changes_thrust_by": th.unit_defect(th.printed_equation, length=INCH),
+            "right_form_changes_by": th.unit_defect(k.corrected_equation, length=INCH),
         },
     }
 
