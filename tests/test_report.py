@@ -30,10 +30,10 @@ from bemt.commands.cli import main
 from bemt.report import book_html
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.found_files import safe_files
+from bemt.report.front import summary
 from bemt.report.gather import attach_diagnoses, gather
 from bemt.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.report.rotor_view import viewer
-from bemt.report.summary import summary
 from bemt.report.verdicts import verdict
 
 CASE = """

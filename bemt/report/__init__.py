@@ -98,8 +98,8 @@ def write(
     ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
     """
     from bemt.base.tables import write_atomic
+    from bemt.report.front import summary
     from bemt.report.gather import gather
-    from bemt.report.summary import summary
 
     folder = Path(out)
     if recordings:

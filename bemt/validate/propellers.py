@@ -17,8 +17,7 @@ from bemt.base.folders import find_data
 from bemt.base.tables import json_text, write_atomic
 from bemt.rotors.population import population
 from bemt.validate.built import Pool, expect, observe
-from bemt.validate.folder import read_folders
-from bemt.validate.points import J_SHARE, Rows, Stations, compare, statistics
+from bemt.validate.points import J_SHARE, Rows, Stations, compare, read_folders, statistics
 
 if TYPE_CHECKING:
     from bemt.effects import Effect

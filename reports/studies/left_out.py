@@ -26,8 +26,7 @@ from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validity import Validity
 from bemt.validate.built import Expected, Observed, Pool, expect, law, lying, observe
-from bemt.validate.folder import Folder, read_folders
-from bemt.validate.points import J_SHARE, KINDS, counted
+from bemt.validate.points import J_SHARE, KINDS, Folder, counted, read_folders
 from bemt.validate.propellers import effects_without, where
 
 if TYPE_CHECKING:

@@ -22,8 +22,7 @@ from bemt.base.tables import json_text, write_atomic
 from bemt.rotors.population import population
 from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from bemt.validate.built import Observed, expect
-from bemt.validate.folder import read_folders
-from bemt.validate.points import KINDS, counted
+from bemt.validate.points import KINDS, counted, read_folders
 from bemt.validate.propellers import effects_without, where
 
 Array = NDArray[np.float64]
