@@ -44,15 +44,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem.duct_stream import jet_area
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
     from geometry.rotor import Rotor
-
-Array = NDArray[np.float64]
 
 # Rounded entrance, loss over 1/2 rho w^2 against lip radius / hydraulic diameter.  Nominal: Crane TP-410, p. A-29;
 # upper end: Idelchik (2007), Handbook of Hydraulic Resistance, 4th ed., diagram 3-4 (both from memory, not checked);

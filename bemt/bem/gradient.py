@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem import kernel as K
 from bemt.bem import solver
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from geometry.blade import Stations
 
 __all__ = ["Gradient", "PerturbedRotors", "elements", "gradient", "loads", "moved", "only"]
-
-Array = NDArray[np.float64]
 
 STEP = 1e-6
 """Relative step of the central differences; of blade angles in radians, of airspeed in tip speeds."""

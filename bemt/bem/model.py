@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.cache import Kept, content_key
 from bemt.bem import packing as arrays
 from bemt.bem import solver
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from geometry.rotor import Rotor
 
 __all__ = ["Model", "acts_on_points", "acts_on_rotor", "flow_of", "only_reads", "respond", "solve"]
-
-Array = NDArray[np.float64]
 
 # Slope of the loads with onset speed: central difference over this share of the tip speed.
 _SPEED_STEP = 2e-3

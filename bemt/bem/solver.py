@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import packing as arrays
 from bemt.bem import residual as res
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from geometry.rotor import Rotor
 
 __all__ = ["REASONS", "Prepared", "Solution", "prepare", "solve", "solve_point", "standard"]
-
-Array = NDArray[np.float64]
 
 REASONS = {
     K.NOT_CONVERGED: "root search did not reach its tolerance",

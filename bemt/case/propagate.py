@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt import coefficients as co
 from bemt.air import air_arrays
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.bem.model import HUB_LOADS
@@ -47,7 +48,6 @@ __all__ = [
     "vary",
 ]
 
-Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
 Progress = Callable[[int, int, str], None]
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
@@ -45,7 +45,6 @@ GRID_FILES = ("system/blockMeshDict", "system/snappyHexMeshDict", "system/topoSe
               "constant/triSurface/lines.obj")  # fmt: skip
 _WATCH = 'read word || { kill -TERM -"$1"; sleep 2; kill -KILL -"$1"; }'
 """Ends the processes of a solver when ours is gone without a word, as after kill -9."""
-Array = NDArray[np.float64]
 
 
 def _digest(*parts: str) -> str:

@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.compare.contrast_text import WORD, headline
 from bemt.compare.matched import POWER_OF_SPEED
 
 if TYPE_CHECKING:
     from bemt.compare.matched import MatchedChannel
     from bemt.compare.recordings import RunChange
-
-Array = NDArray[np.float64]
 
 _A, _B, _BAND, _GREY = canvas.BLUE, canvas.RED, canvas.SKY, canvas.GREY
 _LABEL = {

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.propagate import propagate
 from bemt.dataset import Dataset
 
 __all__ = ["PredictionView", "against_band"]
-
-Array = NDArray[np.float64]
 
 _LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import tables
 from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Dataset"]
 
-Array = NDArray[np.float64]
 _KIND = re.compile(r"[a-z][a-z0-9_]*")
 
 

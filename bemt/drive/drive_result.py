@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
@@ -27,7 +27,6 @@ from bemt.drive import case_drive, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 from bemt.drive.rotor_table import RotorMap
 
-Array = NDArray[np.float64]
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
 CARRIED = ("rpm", "thrust_N", "battery_A", "power_W")

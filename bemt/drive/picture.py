@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.drive.map_points import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.drive.bench_map import BenchMap
-
-Array = NDArray[np.float64]
 
 
 def _figure(columns: int = 1, width: float = 6.0, height: float = 4.0) -> tuple[Any, list[Any]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Propeller", "load", "propeller"]
 
-Array = NDArray[np.float64]
 CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip

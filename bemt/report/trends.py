@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import InputError
 from bemt.base.page import num, table
 from bemt.base.units import G0, INCH, KGF
@@ -31,8 +31,6 @@ ROBOT = {"mass_kg": 6.5, "drives": 2, "wanted_kgf": 6.0, "arm_m": 0.2, "fan_mass
 """Of the source thesis; `fan_mass_kg` is the DS-30 (duct 100 g, motor 300 g), the only drive whose mass it gives."""
 N, COARSE = 15, 20
 """Points of a family, and their blade elements: thrust within 0.2 % of the usual 40."""
-
-Array = NDArray[np.float64]
 
 
 def _line(case: Case, key: str, values: Array) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.latents import STEP, Prior
 
-Array = NDArray[np.float64]
 Readings = Callable[[Array], Array]
 
 TOLERANCE = 0.25

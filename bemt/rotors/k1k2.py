@@ -25,14 +25,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-
-Array = NDArray[np.float64]
 
 K1 = 1.0 / 3.29546
 """Coefficient of D/p [-], reference [1]."""

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.effects.base import Baking
-
-Array = NDArray[np.float64]
 
 KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
 """How the blade of a case is known; ``reference``: from a run of this very rotor."""

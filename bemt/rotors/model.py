@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.rotors.latents import AsBuilt, Prior, Sensed, as_built
 from bemt.rotors.population import population
 from bemt.rotors.predict import Prediction, Solve, predict, sense
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from bemt.bem.model import Model
     from bemt.rotors.latents import Prior
     from bemt.rotors.reference import ReferenceRun
-
-Array = NDArray[np.float64]
 
 
 def air_fields(air: Air) -> dict[str, Array]:

@@ -23,12 +23,10 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed
 from bemt.rotors.validity import Validity
-
-Array = NDArray[np.float64]
 
 SMALL_IN = 7.0
 """Diameter below which the rest, and the chord of a label, scatter more [in]."""

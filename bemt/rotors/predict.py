@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.conditioning import tangents
 from bemt.rotors.latents import NAMES, Prior, Sensed, inflow_angle_deg
 from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun
 
-Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
 """(K,) latent numbers, (P,) rpm, (P,) advance ratio and the points whose air holds, (P,), to (2, P) CT and CP."""
 

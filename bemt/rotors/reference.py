@@ -7,14 +7,11 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.conditioning import Conditioned
 from bemt.rotors.latents import Sensed
 from bemt.rotors.population import Population
-
-Array = NDArray[np.float64]
-
 
 SESSION = 0.01
 """Gain of a stand that all points of a run share, where the recording does not state it: retests of a propeller in one

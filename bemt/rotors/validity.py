@@ -29,9 +29,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
+
 Range = tuple[float, float]
 
 DUCT = 1.5

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import cache
+from bemt.base.arrays import Array
 from bemt.base.cache import Kept
 from bemt.base.errors import needs
 from bemt.sections import four_digit, rule
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
 
 __all__ = ["neuralfoil_polar", "tunnel_polar"]
-
-Array = NDArray[np.float64]
 
 TABLE_VERSION = 5
 """Raise when the making of tables changes: older cache entries are then ignored."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.readers._uiuc_names import class_of
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside
@@ -22,8 +23,6 @@ from bemt.validate.points import KINDS, Rows, Solver, Stations, counted, errors,
 if TYPE_CHECKING:
     from bemt.effects import Effect
     from bemt.readers.uiuc import UiucPropeller
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

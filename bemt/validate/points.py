@@ -1,4 +1,4 @@
-"""Measured points of one propeller beside what the solver gives for them, and the errors that count."""
+"""Measured propellers of a folder: who can be compared, the solver at their points, and the errors that count."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from bemt.readers.uiuc import UiucPropeller
     from geometry.rotor import Rotor
 
-Array = NDArray[np.float64]
 Stations = tuple[Array, Array, Array]
 
 # Forward flight is compared up to this share of the measured zero-thrust advance ratio: beyond it a relative error
