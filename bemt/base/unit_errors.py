@@ -16,8 +16,6 @@ from functools import cache
 
 from bemt.base.units import DEG, FOOT, INCH, LBF, POUND, RPM, UNITS
 
-__all__ = ["SpeedRatio", "UnitError", "errors", "named", "speed_ratios", "symmetric"]
-
 
 @dataclass(frozen=True)
 class UnitError:

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "PerturbedRotors", "elements", "gradient", "loads", "moved", "only"]
-
 STEP = 1e-6
 """Relative step of the central differences; of blade angles in radians, of airspeed in tip speeds."""
 _RAD_PER_RPM = math.pi / 30.0

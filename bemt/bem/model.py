@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
-__all__ = ["Model", "acts_on_points", "acts_on_rotor", "flow_of", "only_reads", "respond", "solve"]
-
 # Slope of the loads with onset speed: central difference over this share of the tip speed.
 _SPEED_STEP = 2e-3
 # Section speeds over those without induction; tables beyond them are left out.

@@ -21,8 +21,6 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.bem.residual import Y_BRAKE
 
-__all__ = ["PlainBlade", "PlainLoads", "solve_plain"]
-
 Section = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 

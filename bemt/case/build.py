@@ -21,8 +21,6 @@ from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
 
-__all__ = ["build_air", "build_duct", "build_rotor"]
-
 T = TypeVar("T")
 
 

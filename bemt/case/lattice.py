@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from bemt.case.load import Case
     from bemt.dataset import Dataset
 
-__all__ = ["solve"]
-
 FEW = 300
 """Up to so many points each has its band solved for itself."""
 ANGLE_STEP, SPEED_STEP = 0.01, 0.1

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from geometry.rotor import Rotor
 
-__all__ = ["duct_unknowns", "k1k2_case", "prepare_case", "prepare_pair"]
-
 
 def _effects(case: Case) -> tuple[effects.Effect, ...]:
     known = effects.catalogue()

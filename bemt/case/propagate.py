@@ -36,18 +36,6 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = [
-    "BANDED",
-    "Moved",
-    "Points",
-    "Propagated",
-    "propagate",
-    "solve_at",
-    "spread",
-    "validity_of",
-    "vary",
-]
-
 Answers = Mapping[str, Array]
 Progress = Callable[[int, int, str], None]
 

@@ -21,29 +21,6 @@ from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
-__all__ = [
-    "AIRSPEED",
-    "ANGLE",
-    "AXES",
-    "GROUPS",
-    "INCH",
-    "RPM",
-    "AirTable",
-    "AsBuiltTable",
-    "AssumptionTable",
-    "BladeTable",
-    "CaseFile",
-    "DuctTable",
-    "ModelTable",
-    "OperatingTable",
-    "PolarTable",
-    "RotorTable",
-    "SecondRotorTable",
-    "SectionTable",
-    "StatorTable",
-    "SweepTable",
-]
-
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)
 INCH = 0.0254
 _HEAVIEST = 10.0  # of a gas [kg/m3]

@@ -33,8 +33,6 @@ from bemt.base.errors import Fault, InputError
 from bemt.exports.openfoam import Settings
 from bemt.exports.openfoam.run import OPEN, SIDES, through
 
-__all__ = ["BALANCE_LIMIT", "Balance", "balance_of"]
-
 BALANCE_LIMIT = 0.01
 """Residual, relative, above which a run counts as not converged."""
 LEAST_CT, LEAST_CQ = 0.01, 0.001

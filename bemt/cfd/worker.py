@@ -29,8 +29,6 @@ from bemt.exports.openfoam import Settings, case_files
 from bemt.exports.openfoam.run import BINS, control
 from bemt.exports.openfoam.write import settings_of, write_openfoam
 
-__all__ = ["DRIFT_LIMIT", "RESIDUALS", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
-
 DRIFT_LIMIT = 0.03
 """Change over the averaged iterations, of the mean, above which a run counts as not converged."""
 SCATTER_LIMIT = 0.05

@@ -20,8 +20,6 @@ from bemt.case import Case
 from bemt.case.propagate import propagate
 from bemt.dataset import Dataset
 
-__all__ = ["PredictionView", "against_band"]
-
 _LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",
     "CP": "$C_P$ = P/($\\rho n^3 D^5$) [1]", "rpm": "speed of rotation [rev/min]", "J": "advance ratio J = V/(n D) [1]",

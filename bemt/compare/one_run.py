@@ -27,8 +27,6 @@ from bemt.recordings.cfd_run import is_run
 from bemt.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.recordings.channels import named
 
-__all__ = ["SCHEMA", "cfd_points", "compare_run", "text"]
-
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
 _ROWS = 6  # points on one screen

@@ -14,8 +14,6 @@ from bemt.dataset import Dataset
 from bemt.recordings.cfd_setup import GRID_FLOOR, GRID_FLOOR_SOURCE, conditions_that_differ, grid_that_differs
 from bemt.recordings.channels import named
 
-__all__ = ["compare_grids", "text"]
-
 _LIKE = 0.01  # speeds and airspeeds that are one point, share
 
 

@@ -25,8 +25,6 @@ from bemt.exports.performance import Performance
 if TYPE_CHECKING:
     from bemt.case import Case
 
-__all__ = ["COEFFICIENTS", "HubTable", "hub_document", "hub_loads", "hub_of"]
-
 COEFFICIENTS = ("dCT", "dCP", "CH", "CY", "CMroll", "CMpitch")
 """Values of the table, in this order."""
 N_RPM = 5

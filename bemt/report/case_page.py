@@ -17,8 +17,6 @@ from bemt.report.rotor_view import viewer
 from bemt.report.values import Section, sections, uri
 from bemt.report.verdicts import headline, stand
 
-__all__ = ["case_sections", "reproduction_table"]
-
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
 NAMES = {"cfd": "CFD, recorded", "openfoam": "CFD, own, compressible",

@@ -15,8 +15,6 @@ from bemt.base.errors import InputError
 from bemt.case import Case
 from bemt.drive.drive_result import full_throttle
 
-__all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
-
 N_J, N_RPM = 29, 21
 REFINED = (10, 20, 40, 80)
 CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")

@@ -14,8 +14,6 @@ from bemt.report.plot import Mark, Plot, figure, points
 from bemt.report.values import Part, uri
 from bemt.report.verdicts import answer, headline, verdict
 
-__all__ = ["answers", "front_parts", "plain_markdown", "summary"]
-
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28),
     "cfd": ("CFD, recorded", "diamond", 0.06),

@@ -18,8 +18,6 @@ from bemt.report.rotor_view import still
 from geometry.common import GeometryError
 from geometry.surface import surfaces
 
-__all__ = ["attach_diagnoses", "diagnose_into", "gather"]
-
 Progress = Callable[[str], None]
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""

@@ -12,8 +12,6 @@ import numpy as np
 from bemt.base.arrays import Array
 from geometry.surface import Surface
 
-__all__ = ["still", "viewer"]
-
 COLOURS = {"blade": "#4f93c4", "hub": "#8d99a6", "duct": "#c9973f", "cut": "#e3c58c", "stator": "#b58a4a"}
 OPEN, CUT_OPEN = (-0.25, 0.95, 1.25), (0.45, 1.05, 0.95)
 """How the rotor first stands: turned about its shaft, then tipped towards the eye [rad]; its size in the viewer. [-]"""

@@ -23,8 +23,6 @@ from bemt.report.values import Section, sections
 from bemt.rotors.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
 from geometry.common import GeometryError
 
-__all__ = ["ROBOT", "choice", "families", "moments", "trend_sections"]
-
 ORIGIN = "Cahill 2025"
 """What a case of the source thesis states as its ``origin``."""
 ROBOT = {"mass_kg": 6.5, "drives": 2, "wanted_kgf": 6.0, "arm_m": 0.2, "fan_mass_kg": 0.4}

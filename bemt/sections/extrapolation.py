@@ -10,8 +10,6 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.sections.polars import ALPHA_GRID, Polar, first_stall
 
-__all__ = ["METHODS", "ExtrapolatedTable", "extend", "from_tables", "viterna_cd_max"]
-
 METHODS = ("viterna", "normal")
 """Names of the post-stall models of `extend`."""
 REVERSED_LIFT = 0.7

@@ -27,8 +27,6 @@ from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
 
-__all__ = ["neuralfoil_polar", "tunnel_polar"]
-
 TABLE_VERSION = 5
 """Raise when the making of tables changes: older cache entries are then ignored."""
 RAW_LIMIT_DEG = 20.0

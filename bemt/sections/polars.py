@@ -17,11 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base import cache
 from bemt.base.arrays import Array
 
-__all__ = [
-    "ALPHA_COARSE_STEP", "ALPHA_FINE_HI", "ALPHA_FINE_LO", "ALPHA_FINE_STEP", "ALPHA_GRID", "DEFAULT_RE", "DLOG_RE",
-    "LOG_RE0", "RE_FIXED", "Polar", "blend", "first_stall", "fixed_re", "linear_polar",
-]  # fmt: skip
-
 ALPHA_FINE_LO = float(np.deg2rad(-30.0))
 ALPHA_FINE_HI = float(np.deg2rad(40.0))
 ALPHA_FINE_STEP = float(np.deg2rad(0.5))

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from geometry.mesh import MeshModel
     from geometry.rotor import Rotor
 
-__all__ = ["Run", "RunRanges", "case_files", "check_run", "settings_of", "write_openfoam"]
-
 
 def case_files(s: Settings, title: str = "") -> dict[str, str]:
     """Write every file of a case, the surfaces in ``constant/triSurface`` aside."""
