@@ -19,6 +19,8 @@ from bemt.case import Case, check_name, load_case
 from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
 from bemt.exports.openfoam.write import Run, RunRanges
 
+__all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
+
 
 class PointTable(RunRanges):
     """[defaults], [[points]] and, as lists, [axes]: one CFD run; omitted values come from the case."""
