@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_origin
 
-from bemt.base.toml import Limits, Table, expected, limits_of
+from bemt.base.toml import FieldLimits, Table, expected, limits_of
 from bemt.case import Case, load_case
 from bemt.case.prepare import prepare_case
 from bemt.case.schema import GROUPS, CaseFile
@@ -142,7 +142,7 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[list[str]]:
         if model.inner(key) is not None and model is not ColumnsTable:
             continue
         limits, default = limits_of(field), field.default
-        kind = expected(field.annotation, replace(limits, low=Limits.low, high=Limits.high, unit=""))
+        kind = expected(field.annotation, replace(limits, low=FieldLimits.low, high=FieldLimits.high, unit=""))
         if model is ColumnsTable:
             kind = "unit " + expected(str, limits_of(model.inner(key).named()["unit"]))  # type: ignore[union-attr]
         kind = kind.removeprefix("a ").removeprefix("the ").removesuffix(" that is not empty")
@@ -156,8 +156,8 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[list[str]]:
             default = ", ".join(f"{v:g}" for v in default)
         span = (
             f"{limits.low:.6g} to {limits.high:.6g}"
-            if limits.low > Limits.low and limits.high < Limits.high
-            else (f"{limits.low:g} or more" if limits.low > Limits.low else "")
+            if limits.low > FieldLimits.low and limits.high < FieldLimits.high
+            else (f"{limits.low:g} or more" if limits.low > FieldLimits.low else "")
         )
         meaning = (field.description or "").replace("|", "\\|")
         yield [f"`{key}`", kind.replace("|", "\\|"), limits.unit, str(default), span, meaning]
@@ -222,7 +222,7 @@ def main() -> None:
         for path in sorted((DOCS / "notebooks").glob("*.ipynb")):
             run_notebook(path)
         return
-    from geometry.picture import cutaway_scene, render, rotor_scene
+    from offscreen import cutaway_scene, render, rotor_scene
 
     page = DOCS / "diagnosis.md"
     page.write_text(numbers(page.read_text(encoding="utf-8")), encoding="utf-8")

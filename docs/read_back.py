@@ -195,8 +195,8 @@ def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
     return Skewed(np.array(rpm), np.array(v), F, M, np.array(rho))
 
 
-def mujoco_skewed(job: Job, folder: Path) -> Skewed:
-    """Forces that the actuators put on the body."""
+def _mujoco_loads(job: Job, folder: Path, rpm: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """What the actuators put on the body at speeds (P,) [rev/min] and velocities (P, 3) [m/s], (P, 6) [N], [N m]."""
     import mujoco as program
 
     _save("mujoco", job, folder)
@@ -205,17 +205,22 @@ def mujoco_skewed(job: Job, folder: Path) -> Skewed:
     model = program.MjModel.from_xml_path(str(folder / f"{job.case.name}.xml"))
     data = program.MjData(model)
     propeller = space["Propeller"](model)
-    rpm, v = skewed(job, 24)
     found = []
-    for n, velocity in zip(rpm, v, strict=True):
+    for n, v in zip(rpm, velocity, strict=True):
         program.mj_resetData(model, data)
-        data.qvel[:3] = velocity
+        data.qvel[:3] = v
         program.mj_forward(model, data)
         propeller.rpm = n
         propeller(model, data)
         program.mj_forward(model, data)
         found.append(data.qfrc_actuator[:6].copy())
-    read = np.array(found)
+    return np.array(found)
+
+
+def mujoco_skewed(job: Job, folder: Path) -> Skewed:
+    """Forces and moments in a wind from any side."""
+    rpm, v = skewed(job, 24)
+    read = _mujoco_loads(job, folder, rpm, v)
     return Skewed(rpm, v, read[:, :3], read[:, 3:])
 
 
@@ -296,29 +301,12 @@ def jsbsim(job: Job, folder: Path) -> Ran:
 
 
 def mujoco(job: Job, folder: Path) -> Ran:
-    """Forces that the actuators put on the body."""
-    import mujoco as program
-
-    _save("mujoco", job, folder)
-    space: dict[str, Any] = {}
-    exec((folder / f"{job.case.name}_mujoco.py").read_text(encoding="utf-8"), space)
-    model = program.MjModel.from_xml_path(str(folder / f"{job.case.name}.xml"))
-    data = program.MjData(model)
-    propeller = space["Propeller"](model)
+    """Thrust and torque along the shaft."""
     rpm, V = points(job, 24)
-    T, about = [], []
-    for n, v in zip(rpm, V, strict=True):
-        program.mj_resetData(model, data)
-        data.qvel[2] = v
-        program.mj_forward(model, data)
-        propeller.rpm = n
-        propeller(model, data)
-        program.mj_forward(model, data)
-        T.append(data.qfrc_actuator[2])
-        about.append(data.qfrc_actuator[5])
+    read = _mujoco_loads(job, folder, rpm, V[:, None] * np.array([0.0, 0.0, 1.0]))
     # a right-handed rotor, clockwise seen from behind, turns about the thrust (+z); its reaction is about -z
-    sense = -int(np.sign(about[1]))
-    return Ran(rpm, V, T, -sense * np.array(about), sense)
+    sense = -int(np.sign(read[1, 5]))
+    return Ran(rpm, V, read[:, 2], -sense * read[:, 5], sense)
 
 
 def rotorpy(job: Job, folder: Path) -> Ran:

@@ -29,7 +29,7 @@ API = {  # page: title, introduction, names
                                                 "export", "ExportedCase", "report", "cite")),
         "bemt.library.blades.design", "bemt.design.blade_design.Design",
         "bemt.case.sources.Source",
-        "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.Band")),
+        "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.DriveBand")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
         "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",
         "bemt.base.errors.Fault")),

@@ -1,6 +1,6 @@
 """Parametric shapes of propellers and ducted fans: pure geometry, no aerodynamics.
 
 Lengths in metres, angles in radians; other units carry a suffix.
-Submodules: ``airfoil`` and ``airfoil_file``, ``blade``, ``laws`` and ``designation``, ``rotor``, ``duct``; ``common``
+Submodules: ``airfoil``, ``blade``, ``laws`` and ``designation``, ``rotor``, ``duct``; ``common``
 is what they share.
 """

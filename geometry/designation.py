@@ -49,28 +49,15 @@ _DIGITS = re.compile(
 
 @dataclass(frozen=True)
 class Designation:
-    """What a label says; None where it says nothing.
+    """What a label says; None where it says nothing."""
 
-    Parameters
-    ----------
-    diameter_in, pitch_in : float
-        Size. [in]
-    blades : int or None
-        Number of blades.
-    blade_class : str or None
-        One of `BLADE_CLASSES`.
-    maker : str
-        Words before the size, empty without any.
-    reverse : bool
-        Whether it is the pusher or counter-rotating one of a pair.
-    """
-
+    # Size. [in]
     diameter_in: float
     pitch_in: float
     blades: int | None = None
-    blade_class: str | None = None
-    maker: str = ""
-    reverse: bool = False
+    blade_class: str | None = None  # One of `BLADE_CLASSES`
+    maker: str = ""  # Words before the size, empty without any
+    reverse: bool = False  # Whether it is the pusher or counter-rotating one of a pair
 
     @property
     def size(self) -> str:

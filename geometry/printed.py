@@ -18,8 +18,6 @@ from geometry.blade import Blade
 from geometry.common import Array, Faults, GeometryError, offset
 from geometry.rotor import Rotor
 
-__all__ = ["ADAPTERS", "Printed", "cutters", "framed", "outline", "root_depth", "seeds", "settled"]
-
 SHARPNESS = 12.0
 """p: the larger it is, the narrower the transition from strip to section; at its middle 6 % is added [1]."""
 SLOPE = 3.0

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.airfoil import Airfoil
 from geometry.common import Array, GeometryError
-from geometry.cylinder_cut import blades
-from geometry.rotor_axis import PROBES, frame, pick
+from geometry.rotor_axis import PROBES, blades, frame, pick
 from geometry.section_fit import Cut, fit_section, nose_first
 
 Faces = NDArray[np.int64]

@@ -74,6 +74,8 @@ def main() -> None:
             bemt("validate", f"{uiuc}/volume-{k}", "--match-J0", "--out", f"reports/validation/uiuc_volume_{k}")
     proof = json.loads((ROOT / "reports" / "proof" / "proof.json").read_text(encoding="utf-8"))
     (ROOT / "reports" / "proof" / "proof.html").write_text(proof_text.html(proof), encoding="utf-8")
+    with (ROOT / "reports" / "reproduction.json").open("w", encoding="utf-8") as file:
+        subprocess.run([sys.executable, "reports/studies/reproduce.py", "--json"], cwd=ROOT, stdout=file, check=True)
     bemt("report", "cases/", "--out", "reports")
 
 

@@ -29,7 +29,7 @@ COMMANDS: dict[str, list[str]] = {
     "sweep": ["sweep", "cases/", "--json"],
     "validate_1": ["validate", f"{D}/uiuc/volume-1", "--json"],
     "validate_2": ["validate", f"{D}/uiuc/volume-2", "--json"],
-    "reproduce": ["reproduce", "--json"],
+    "reproduce": ["reports/studies/reproduce.py", "--json"],
     "diagnose_fluent": ["diagnose", *FLUENT, "--case", *CASES, "--json"],
     "diagnose_k1k2": ["diagnose", *FLUENT, "--case", *CASES, "--baseline", "k1k2", "--json"],
     **{f"diagnose_{n}": ["diagnose", f"reports/diagnosis/cfd_{n}.csv", *CFD, "--json"]
@@ -54,7 +54,8 @@ def save(folder: Path, tree: Path, only: list[str]) -> None:
     for name, words in COMMANDS.items():
         if only and name not in only:
             continue
-        line = [sys.executable, "-m", "bemt", *(w.format(data=data) for w in words)]
+        module = [] if words[0].endswith(".py") else ["-m", "bemt"]
+        line = [sys.executable, *module, *(w.format(data=data) for w in words)]
         done = subprocess.run(line, cwd=tree, capture_output=True, text=True)
         (folder / f"{name}.json").write_text(done.stdout or json.dumps({"error": done.stderr[-2000:]}))
         print(f"{name}: exit {done.returncode}, {len(done.stdout)} characters", flush=True)

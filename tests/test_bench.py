@@ -3,15 +3,14 @@
 import json
 import math
 
+import bench
+import bench_work as benchwork
 import numpy as np
 import pytest
 
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.bem import solver
-from bemt.commands import cli
-from bemt.compare.bench import timing as bench
-from bemt.compare.bench import work as benchwork
 
 
 @pytest.fixture(scope="module")
@@ -156,10 +155,10 @@ def test_the_original_work_runs_when_it_is_there(shared_data):
 
 def test_command(capsys, monkeypatch, doc):
     monkeypatch.setattr(bench, "document", lambda work, quick: doc)
-    assert cli.main(["bench", "--quick"]) == 0
+    assert bench.main(["--quick"]) == 0
     text = capsys.readouterr().out
     assert "us per operating point" in text and max(map(len, text.splitlines())) <= 110
-    assert cli.main(["bench", "--json", "--quick"]) == 0
+    assert bench.main(["--json", "--quick"]) == 0
     assert json.loads(capsys.readouterr().out)["schema"] == "bemt.bench/1"
     monkeypatch.setattr(bench, "document", lambda work, quick: doc | {"converged": 59})
-    assert cli.main(["bench", "--quick"]) == 1
+    assert bench.main(["--quick"]) == 1

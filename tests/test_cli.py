@@ -35,7 +35,7 @@ def test_help_is_fast_and_names_every_command() -> None:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True, check=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        assert command == ("-c", "") or all(name in done.stdout for name in ("sweep", "validate", "reproduce", "bench"))
+        assert command == ("-c", "") or all(name in done.stdout for name in ("sweep", "validate", "diagnose"))
         return float(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
 
     python = min(cpu("-c", "") for _ in range(5))
@@ -98,7 +98,7 @@ def test_version() -> None:
 @pytest.mark.parametrize(
     "arguments",
     [["swep"], ["sweep", "cases", "--jobs", "0"], ["sweep", "cases", "--jobs", "two"],
-     ["validate"], ["validate", "x", "--polar", "100000"], ["validate", "x", "--polar", "fixed:many"], ["bench", "x"]],
+     ["validate"], ["validate", "x", "--polar", "100000"], ["validate", "x", "--polar", "fixed:many"], ["data"]],
 )  # fmt: skip
 def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -211,8 +211,8 @@ def test_exit_code_follows_the_outcome(
             raise outcome
         return outcome
 
-    monkeypatch.setattr("bemt.commands.bench.run", run)
-    assert cli.main(["bench"]) == code
+    monkeypatch.setattr("bemt.commands.effects.run", run)
+    assert cli.main(["effects"]) == code
     shown = capsys.readouterr()
     assert words in shown.err and shown.out == ""
 

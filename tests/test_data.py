@@ -128,9 +128,6 @@ def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
     assert (doc["checksum"], doc["fetched"], doc["folder"]) == ("first use", True, str(folder))
     assert (folder / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM  # the one top folder is left off
     assert folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
-    from bemt.compare.reproduce import find_uiuc
-
-    assert find_uiuc() == folder
     assert cli.main(["calibrate", "--quiet"]) == 0  # reads the fetched data when no file is named
 
 

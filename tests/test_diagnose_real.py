@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnosing import left_out
+from duct_fans import DUCT_76, FAN_76
 
 from bemt.case import Case, load_case
 from bemt.case.unknowns import section_of
@@ -122,29 +123,8 @@ def test_the_duct_of_a_76_mm_fan_is_named_whatever_pitch_is_guessed(
     shared_data: Path, tmp_path: Path, pitch_in: float
 ) -> None:
     """The open fan as reference calibrates the blade: the verdict does not hang on the pitch that the case guesses."""
-    body = f"""[rotor]
-kind = "fan"
-blades = 8
-diameter_mm = 76
-hub_ratio = 0.25
-[blade]
-pitch_in = {pitch_in}
-chord_law = "fan"
-max_chord_over_R = 0.35
-[blade.section]
-camber = 0.05
-thickness = 0.09
-[duct]
-tip_gap_mm = 0.5
-length_mm = 25
-lip_radius_mm = 4
-exit_area_ratio = 1.0
-[operating]
-rpm = 20000
-[air]
-density_kg_m3 = 1.2
-"""
-    case = left_out("duct", write(tmp_path / "fan", body))
+    guess = FAN_76.format(pitch=25.4 * pitch_in, duct=DUCT_76).replace('"propeller"', '"fan"')
+    case = left_out("duct", write(tmp_path / "fan", guess))
     folder = shared_data / "jmajew"
     ducted = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_duct_table*.csv"))]
     bare = [load(str(f), case) for f in sorted(folder.glob("grp01__f1507_hqprop76x8_4s_table*.csv"))]

@@ -477,7 +477,8 @@ def test_every_imported_library_is_declared(project: Path) -> None:
         "python_calamine": "python-calamine",  # its name when it is imported
     }
     assert set(comes_with.values()) <= declared
-    ours = {"bemt", "geometry", "conftest", "tests", "__future__", *(p.stem for p in (project / "tests").glob("*.py"))}
+    scripts = (p.stem for place in ("tests", "docs", "reports/studies") for p in (project / place).glob("*.py"))
+    ours = {"bemt", "geometry", "conftest", "tests", "__future__", *scripts}
     assert found - {n.lower() for n in sys.stdlib_module_names} - ours - set(comes_with) <= declared
 
 

@@ -7,6 +7,8 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import drive_identify
+import drive_recordings
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -15,7 +17,7 @@ from hypothesis import strategies as st
 from bemt import effects
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
-from bemt.drive import identify, mission, rotor_table, transient, validation_folder
+from bemt.drive import mission, rotor_table, transient
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
 from bemt.drive.map_points import map_points
 from bemt.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
@@ -24,13 +26,19 @@ FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)
 
 
+def coefficients(CT: float, CQ: float, D: float, *more: float) -> rotor_table.RotorMap:
+    """Rotor of constant coefficients in 1.225 kg/m3; more: inertia, solidity."""
+    turn = (2.0 * math.pi) ** 2
+    return rotor_table.quadratic(1.225 * CT * D**4 / turn, 1.225 * CQ * D**5 / turn, D, 1.225, *more)
+
+
 def drive(**changes: object) -> Drive:
     """Ordinary 4S drive of an 8 in propeller."""
     parts = {
         "battery": Battery(4, 0.02, 2.2),
         "esc": Esc(resistance_ohm=0.005, idle_A=0.05),
         "motor": Motor(1100.0, 0.06, 0.8, 1.2e-5, 25.0, 4.0),
-        "rotor": rotor_table.from_coefficients(0.11, 0.0082, 0.2032, 1.225, 1.5e-5, 0.09),
+        "rotor": coefficients(0.11, 0.0082, 0.2032, 1.5e-5, 0.09),
     }
     return Drive(**{**parts, **changes})  # type: ignore[arg-type]
 
@@ -198,7 +206,7 @@ def test_a_planted_drive_is_found_from_its_thrust_map(ripple: float) -> None:
     s = truth.steady(PULSE)
     recorded = {"thrust_N": s.thrust_N, "rpm": s.rpm, "current_A": s.battery_A, "voltage_V": s.voltage_V}
     points = map_points(PULSE, recorded)
-    fit = identify.fit_map(points, {"kv_rpm_V": 1100.0, "no_load_A": 0.8}, s.torque_Nm)
+    fit = drive_identify.fit_map(points, {"kv_rpm_V": 1100.0, "no_load_A": 0.8}, s.torque_Nm)
     assert fit.fitted["pulse_min_us"] == pytest.approx(1040.0, abs=2.0)
     assert fit.fitted["pulse_max_us"] == pytest.approx(1940.0, abs=2.0)
     assert fit.fitted.get("ripple_ohm", math.inf) == pytest.approx(ripple, rel=0.02)
@@ -214,7 +222,7 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
     t = np.arange(0.0, 1.0, 0.01)
     rotor = replace(d.rotor, inertia_kg_m2=0.0)
     got = transient.simulate(replace(d, rotor=rotor), [(0.0, 1200.0), (0.305, 1600.0)], t[-1], t)
-    inertia, _ = identify.fit_inertia(d, t, got.thrust_N, 1200.0, 1600.0)
+    inertia, _ = drive_identify.fit_inertia(d, t, got.thrust_N, 1200.0, 1600.0)
     assert inertia == pytest.approx(3e-5, rel=0.03)
 
 
@@ -272,7 +280,7 @@ def test_faults_of_the_drive_come_all_at_once(
 
 def test_steps_need_something_that_turns() -> None:
     with pytest.raises(InputError, match="inertia_kg_m2"):
-        still = drive(motor=Motor(1100.0, 0.06), rotor=rotor_table.from_coefficients(0.1, 0.01, 0.2))
+        still = drive(motor=Motor(1100.0, 0.06), rotor=coefficients(0.1, 0.01, 0.2))
         transient.simulate(still, [(0.0, 1200.0)], 1.0)
 
 
@@ -310,7 +318,7 @@ def test_one_motor_and_esc_with_two_propellers(shared_data: Path, tmp_path: Path
     """The recordings with 10 and 14 in, fitted apart, give one resistance and one ripple, and hold within 5 %."""
     name = "mit_copter_rcbenchmark"
     (tmp_path / name).symlink_to((shared_data / name).resolve())
-    ten, fourteen = validation_folder.maps(tmp_path)
+    ten, fourteen = drive_recordings.maps(tmp_path)
     assert ten.worst < 0.05 and fourteen.worst < 0.05
     for key in ("ripple_ohm", "resistance_ohm"):
         assert ten.fitted[key] == pytest.approx(fourteen.fitted[key], rel=0.1)
@@ -318,7 +326,7 @@ def test_one_motor_and_esc_with_two_propellers(shared_data: Path, tmp_path: Path
 
 @pytest.mark.slow
 def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
-    found = {m.name: m.worst for m in validation_folder.maps(shared_data)}
+    found = {m.name: m.worst for m in drive_recordings.maps(shared_data)}
     for name in ("xNova steps (to 1600 us)", "xNova ramp (to 1800 us)", "MIT 10 in", "MIT 14 in"):
         assert found[name] < 0.05, name
     apart = [worst for name, worst in found.items() if name.startswith("jmajew")]
@@ -328,7 +336,7 @@ def test_real_thrust_maps_within_five_percent(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_time_constants_of_real_steps(shared_data: Path) -> None:
     """All five within 20 %: rises, the falls to no throttle (softer brake) and the fall to idle (full brake)."""
-    checks, fitted = validation_folder.steps(shared_data)
+    checks, fitted = drive_recordings.steps(shared_data)
     assert [c.log[:4] for c in checks] == ["0500", "0500", "incr", "incr", "incr"] and all(c.resolved for c in checks)
     assert all(abs(c.ratio - 1.0) < 0.2 for c in checks)
     assert 0.6 < fitted.esc.brake_on_stop < 0.8

@@ -14,12 +14,11 @@ is 2 to 8 % too large here, see docs/duct.md.
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
+import duct_fans as fans
 import numpy as np
 import pytest
 
@@ -36,19 +35,6 @@ from bemt.effects.tip_gap import TipGap
 from geometry.duct import Duct
 from geometry.laws import helix
 from geometry.rotor import Rotor
-
-
-def study(name: str) -> Any:
-    """Load a script of reports/studies."""
-    path = Path(__file__).parents[1] / "reports" / "studies" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    sys.modules[name] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-FANS = study("duct_fans")
 
 # Jets ---------------------------------------------------------------------------------------------------------------
 
@@ -134,7 +120,7 @@ def test_the_lip_loss_lies_in_the_range_of_its_sources() -> None:
 
 @pytest.fixture(scope="module")
 def f1_case(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    return FANS.f1(shared_data, tmp_path_factory.mktemp("f1"))
+    return fans.f1(shared_data, tmp_path_factory.mktemp("f1"))
 
 
 @pytest.fixture(scope="module")
@@ -227,7 +213,7 @@ def test_a_swirling_jet_agrees_with_its_stream_tubes_followed_one_by_one(swirl: 
 
 @pytest.mark.parametrize("angle", [19, 29])
 def test_x22a(shared_data: Path, tmp_path: Path, angle: int) -> None:
-    known = FANS.x22a(shared_data, tmp_path, angle)
+    known = fans.x22a(shared_data, tmp_path, angle)
     CT, CQ, _ = off(known)
     assert np.max(np.abs(CT)[known.J < 0.56]) < 0.05
     assert np.median(np.abs(CQ)) < 0.1
@@ -235,7 +221,7 @@ def test_x22a(shared_data: Path, tmp_path: Path, angle: int) -> None:
 
 @pytest.mark.parametrize("pitch", [0.6, 0.8, 1.0, 1.2, 1.4])
 def test_ka_4_70_in_nozzle_19a(shared_data: Path, tmp_path: Path, pitch: float) -> None:
-    known = FANS.nozzle_19a(shared_data, tmp_path, pitch)
+    known = fans.nozzle_19a(shared_data, tmp_path, pitch)
     some = known.CT > 0.15 * known.CT[0]
     for error, limit in zip(off(known), (0.03, 0.08, 0.02), strict=True):
         assert np.median(np.abs(error)[some]) < limit
@@ -243,14 +229,14 @@ def test_ka_4_70_in_nozzle_19a(shared_data: Path, tmp_path: Path, pitch: float) 
 
 def test_the_duct_of_the_76_mm_fan_changes_its_torque_as_measured(shared_data: Path, tmp_path: Path) -> None:
     """Nobody described the blade: its pitch is that of the torque of the open runs; the ducted ones are left out."""
-    pitch = FANS.pitch_of_torque(shared_data, tmp_path)
-    _, torque = FANS.over_measured(*FANS.fan_76(shared_data, tmp_path, pitch, True))
+    pitch = fans.pitch_of_torque(shared_data, tmp_path)
+    _, torque = fans.over_measured(*fans.fan_76(shared_data, tmp_path, pitch, True))
     assert np.max(np.abs(torque - 1.0)) < 0.1
 
 
 def test_the_ds30_beside_our_cfd_that_settled(project: Path) -> None:
     """No vanes, gap closed by the cells, incompressible, mean of three grids (their spread: 5 % and 8 %)."""
-    found = [r for r in FANS.rows(project / "reports" / "cfd" / "ds30_spinner" / "recording.csv")
+    found = [r for r in fans.rows(project / "reports" / "cfd" / "ds30_spinner" / "recording.csv")
              if r["converged"] == "1" and float(r["tip_gap_mm"]) < 0.1]  # fmt: skip
     assert len(found) == 3
     case = load_case(project / "cases" / "ds30").replaced({

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bemt.base.toml import Limits, Table, limits_of, validated
+from bemt.base.toml import FieldLimits, Table, limits_of, validated
 from bemt.base.toml_text import Collector
 from bemt.case.schema import CaseFile
 from bemt.cfd.schema import CampaignFile
@@ -82,5 +82,5 @@ def test_every_value_says_what_it_is(model: type[Table]) -> None:
         if inner is not None:
             test_every_value_says_what_it_is(inner)
         else:
-            assert field.description and any(isinstance(item, Limits) for item in field.metadata), (model, key)
+            assert field.description and any(isinstance(item, FieldLimits) for item in field.metadata), (model, key)
             assert limits_of(field).low < limits_of(field).high

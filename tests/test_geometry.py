@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator  # type: ignore[import-untyped]
 
 from bemt.sections import rule as section_rule
-from geometry.airfoil import Airfoil, blend, naca, naca4, plate
-from geometry.airfoil_file import parse_dat
+from geometry.airfoil import Airfoil, blend, naca, naca4, parse_dat, plate
 from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError, pchip
 from geometry.designation import parse_designation

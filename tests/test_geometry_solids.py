@@ -13,11 +13,11 @@ import pytest
 from bemt.case import load_case
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
-from geometry.cylinder_cut import blades
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws, helix
 from geometry.mesh import MeshModel, Options, build, rotor_mesh
 from geometry.rotor import Rotor
+from geometry.rotor_axis import blades
 from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
 from geometry.surface import surfaces

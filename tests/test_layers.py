@@ -67,9 +67,8 @@ MAY: dict[str, set[str]] = {
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
     "bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
-    "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.folder": {"files"},
+    "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.points": {"files"},
     "bemt.sweep.batch": {"files", "environment"},
-    "bemt.compare.bench.*": {"files", "clock", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
     "bemt.diagnose.interval_scales": {"files"},
     "bemt.proof.prove": {"files", "clock", "environment"},
@@ -81,7 +80,7 @@ MAY: dict[str, set[str]] = {
     "bemt.design.motors_file": {"files"},
     "bemt.drive.*_file|bemt.drive.*_folder|bemt.drive.*_result": {"files"},
     "bemt.report|bemt.report.*": {"files"},
-    "geometry.export|geometry.picture*": {"files"},
+    "geometry.export": {"files"},
 }
 
 # What makes the data of the proof must know nothing of what is proved, not even through others.

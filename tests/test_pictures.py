@@ -9,13 +9,9 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import offscreen as picture
 import pytest
-
-from geometry import picture
-from geometry.airfoil import naca
-from geometry.duct import around
-from geometry.laws import helix
-from geometry.picture import (
+from offscreen import (
     PictureError,
     blade_scene,
     cutaway_scene,
@@ -24,6 +20,10 @@ from geometry.picture import (
     render,
     rotor_scene,
 )
+
+from geometry.airfoil import naca
+from geometry.duct import around
+from geometry.laws import helix
 from geometry.rotor import Rotor
 
 OUTLINE = Rotor(helix(0.2032, 0.127, anchors=naca("4412")), 2)

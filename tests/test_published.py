@@ -18,8 +18,7 @@ from bemt.bem.duct import duct_flow
 from bemt.effects import Effect, standard
 from bemt.effects.lifting_surface import LiftingSurface
 from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
-from geometry.airfoil import Airfoil, naca, naca4
-from geometry.airfoil_file import parse_dat
+from geometry.airfoil import Airfoil, naca, naca4, parse_dat
 from geometry.blade import from_stations
 from geometry.duct import Duct
 from geometry.rotor import Rotor

@@ -30,10 +30,10 @@ from bemt.commands.cli import main
 from bemt.report import book_html
 from bemt.report.cfd import attach, cfd_runs
 from bemt.report.found_files import safe_files
+from bemt.report.front import summary
 from bemt.report.gather import attach_diagnoses, gather
 from bemt.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.report.rotor_view import viewer
-from bemt.report.summary import summary
 from bemt.report.verdicts import verdict
 
 CASE = """
@@ -820,7 +820,7 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
 
 
 def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.report.fidelity import fidelities, fidelity_sections
+    from bemt.report.cfd import fidelities, fidelity_sections
 
     folder = tmp_path / "disk"
     folder.mkdir()

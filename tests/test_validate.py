@@ -14,7 +14,7 @@ from bemt.base.tables import json_text
 from bemt.commands.cli import main
 from bemt.readers import uiuc
 from bemt.sections import rule as section_rule
-from bemt.validate import match, points, propellers, text
+from bemt.validate import points, propellers
 
 R_R = np.linspace(0.15, 1.0, 18)
 C_R = 0.12 + 0.08 * np.sin(np.pi * R_R) - 0.06 * R_R
@@ -70,13 +70,13 @@ def test_a_planted_blade_angle_is_found_and_kept_apart(tmp_path: Path) -> None:
         assert turned[kind]["points"] == plain[kind]["points"]
     assert doc["propellers"][0].pop("matched_J0")["shift_deg"] == turned["shift_deg_p10_p50_p90"][1]
     assert doc == plain
-    assert "turned to measured J0, 1" in text.text({**doc, "matched_J0": turned})
+    assert "turned to measured J0, 1" in propellers.text({**doc, "matched_J0": turned})
 
 
 def test_a_zero_thrust_J_that_no_blade_angle_gives_is_not_matched() -> None:
-    assert np.isnan(match.shift_to(float("nan"), lambda d: 0.7 + 0.05 * d))
-    assert np.isnan(match.shift_to(0.7, lambda d: 0.9 if d > -2.0 else float("nan")))
-    assert match.shift_to(0.7, lambda d: 0.7) == 0.0
+    assert np.isnan(propellers.shift_to(float("nan"), lambda d: 0.7 + 0.05 * d))
+    assert np.isnan(propellers.shift_to(0.7, lambda d: 0.9 if d > -2.0 else float("nan")))
+    assert propellers.shift_to(0.7, lambda d: 0.7) == 0.0
 
 
 def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
     doc = propellers.validate(_folder(tmp_path))
     nothing = points.statistics(np.array([np.nan, np.nan]))
     doc["static"]["CT"] |= nothing
-    line = next(row for row in text.text(doc).splitlines() if row.startswith("all points"))
+    line = next(row for row in propellers.text(doc).splitlines() if row.startswith("all points"))
     assert line.split("|")[1].split() == ["inf", "inf", "-"]
 
 

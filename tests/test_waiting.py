@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import bemt
-from bemt.base.kept import Kept
+from bemt.base.cache import Kept
 from bemt.bem import model as bem
 from bemt.case import lattice
 from bemt.case.prepare import prepare_case

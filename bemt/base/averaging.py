@@ -20,9 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-
-Array = NDArray[np.float64]
 
 DEFAULT_REVOLUTIONS = 4
 """Revolutions that are averaged when nothing is asked for, at most half of what the run has."""

@@ -5,7 +5,7 @@ temporary name and renamed, so a reader never sees half a file; an entry that ca
 folder that cannot be written switches the disk part off and nothing else.
 
 The folder is ``$BEMT_CACHE``, else ``$XDG_CACHE_HOME/bemt``, else ``~/.cache/bemt``. ``BEMT_CACHE=off`` (or empty)
-keeps everything in the process.
+keeps everything in the process. `Kept` bounds what is kept in memory only.
 """
 
 from __future__ import annotations
@@ -15,15 +15,66 @@ import json
 import os
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from threading import Lock
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+
+V = TypeVar("V")
+
+
+class Kept(Generic[V]):
+    """Values by key; beyond ``most`` units of size the ones used longest ago are dropped.
+
+    A key must hold everything that decides the value, so that none is ever stale. Threads that miss the same key at
+    once make it twice and share the first.
+
+    >>> kept = Kept(most=2, size=len)
+    >>> [kept.get(key, lambda: key) for key in ("a", "b", "a", "c")], len(kept)
+    (['a', 'b', 'a', 'c'], 2)
+    """
+
+    def __init__(self, most: float, size: Callable[[V], float]) -> None:
+        self.most, self._size = most, size
+        self._values: OrderedDict[Hashable, tuple[V, float]] = OrderedDict()
+        self._lock = Lock()
+        self.size, self.made = 0.0, 0
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def get(self, key: Hashable, make: Callable[[], V]) -> V:
+        """Value of a key, made if it is not there."""
+        with self._lock:
+            found = self._values.get(key)
+            if found is not None:
+                self._values.move_to_end(key)
+                return found[0]
+        value = make()
+        size = float(self._size(value))
+        with self._lock:
+            self.made += 1
+            if key in self._values:
+                return self._values[key][0]
+            if size <= self.most:
+                self._values[key] = value, size
+                self.size += size
+            while self.size > self.most:
+                self.size -= self._values.popitem(last=False)[1][1]
+        return value
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._values.clear()
+            self.size = 0.0
+
 
 Arrays = dict[str, np.ndarray]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
@@ -9,11 +10,11 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["STYLE", "blank"]
-
 # Okabe and Ito 2008, Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, RED, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8a8a8a"
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, BLACK)
+"""Colours of lines, first to last."""
 
 WIDTH = 8.0
 DPI = 150
@@ -25,11 +26,30 @@ STYLE: dict[Any, Any] = {
 """Settings of matplotlib."""
 
 
-def blank(height: float, rows: int, columns: int, **options: Any) -> tuple[Figure, NDArray[Any]]:
-    """Give a figure that no window knows of, so that nothing stays open."""
+def figure(width: float, height: float) -> Figure:
+    """Give a figure that no window knows of, so that nothing stays open [in]."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+    made = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(made)
+    return made
+
+
+def blank(height: float, rows: int, columns: int, **options: Any) -> tuple[Figure, NDArray[Any]]:
+    """Figure of the usual width with axes in rows and columns."""
+    made = figure(WIDTH, height)
+    return made, made.subplots(rows, columns, squeeze=False, **options)
+
+
+def frame(ax: Any) -> None:
+    """Grid, and no frame above and to the right."""
+    ax.grid(True, alpha=0.3)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def png(made: Figure, dpi: int = 110) -> bytes:
+    """PNG bytes that depend on the figure alone."""
+    out = io.BytesIO()
+    made.savefig(out, format="png", dpi=dpi, metadata={"Software": None})
+    return out.getvalue()

@@ -6,8 +6,6 @@ import re
 import stat
 from pathlib import Path
 
-__all__ = ["commit"]
-
 _HASH = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
 _REF = re.compile(r"refs/[\w./+@-]+")
 _MOST = 1 << 24  # Bytes of a file of references

@@ -44,7 +44,7 @@ _NOT_EMPTY = StringConstraints(pattern=r"\S")
 
 
 @dataclass(frozen=True)
-class Limits:
+class FieldLimits:
     """What the numbers or texts of a field may be; as metadata of the field it builds pydantic's own checks."""
 
     unit: str = ""  # for messages
@@ -91,7 +91,7 @@ class Limits:
 class _Number:
     """A finite number within limits: no text, no truth value; 4.0 is a whole number."""
 
-    limits: Limits
+    limits: FieldLimits
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         low, high = ((None if math.isinf(v) else v) for v in (self.limits.low, self.limits.high))
@@ -112,7 +112,7 @@ class _Number:
 
 def entry(
     meaning: str,
-    unit: str | Limits = "",
+    unit: str | FieldLimits = "",
     low: float = -math.inf,
     high: float = math.inf,
     suspect: Callable[[Any], str] | None = None,
@@ -125,7 +125,9 @@ def entry(
 ) -> Any:
     """Declare one field of a :class:`Table`: what it means, its unit and range (or those of another), its default."""
     made = Field(... if required else default, description=meaning, alias=alias)
-    made.metadata.append(unit if isinstance(unit, Limits) else Limits(unit, low, high, suspect, tuple(choices), words))
+    made.metadata.append(
+        unit if isinstance(unit, FieldLimits) else FieldLimits(unit, low, high, suspect, tuple(choices), words)
+    )
     return made
 
 
@@ -181,15 +183,15 @@ def axis_values(axis: tuple[float, ...] | Span) -> NDArray[np.float64]:
     return np.linspace(axis.start, axis.stop, axis.num) if isinstance(axis, Span) else np.array(axis, dtype=float)
 
 
-def limits_of(field: FieldInfo) -> Limits:
+def limits_of(field: FieldInfo) -> FieldLimits:
     """What the values of a field may be."""
-    return next((item for item in field.metadata if isinstance(item, Limits)), Limits())
+    return next((item for item in field.metadata if isinstance(item, FieldLimits)), FieldLimits())
 
 
-def expected(kind: Any, limits: Limits, name: str = "") -> str:
+def expected(kind: Any, limits: FieldLimits, name: str = "") -> str:
     """What a value must be, in words.
 
-    >>> expected(float | None, Limits("mm", 0, 5)), expected(Literal["a", "b"], Limits())
+    >>> expected(float | None, FieldLimits("mm", 0, 5)), expected(Literal["a", "b"], FieldLimits())
     ('a number from 0 to 5 mm', 'one of a, b')
     """
     if limits.words:
@@ -237,7 +239,7 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _hint(where: str, value: Any, kind: Any, limits: Limits) -> str:
+def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
     """How to repair a value that is not what its field holds."""
     parts, name = _parts(kind), where.rpartition(".")[2]
     if isinstance(value, str):

@@ -16,8 +16,6 @@ from functools import cache
 
 from bemt.base.units import DEG, FOOT, INCH, LBF, POUND, RPM, UNITS
 
-__all__ = ["SpeedRatio", "UnitError", "errors", "named", "speed_ratios", "symmetric"]
-
 
 @dataclass(frozen=True)
 class UnitError:
@@ -224,20 +222,8 @@ def _ratios() -> Iterator[SpeedRatio]:
 def speed_ratios(rarest: float = math.inf, nearest: Fraction = Fraction(1)) -> tuple[SpeedRatio, ...]:
     """Miscounted speeds, one for each ratio, the commonest first: pole pairs, blades, marks; ratio and inverse.
 
-    Parameters
-    ----------
-    rarest : float
-        Largest rarity [1].
-    nearest : Fraction
-        Ratios nearer to 1 than this, or its inverse, are left out: a reading of the level cannot tell them [1].
+    Left out: rarer ones than `rarest`, and ratios nearer to 1 than `nearest`, which a reading of the level cannot tell.
 
-    Returns
-    -------
-    tuple of SpeedRatio
-        The cause is the commonest one of the ratio.
-
-    Examples
-    --------
     >>> [f"{r.true}/{r.set}" for r in speed_ratios(rarest=0.0)]
     ['6/1', '7/1', '11/1', '12/1', '14/1', '6/7', '7/6']
     """

@@ -44,15 +44,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem.duct_stream import jet_area
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
     from geometry.rotor import Rotor
-
-Array = NDArray[np.float64]
 
 # Rounded entrance, loss over 1/2 rho w^2 against lip radius / hydraulic diameter.  Nominal: Crane TP-410, p. A-29;
 # upper end: Idelchik (2007), Handbook of Hydraulic Resistance, 4th ed., diagram 3-4 (both from memory, not checked);
@@ -106,43 +104,23 @@ def lip_loss(radius_over_diameter: float) -> LipLoss:
 
 @dataclass(frozen=True)
 class DuctFlow:
-    """The numbers by which a duct enters the momentum balance.
+    """The numbers by which a duct enters the momentum balance."""
 
-    Attributes
-    ----------
-    wake_ratio : float
-        sigma_w, exit area over the rotor's annulus [1].
-    wall_loss, lip_loss : float
-        Loss coefficients on w^2 and (w - V)^2 [1].
-    stator : float
-        Share of the swirl's dynamic pressure recovered behind the rotor, 0 without a stator [1].
-    gap : float
-        Tip gap [m].
-    span : float
-        Blade height, R - Rhub [m].
-    drag_area : float
-        Drag of the outer wall over 1/2 rho V^2 [m2].
-    contraction, capture : float
-        Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1].
-    bend : float
-        Departure of the jet's speed from a straight line between the two, see :mod:`bemt.bem.duct_stream` [1].
-    area : float
-        Swept annulus, pi (R^2 - Rhub^2) [m2].
-    exit_hub : float
-        Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m].
-    """
-
-    wake_ratio: float
+    wake_ratio: float  # sigma_w, exit area over the rotor's annulus [1]
+    # Loss coefficients on w^2 and (w - V)^2 [1]
     wall_loss: float = 0.0
     lip_loss: float = 0.0
-    stator: float = 0.0
-    gap: float = 0.0
-    span: float = 1.0
-    drag_area: float = 0.0
+    stator: float = 0.0  # Share of the swirl's dynamic pressure recovered behind the rotor, 0 without a stator [1]
+    gap: float = 0.0  # Tip gap [m]
+    span: float = 1.0  # Blade height, R - Rhub [m]
+    drag_area: float = 0.0  # Drag of the outer wall over 1/2 rho V^2 [m2]
+    # Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1]
     contraction: float = 1.0
     capture: float = 1.0
+    # Departure of the jet's speed from a straight line between the two, see :mod:`bemt.bem.duct_stream` [1]
     bend: float = 0.0
-    area: float = float("nan")
+    area: float = float("nan")  # Swept annulus, pi (R^2 - Rhub^2) [m2]
+    # Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m]
     exit_hub: float = float("nan")
 
     def jet_speed(self, w: Array, V: Array) -> Array:

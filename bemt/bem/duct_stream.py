@@ -29,11 +29,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from geometry.duct import Duct
-
-Array = NDArray[np.float64]
 
 # Fewer than a hundred unknowns: beyond it a linear solver starts threads, which cost more than they save.
 WALL_PANELS, BODY_PANELS = 26, 7

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem import kernel as K
 from bemt.bem import solver
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["Gradient", "Moved", "elements", "gradient", "loads", "moved", "only"]
-
-Array = NDArray[np.float64]
-
 STEP = 1e-6
 """Relative step of the central differences; of blade angles in radians, of airspeed in tip speeds."""
 _RAD_PER_RPM = math.pi / 30.0
@@ -37,25 +34,16 @@ _RAD_PER_RPM = math.pi / 30.0
 
 @dataclass(frozen=True, eq=False)
 class Gradient:
-    """Loads at one point, and how they change.
+    """Loads at one point, and how they change."""
 
-    Attributes
-    ----------
-    stations : Stations
-        Blade elements. [m], [rad]
-    thrust_N, torque_Nm : float
-        Rotor thrust (without duct and stator) [N] and shaft torque [N m].
-    chord, beta : (2, N) float
-        Derivatives of thrust and torque by each element's chord [N/m], [N m/m] and blade angle [N/rad], [N m/rad].
-    rpm, airspeed, density : (2,) float
-        Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity, speed of sound held) [N/unit], [N m/unit].
-    """
-
-    stations: Stations
+    stations: Stations  # Blade elements. [m], [rad]
+    # Rotor thrust (without duct and stator) [N] and shaft torque [N m]
     thrust_N: float
     torque_Nm: float
+    # (2, N) Derivatives of thrust and torque by each element's chord [N/m], [N m/m] and blade angle [N/rad], [N m/rad]
     chord: Array
     beta: Array
+    # (2,) Derivatives of thrust and torque by rev/min, m/s, kg/m3 (viscosity, speed of sound held) [N/unit], [N m/unit]
     rpm: Array
     airspeed: Array
     density: Array
@@ -117,7 +105,7 @@ def loads(
     return float(both[0].sum()), float(both[1].sum())
 
 
-class Moved(NamedTuple):
+class PerturbedRotors(NamedTuple):
     """The rotor, and rotors whose chords (angles) are all a little smaller and larger, with the distance between."""
 
     base: Prepared
@@ -125,7 +113,9 @@ class Moved(NamedTuple):
     beta: tuple[Prepared, Prepared, Array]
 
 
-def moved(model: Model, effects: Sequence[Effect], stations: Stations | None = None, step: float = STEP) -> Moved:
+def moved(
+    model: Model, effects: Sequence[Effect], stations: Stations | None = None, step: float = STEP
+) -> PerturbedRotors:
     """Rotors around the one to be differentiated: what differs between them is the derivative, element by element."""
     chosen = _inside(effects)
     s = stations if stations is not None else model.rotor.blade.midpoints(model.n_stations, spacing="cosine")
@@ -137,7 +127,7 @@ def moved(model: Model, effects: Sequence[Effect], stations: Stations | None = N
         low, high = (made(s._replace(**{key: getattr(s, key) + sign * width})) for sign in (-1.0, 1.0))
         return low, high, 2.0 * width
 
-    return Moved(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
+    return PerturbedRotors(made(s), pair("chord", step * s.chord), pair("beta", np.full(s.beta.shape, step)))
 
 
 def only(model: Model, effects: Sequence[Effect], stations: Stations) -> Prepared:

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.base.cache import content_key
-from bemt.base.kept import Kept
+from bemt.base.arrays import Array
+from bemt.base.cache import Kept, content_key
 from bemt.bem import packing as arrays
 from bemt.bem import solver
 from bemt.bem.duct import DuctFlow, duct_flow
@@ -33,10 +33,6 @@ if TYPE_CHECKING:
     from geometry.blade import Stations
     from geometry.duct import Duct
     from geometry.rotor import Rotor
-
-__all__ = ["Model", "acts_on_points", "acts_on_rotor", "flow_of", "only_reads", "respond", "solve"]
-
-Array = NDArray[np.float64]
 
 # Slope of the loads with onset speed: central difference over this share of the tip speed.
 _SPEED_STEP = 2e-3
@@ -55,39 +51,18 @@ PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept (:data:`PREPARED`).
-
-    Parameters
-    ----------
-    rotor : geometry.rotor.Rotor
-        Rotor.
-    polars : sequence of (float, Polar)
-        Section tables at r/R.
-    duct : DuctFlow or None
-        Duct.
-    n_stations : int
-        Blade elements [1].
-    mach_max : float
-        Largest section Mach number that occurs [1].
-    re_range : tuple of float or None
-        Section Reynolds numbers that occur; None: any [1].
-    effects : tuple of Effect
-        Physics that is on.
-    notes : tuple of str
-        Remarks of the section tables.
-    learned : callable or None
-        What a run of this rotor adds to CT and CP, (2, P), at advance ratios along the shaft and Reynolds numbers at
-        0.75 R of the rotation alone, (P,) each [1].
-    """
+    """Everything from which a rotor is solved with any set of effects; prepared rotors are kept (:data:`PREPARED`)."""
 
     rotor: Rotor
-    polars: Sequence[tuple[float, Polar]]
+    polars: Sequence[tuple[float, Polar]]  # Section tables at r/R
     duct: DuctFlow | None = None
-    n_stations: int = 40
-    mach_max: float = 1.25
-    re_range: tuple[float, float] | None = None
-    effects: tuple[Effect, ...] = field(default_factory=standard)
-    notes: tuple[str, ...] = ()
+    n_stations: int = 40  # Blade elements [1]
+    mach_max: float = 1.25  # Largest section Mach number that occurs [1]
+    re_range: tuple[float, float] | None = None  # Section Reynolds numbers that occur; None: any [1]
+    effects: tuple[Effect, ...] = field(default_factory=standard)  # Physics that is on
+    notes: tuple[str, ...] = ()  # Remarks of the section tables
+    # What a run of this rotor adds to CT and CP, (2, P), at advance ratios along the shaft and Reynolds numbers at 0.75
+    # R of the rotation alone, (P,) each [1]
     learned: Callable[[Array, Array], Array] | None = None
     _reaching: dict[Any, Model] = field(default_factory=dict, init=False, repr=False)
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from bemt.effects import Effect
     from geometry.blade import Stations
 
-__all__ = ["rotor_component"]
-
 
 def rotor_component(model: Model, effects: Sequence[Effect], air: Air) -> Any:
     """Make a component of one rotor."""

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import residual as res
 from bemt.effects.base import Baking
@@ -26,8 +26,6 @@ from bemt.sections.polars import (
 
 if TYPE_CHECKING:
     from bemt.sections.polars import Polar
-
-Array = NDArray[np.float64]
 
 # Squared Mach number grid: uniform, so that the kernel needs neither root nor search.
 M2_STEP = 0.1

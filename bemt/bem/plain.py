@@ -17,13 +17,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem.residual import Y_BRAKE
 
-__all__ = ["PlainBlade", "PlainLoads", "solve_plain"]
-
-Array = NDArray[np.float64]
 Section = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 

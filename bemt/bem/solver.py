@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import packing as arrays
 from bemt.bem import residual as res
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from geometry.rotor import Rotor
 
 __all__ = ["REASONS", "Prepared", "Solution", "prepare", "solve", "solve_point", "standard"]
-
-Array = NDArray[np.float64]
 
 REASONS = {
     K.NOT_CONVERGED: "root search did not reach its tolerance",
@@ -56,41 +55,22 @@ _THREAD_MIN = 64
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A rotor ready to solve; made by :func:`prepare`, not by hand.
-
-    Attributes
-    ----------
-    rotor : geometry.rotor.Rotor
-        Rotor.
-    stations : Stations
-        Blade elements.
-    effects : tuple of Effect
-        Physics that is on.
-    duct : DuctFlow or None
-        Momentum numbers of the duct.
-    st : (N, 14) float
-        Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units.
-    tab : (N, rows, Na, 2) float
-        Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in ``tables`` [1].
-    axes : (int, int)
-        Mach and Reynolds numbers of the tables.
-    num, grid : (13,), (17,) float
-        Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and
-        :mod:`bemt.bem.kernel` [SI units].
-    cone : float or None
-        Coning angle of blades on flapping hinges; None: stiff blades [rad].
-    """
+    """A rotor ready to solve; made by :func:`prepare`, not by hand."""
 
     rotor: Rotor
     stations: Stations
-    effects: tuple[Effect, ...]
-    duct: DuctFlow | None
-    st: Array
+    effects: tuple[Effect, ...]  # Physics that is on
+    duct: DuctFlow | None  # Momentum numbers of the duct
+    st: Array  # (N, 14) Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units
+    # (N, rows, Na, 2) Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in
+    # ``tables`` [1]
     tab: Array
-    axes: tuple[int, int]
+    axes: tuple[int, int]  # Mach and Reynolds numbers of the tables
+    # (13,), (17,) Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and :mod:`bemt.bem.kernel`
+    # [SI units]
     num: Array
     grid: Array
-    cone: float | None = None
+    cone: float | None = None  # Coning angle of blades on flapping hinges; None: stiff blades [rad]
 
     @property
     def D(self) -> float:
@@ -130,55 +110,37 @@ class Prepared:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Results over P operating points, NaN where not converged.
+    """Results over P operating points, NaN where not converged."""
 
-    Attributes
-    ----------
-    rpm, V : (P,) float
-        Rotation speed [rev/min] and axial onset speed [m/s].
-    T, Q, P : (P,) float
-        Thrust [N], torque [N m], shaft power [W].  With a duct T is the total.
-    CT, CQ, CP, J : (P,) float
-        Propeller convention, CT = T/(rho n^2 D^4) [1].
-    T_rotor, T_duct, T_stator, V_exit : (P,) float
-        Thrust shares [N]; speed in the exit plane, mass flow / (rho A_exit) (ducted), or in the far wake, averaged
-        over the mass flow (open) [m/s].
-    mass_flow : (P,) float
-        Mass flow through the disk [kg/s].
-    converged : (P,) bool
-        False where any blade element failed.
-    flags : tuple of tuple of str
-        Words per point: reasons of failure, turbulent states, Mach number above the tables.
-    radial : dict of (P, N) float, empty unless asked for
-        r, phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, a, ap, Re, M.
-    side : (P,) float or None
-        In-plane onset speed [m/s], if any was given.
-    hub : (P, 4) float or None
-        In-plane forces H (downstream), Y (to the advancing side) [N], roll moment (lifts the advancing side) and pitch
-        moment (lifts the upstream side) [N m]; given with `side`.
-    disk : (P, N, azimuths) float or None
-        Thrust per area over blade and azimuth, if asked for with `radial` [N/m2]; 0 where `side` is 0.
-    """
-
+    # (P,) Rotation speed [rev/min] and axial onset speed [m/s]
     rpm: Array
     V: Array
+    # (P,) Thrust [N], torque [N m], shaft power [W].  With a duct T is the total
     T: Array
     Q: Array
     P: Array
+    # (P,) Propeller convention, CT = T/(rho n^2 D^4) [1]
     CT: Array
     CQ: Array
     CP: Array
     J: Array
+    # (P,) Thrust shares [N]; speed in the exit plane, mass flow / (rho A_exit) (ducted), or in the far wake, averaged
+    # over the mass flow (open) [m/s]
     T_rotor: Array
     T_duct: Array
     T_stator: Array
     V_exit: Array
-    mass_flow: Array
-    converged: NDArray[np.bool_]
+    mass_flow: Array  # (P,) Mass flow through the disk [kg/s]
+    converged: NDArray[np.bool_]  # (P,) False where any blade element failed
+    # Words per point: reasons of failure, turbulent states, Mach number above the tables
     flags: tuple[tuple[str, ...], ...]
+    # (P, N) r, phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, a, ap, Re, M
     radial: dict[str, Array] = field(default_factory=dict)
-    side: Array | None = None
+    side: Array | None = None  # (P,) In-plane onset speed [m/s], if any was given
+    # (P, 4) In-plane forces H (downstream), Y (to the advancing side) [N], roll moment (lifts the advancing side) and
+    # pitch moment (lifts the upstream side) [N m]; given with `side`
     hub: Array | None = None
+    # (P, N, azimuths) Thrust per area over blade and azimuth, if asked for with `radial` [N/m2]; 0 where `side` is 0
     disk: Array | None = None
 
 
@@ -194,41 +156,14 @@ def prepare(
     level: float = 1.0,
     re_range: tuple[float, float] | None = None,
 ) -> Prepared:
-    """Bake a rotor, its section tables and its effects for the kernel.
+    """Bake a rotor, its section tables and its effects (default: the standard ones) for the kernel.
 
-    Parameters
-    ----------
-    rotor : geometry.rotor.Rotor
-        Blades, blade count, hub.  A blade without sections counts as 12 % thick (wave drag).
-    polars : sequence of (float, Polar)
-        Section tables at r/R; linear blend in r/R between them, constant beyond the ends.
-    effects : iterable of Effect, optional
-        Physics that is on; default :func:`bemt.effects.standard`.
-    duct : DuctFlow, optional
-        Momentum numbers of a duct, see :mod:`bemt.bem.duct`.
-    n_stations : int
-        Blade elements, cosine spaced [1].
-    stations : Stations, optional
-        Blade elements to use as they are, instead.
-    mach_max : float
-        Largest section Mach number to tabulate [1]; beyond it the last table is held and the point flagged.
-    level : float
-        Share at which effects act whose size differs between points, see :meth:`bemt.effects.Effect.share` [1].
-    re_range : tuple of float, optional
-        Reynolds numbers that will occur: other tables are left out, which makes many preparations cheap [1].
+    A blade without sections counts as 12 % thick (wave drag). Section tables at r/R blend linearly between them and are
+    constant beyond the ends; beyond `mach_max` the last table is held and the point flagged. `stations` are used as
+    they are instead of `n_stations` cosine-spaced ones. `level`: share at which effects act whose size differs between
+    points, see :meth:`bemt.effects.Effect.share`. `re_range`: Reynolds numbers that will occur; other tables are left
+    out, which makes many preparations cheap. ValueError if polars are missing or a station is not usable.
 
-    Returns
-    -------
-    Prepared
-        For :func:`solve`.
-
-    Raises
-    ------
-    ValueError
-        If polars are missing or a station is not usable.
-
-    Examples
-    --------
     >>> from bemt.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.readers._uiuc_names import class_of
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from bemt.case.schema import AsBuiltTable, BladeTable, CaseFile
     from geometry.rotor import Rotor
-
-Array = NDArray[np.float64]
 
 # Assumptions that move a latent number of their own accord.
 MOVED = {

@@ -14,15 +14,12 @@ from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case.schema import AirTable, CaseFile
-from geometry.airfoil import Airfoil, naca, naca4
-from geometry.airfoil_file import parse_dat
+from geometry.airfoil import Airfoil, naca, naca4, parse_dat
 from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
-
-__all__ = ["build_air", "build_duct", "build_rotor"]
 
 T = TypeVar("T")
 

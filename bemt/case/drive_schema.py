@@ -19,16 +19,16 @@ from typing import Literal
 
 import numpy as np
 
-from bemt.base.toml import Limits, Table, entry
+from bemt.base.toml import FieldLimits, Table, entry
 
 LIPO_SOC = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 LIPO_V = (3.27, 3.61, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20)
 """Open-circuit voltage of a lithium polymer cell, as printed on hobby charts: declared, not measured here. [V]"""
-KV = Limits(
+KV = FieldLimits(
     "rev/min/V", 20.0, 50_000.0, lambda v: "That is rev/min per volt, as printed on the motor" if v < 20 else ""
 )
-MASS = Limits("kg", 0.005, 1000.0, lambda v: f"In grams? Write {v / 1e3:g}" if v > 1000.0 else "")
-CAPACITY = Limits("A h", 0.01, 1000.0, lambda v: f"Looks like mAh: write {v / 1e3:g}" if v > 200.0 else "")
+MASS = FieldLimits("kg", 0.005, 1000.0, lambda v: f"In grams? Write {v / 1e3:g}" if v > 1000.0 else "")
+CAPACITY = FieldLimits("A h", 0.01, 1000.0, lambda v: f"Looks like mAh: write {v / 1e3:g}" if v > 200.0 else "")
 
 
 def _slip_mohm(value: float) -> str:

@@ -17,8 +17,6 @@ from bemt.readers._uiuc_names import class_of, family_of
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
-__all__ = ["case_name", "fan_text", "full_rpm", "label_text", "of_stations", "read_label", "stations_text"]
-
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
 

@@ -17,8 +17,6 @@ from bemt.readers._blade import case_text
 if TYPE_CHECKING:
     from bemt.readers._blade import BladeFile
 
-__all__ = ["document", "read_blade", "text", "write"]
-
 
 def read_blade(path: Path, unit: str | None = None) -> BladeFile | None:
     """Blade of a design tool's file, None when no reader of blades claims it."""

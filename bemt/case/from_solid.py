@@ -16,8 +16,6 @@ from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import FoundRotor, find_rotor
 
-__all__ = ["case_files", "document", "find_stations", "refuse_other", "text", "write"]
-
 SCHEMA = "bemt.stations/1"
 TIP_SPEED = 120.0  # of the rpm that is put into the case: geometry says nothing about it [m/s]
 ANCHORS = (0.2, 0.35, 0.5, 0.65, 0.8, 0.95)

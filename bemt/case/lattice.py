@@ -13,15 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.case.propagate import propagate
 
 if TYPE_CHECKING:
     from bemt.case.load import Case
     from bemt.dataset import Dataset
-
-__all__ = ["solve"]
-
-Array = NDArray[np.float64]
 
 FEW = 300
 """Up to so many points each has its band solved for itself."""

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
-__all__ = ["Assumption", "Case", "check_name", "find_cases", "load_case"]
-
 FILE_NAME = "case.toml"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem.coaxial import RATIOS, PairModel
 from bemt.rotors.latents import AsBuilt, as_built
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from bemt.rotors.latents import Prior
 
-Array = NDArray[np.float64]
 Loads = dict[str, Array]
 
 

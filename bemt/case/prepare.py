@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt import effects
 from bemt.base import cache
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.coaxial import PairModel
 from bemt.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
@@ -19,7 +20,7 @@ from bemt.bem.model import Model, acts_on_points
 from bemt.case.load import Assumption
 from bemt.effects.tip_gap import GAP_LOSS, TipGap
 from bemt.rotors import k1k2
-from bemt.rotors.learned import with_run
+from bemt.rotors.model import with_run
 from bemt.sections import polars
 from bemt.sections.neuralfoil import neuralfoil_polar
 
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
     from bemt.case.schema import PolarTable
     from bemt.dataset import Dataset
     from geometry.rotor import Rotor
-
-__all__ = ["duct_unknowns", "k1k2_case", "prepare_case", "prepare_pair"]
-
-Array = NDArray[np.float64]
 
 
 def _effects(case: Case) -> tuple[effects.Effect, ...]:

@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt import coefficients as co
 from bemt.air import air_arrays
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.bem.model import HUB_LOADS
@@ -35,19 +36,6 @@ if TYPE_CHECKING:
     from bemt.case.load import Assumption, Case
     from bemt.dataset import Dataset
 
-__all__ = [
-    "BANDED",
-    "Moved",
-    "Points",
-    "Propagated",
-    "propagate",
-    "solve_at",
-    "spread",
-    "validity_of",
-    "vary",
-]
-
-Array = NDArray[np.float64]
 Answers = Mapping[str, Array]
 Progress = Callable[[int, int, str], None]
 

@@ -13,8 +13,6 @@ from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
 
-__all__ = ["check_case", "check_shape", "table_at", "value_at"]
-
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
 MAX_GRID = 50_000_000

@@ -14,35 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import LIQUID
-from bemt.base.toml import Axis, Limits, Table, axis_values, entry, expected, shown
+from bemt.base.toml import Axis, FieldLimits, Table, axis_values, entry, expected, shown
 from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
-
-__all__ = [
-    "AIRSPEED",
-    "ANGLE",
-    "AXES",
-    "GROUPS",
-    "INCH",
-    "RPM",
-    "AirTable",
-    "AsBuiltTable",
-    "AssumptionTable",
-    "BladeTable",
-    "CaseFile",
-    "DuctTable",
-    "ModelTable",
-    "OperatingTable",
-    "PolarTable",
-    "RotorTable",
-    "SecondRotorTable",
-    "SectionTable",
-    "StatorTable",
-    "SweepTable",
-]
 
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)
 INCH = 0.0254
@@ -74,24 +51,24 @@ def _percent(key: str, low: float = 1.0) -> Suspect:
     return _looks((low, 1000.0, "percent", lambda v: v / 100.0, key))
 
 
-RPM = Limits("rev/min", 10, 300_000, _looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))
-AIRSPEED = Limits("m/s", -100, 300, _looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
-ANGLE = Limits("deg", 0, 180)
-_DENSITY = Limits("kg/m3", 0.01, LIQUID[1], _looks(
+RPM = FieldLimits("rev/min", 10, 300_000, _looks((1e-9, 9.999, "rev/s", lambda v: v * 60, "rpm")))
+AIRSPEED = FieldLimits("m/s", -100, 300, _looks((300.1, 1100, "km/h", lambda v: v / 3.6, "airspeed_m_s")))
+ANGLE = FieldLimits("deg", 0, 180)
+_DENSITY = FieldLimits("kg/m3", 0.01, LIQUID[1], _looks(
     (1100.01, 1500, "g/m3", lambda v: v / 1000, "density_kg_m3"),
     (0.0755, 0.0775, "lb/ft3", lambda v: v * 16.018463, "density_kg_m3"),
     (0.00235, 0.0024, "slug/ft3", lambda v: v * 515.37882, "density_kg_m3")))  # fmt: skip
-_ALTITUDE = Limits("m", -500, 20_000, _looks((20_000.1, 70_000, "feet", lambda v: v * 0.3048, "altitude_m")))
-_TEMPERATURE = Limits("C", -60, 60, _looks(
+_ALTITUDE = FieldLimits("m", -500, 20_000, _looks((20_000.1, 70_000, "feet", lambda v: v * 0.3048, "altitude_m")))
+_TEMPERATURE = FieldLimits("C", -60, 60, _looks(
     (180, 340, "kelvin", lambda v: v - 273.15, "temperature_C"),
     (60.1, 140, "degrees Fahrenheit", lambda v: (v - 32) / 1.8, "temperature_C")))  # fmt: skip
-_PRESSURE = Limits("hPa", 50, 1200, _looks(
+_PRESSURE = FieldLimits("hPa", 50, 1200, _looks(
     (5000, 120_000, "pascals", lambda v: v / 100, "pressure_hPa"),
     (0.5, 1.2, "bar", lambda v: v * 1000, "pressure_hPa"),
     (25, 32, "inches of mercury", lambda v: v * 33.86389, "pressure_hPa")))  # fmt: skip
-_PITCH_IN = Limits("in", 0.1, 120, _inch("pitch_in", 120.1))
-_DIAMETER_IN = Limits("in", 0.5, 200, _inch("diameter_in", 200.1))
-_GAP = Limits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
+_PITCH_IN = FieldLimits("in", 0.1, 120, _inch("pitch_in", 120.1))
+_DIAMETER_IN = FieldLimits("in", 0.5, 200, _inch("diameter_in", 200.1))
+_GAP = FieldLimits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
@@ -355,7 +332,7 @@ class SweepTable(Table):
     pitch_in: Axis = entry("pitches", _PITCH_IN)
     diameter_in: Axis = entry("diameters", _DIAMETER_IN)
     tip_gap_mm: Axis = entry("tip gaps", _GAP)
-    z_over_D: Axis = entry("distances of a second rotor over the diameter", Limits("", 0, 20))
+    z_over_D: Axis = entry("distances of a second rotor over the diameter", FieldLimits("", 0, 20))
 
     def axes(self) -> dict[str, NDArray[np.float64]]:
         """Axes: name (with its unit) to values, (N,)."""

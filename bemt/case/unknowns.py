@@ -13,22 +13,6 @@ from bemt.rotors.population import chord_sd, population
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
 from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 
-__all__ = [
-    "AIR",
-    "DRIVE",
-    "ESC_DROP",
-    "FAN",
-    "HUB",
-    "OFFSET",
-    "SECTION",
-    "SURFACE",
-    "Unknown",
-    "completed",
-    "label_chord",
-    "section_of",
-]
-
-
 CHORD, CHORD_EXPONENT = 0.2, -0.2
 """Largest chord over tip radius of the usual 10 in propeller and its exponent over the diameter, calibrated: of twelve
 pairs the one that predicts 87 propellers of UIUC from their labels best in the median, at rest and in flight.  Their

@@ -27,13 +27,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.exports.openfoam import Settings
 from bemt.exports.openfoam.run import OPEN, SIDES, through
-
-__all__ = ["BALANCE_LIMIT", "Balance", "balance_of"]
 
 BALANCE_LIMIT = 0.01
 """Residual, relative, above which a run counts as not converged."""
@@ -41,7 +39,6 @@ LEAST_CT, LEAST_CQ = 0.01, 0.001
 """Coefficients below which loads are no measure of themselves: a rotor near zero thrust."""
 BANDS_PER_R = 10
 """Bands along the shaft in which the sides are compared, per tip radius."""
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,6 @@ from bemt.recordings.cfd_setup import audit_of, faults_first, floor_note
 if TYPE_CHECKING:
     from bemt.exports.openfoam import Settings
 
-__all__ = ["document", "is_folder_of_campaigns", "run", "run_campaign", "text"]
-
 
 def run_campaign(
     campaign: Campaign,

@@ -22,8 +22,6 @@ from bemt.readers import number
 from bemt.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
 from bemt.recordings.grid_study import grid_study, ratios
 
-__all__ = ["COLUMNS", "CampaignRecord", "grid_studies", "grid_uncertainty"]
-
 COLUMNS = (
     "run", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "thrust_rotor_N",
     "thrust_standing_N", "density_kg_m3", "temperature_C", "pressure_Pa", "wall_distance_m", "tip_gap_mm",
@@ -136,18 +134,7 @@ def grid_uncertainty(studies: Sequence[Mapping[str, Any]], row: Mapping[str, Any
 
 
 class CampaignRecord:
-    """Files of one campaign; every change is written whole.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The campaign.
-
-    Raises
-    ------
-    InputError
-        When the recording that is there is not one of ours.
-    """
+    """Files of one campaign; every change is written whole. A recording that is not one of ours is refused."""
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign

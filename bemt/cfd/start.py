@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["StartField", "splice"]
-
 _FIELD = re.compile(rb"internalField\s+nonuniform\s+List<(scalar|vector)>\s*(\d+)\s*\(")
 _UNIFORM = re.compile(rb"internalField\s+uniform[^;]*;")
 POWERS = {"U": 1, "p": 2, "k": 2, "omega": 1, "epsilon": 3, "nut": 1}

@@ -19,8 +19,6 @@ from bemt.case import Case
 from bemt.case.prepare import prepare_case
 from bemt.cfd.schema import Campaign, load_campaign
 
-__all__ = ["BANDS", "summary", "summary_text"]
-
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
 """Edges of the bands. [R]"""
 MACH_EFFECTS = ["compressibility", "drag_divergence"]

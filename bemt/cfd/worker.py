@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
@@ -28,8 +28,6 @@ from bemt.cfd.start import StartField, splice
 from bemt.exports.openfoam import Settings, case_files
 from bemt.exports.openfoam.run import BINS, control
 from bemt.exports.openfoam.write import settings_of, write_openfoam
-
-__all__ = ["DRIFT_LIMIT", "RESIDUALS", "SCATTER_LIMIT", "Outcome", "Worker", "history_of", "point_key", "radial_of"]
 
 DRIFT_LIMIT = 0.03
 """Change over the averaged iterations, of the mean, above which a run counts as not converged."""
@@ -45,7 +43,6 @@ GRID_FILES = ("system/blockMeshDict", "system/snappyHexMeshDict", "system/topoSe
               "constant/triSurface/lines.obj")  # fmt: skip
 _WATCH = 'read word || { kill -TERM -"$1"; sleep 2; kill -KILL -"$1"; }'
 """Ends the processes of a solver when ours is gone without a word, as after kill -9."""
-Array = NDArray[np.float64]
 
 
 def _digest(*parts: str) -> str:

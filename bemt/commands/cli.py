@@ -23,8 +23,6 @@ from bemt import __version__
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.commands._terminal import coloured
 
-__all__ = ["build_parser", "commands", "main"]
-
 EXIT_INTERRUPTED = 130
 GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
 """Groups of the help in order; other groups come after them."""

@@ -25,22 +25,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     off = "switch off battery_sag, motor_heating, rotor_inertia or inflow_lag; repeatable"
     parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
     parser.add_argument("--airspeed", type=float, default=0.0, metavar="V", help="flight speed [m/s] (default 0)")
-    recorded = "compare the model with the recordings in this folder instead"
-    parser.add_argument("--validate", metavar="DIR", help=recorded)
     parser.add_argument("--out", metavar="DIR", help="write JSON, CSV and a picture to this folder")
-    _options.add_json(parser, "bemt.drive.result/2; --validate: bemt.drive.validation/1")
+    _options.add_json(parser, "bemt.drive.result/2")
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve the drive; 1 if hover or airspeed is beyond it, or a point is unconverged."""
     from bemt.base.tables import json_text
-
-    if args.validate:
-        from bemt.drive import validation_folder
-
-        found, shown = validation_folder.compare(args.validate, args.out)
-        print(json_text(found) if args.json else shown, end="")
-        return EXIT_OK
     from bemt.drive import drive_result
 
     case = drive_result.case_for(

@@ -36,24 +36,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--match-J0", action="store_true", help=turned)
     drawn = "use the stations as given, without the population of rotors as built"
     parser.add_argument("--as-drawn", action="store_true", help=drawn)
-    fitted = "fit the population of rotors as built to the folder and write it to FILE"
-    parser.add_argument("--fit-population", metavar="FILE", help=fitted)
-    left = "predict each family with a population fitted without it"
-    parser.add_argument("--leave-family-out", action="store_true", help=left)
-    beside = "run another solver (ccblade) on the same propellers for a paired comparison"
-    parser.add_argument("--peer", metavar="NAME", help=beside)
     parser.add_argument("--out", metavar="DIR", help="also write the tables to this folder")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare; 1 when points did not converge."""
     from bemt.base.tables import json_text
-    from bemt.validate.propellers import effects_without, validate, where, write
-    from bemt.validate.text import text
+    from bemt.validate.propellers import effects_without, text, validate, where, write
 
     effects = effects_without(args.off)
-    if args.fit_population or args.leave_family_out or args.peer:
-        return _population(args)
     found = [where(name) for name in args.folders]
     with _terminal.progress() as say:
         document = validate(found, effects, args.polar, say, match_J0=args.match_J0, as_drawn=args.as_drawn)
@@ -62,38 +53,3 @@ def run(args: argparse.Namespace) -> int:
     # an infinite error (not converged) becomes null: JSON has no infinity
     print(json_text(document).rstrip() if args.json else text(document))
     return EXIT_UNCONVERGED if document["unconverged"] else EXIT_OK
-
-
-def _population(args: argparse.Namespace) -> int:
-    """Fit the population, leave families out of it, or run a peer."""
-    from pathlib import Path
-
-    from bemt.base.tables import json_text, write_atomic
-    from bemt.validate import left_out, paired, peers
-    from bemt.validate.folder import read_folders
-    from bemt.validate.propellers import effects_without, where
-
-    effects = effects_without(args.off)
-    if args.peer:
-        peers.peer(args.peer)
-    folder, names = read_folders([where(name) for name in args.folders]), " ".join(args.folders)
-    with _terminal.progress() as say:
-        seen = left_out.watch(folder, effects, say)
-        if args.fit_population or args.leave_family_out:
-            fitted = left_out.fit_population(seen, names)
-        if args.fit_population:
-            document = left_out.document_of(fitted[0])
-            write_atomic(Path(args.fit_population), json_text(document))
-        if args.leave_family_out:
-            document = left_out.leave_out(seen, names, fitted, say)
-            if args.out:
-                write_atomic(Path(args.out) / "left_out.json", json_text(document))
-                write_atomic(Path(args.out) / "left_out.txt", left_out.table(document) + "\n")
-        if args.peer:
-            document = paired.paired(seen, args.peer, say)
-            if args.out:
-                write_atomic(Path(args.out) / f"paired_{args.peer}.json", json_text(document))
-                write_atomic(Path(args.out) / f"paired_{args.peer}.txt", paired.text(document) + "\n")
-    table = paired.text if args.peer else left_out.table if args.leave_family_out else None
-    print(json_text(document).rstrip() if args.json or table is None else table(document))
-    return EXIT_OK

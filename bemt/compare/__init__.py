@@ -1,4 +1,4 @@
-"""Models beside recordings: sweep, validation, grids, the thesis, benchmark.
+"""What changed between two recordings, and one run beside the model.
 
 ``bemt.compare(a, b)`` says what changed between two recordings: ``help(bemt.library.compare)``.
 """

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.rotors.conditioning import Conditioned, condition
 from bemt.rotors.latents import Prior
 from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
@@ -19,8 +20,6 @@ from bemt.rotors.reference import SESSION, ReferenceRun, noise_of_run, scatter
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.case import Case
-
-Array = NDArray[np.float64]
 
 # Advance ratio below which a point is at rest [1].
 _STILL = 0.01

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import textwrap
 from collections.abc import Callable, Mapping
@@ -10,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.compare.contrast_text import WORD, headline
 from bemt.compare.matched import POWER_OF_SPEED
 
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from bemt.compare.matched import MatchedChannel
     from bemt.compare.recordings import RunChange
 
-Array = NDArray[np.float64]
-
-# Okabe and Ito 2008, Color Universal Design.
-_A, _B, _BAND, _GREY = "#0072B2", "#D55E00", "#56B4E9", "#8a8a8a"
+_A, _B, _BAND, _GREY = canvas.BLUE, canvas.RED, canvas.SKY, canvas.GREY
 _LABEL = {
     "thrust_N": "thrust / n² [N s²]",
     "torque_Nm": "torque / n² [N m s²]",
@@ -37,38 +34,22 @@ _OVER_COMMAND = ("speed", "voltage")
 _STEADY = 0.05
 # Characters in a line of the title.
 _WIDE = 110
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "figure.facecolor": "white",
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "lines.linewidth": 1.5,
-}
 
 
 def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
     """Draw it as PNG."""
     import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     shown = [c for c in change.channels.values() if c.name in ("thrust", "torque")]
     shown = shown or list(change.channels.values())[:2]
     shown += [c for c in change.channels.values() if c.name == "speed"][: 3 - len(shown)]
-    with matplotlib.rc_context(_STYLE):
-        figure = Figure(figsize=(8.0, 2.3 * len(shown) + 0.5), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.subplots(len(shown), 2, squeeze=False)
+    with matplotlib.rc_context(canvas.STYLE):
+        figure, axes = canvas.blank(2.3 * len(shown) + 0.5, len(shown), 2)
         for row, c in zip(axes, shown, strict=True):
             _readings(row[0], change, c)
             _ratio(row[1], change, c)
         figure.suptitle(title(doc), fontsize=9.5)
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=150)
-    return buffer.getvalue()
+        return canvas.png(figure, canvas.DPI)
 
 
 def title(doc: Mapping[str, Any]) -> str:

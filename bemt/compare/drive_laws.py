@@ -14,15 +14,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.compare import smooth_change as fits
 from bemt.compare.matched import MatchedChannel
 from bemt.compare.smooth_change import Scatter
 from bemt.gaussian.evidence import LinearTerms, log_sum, shares
 from bemt.gaussian.whitening import log_density, whitener
-
-Array = NDArray[np.float64]
 
 NONE, UNKNOWN = "none", "unknown"
 _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}

@@ -6,24 +6,19 @@ numerics). Every point is judged at its own speed, airspeed and density; the dra
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.propagate import propagate
 from bemt.dataset import Dataset
-
-__all__ = ["PredictionView", "against_band"]
-
-Array = NDArray[np.float64]
 
 _LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",
@@ -41,33 +36,15 @@ _MARKS = (("o", canvas.BLACK), ("s", canvas.RED), ("^", canvas.GREEN), ("D", can
 
 @dataclass(frozen=True, eq=False)
 class PredictionView:
-    """Recordings beside the prediction of a case.
-
-    Attributes
-    ----------
-    case : str
-        Name of the case.
-    over : str
-        ``rpm``, or ``J`` where the advance ratio moves.
-    channels : tuple of str
-        What is drawn: thrust_N, torque_Nm; CT, CP over J.
-    recorded : tuple of Dataset
-        The points, with x, value and u under the names of the axes.
-    model : tuple of Dataset
-        The prediction at the same points; u is half the 95 % width.
-    curve : Dataset
-        The prediction along the drawn line; u is half the 95 % width.
-    notes : tuple of str
-        What the picture leaves out or simplifies.
-    """
+    """Recordings beside the prediction of a case."""
 
     case: str
-    over: str
-    channels: tuple[str, ...]
-    recorded: tuple[Dataset, ...]
-    model: tuple[Dataset, ...]
-    curve: Dataset
-    notes: tuple[str, ...]
+    over: str  # ``rpm``, or ``J`` where the advance ratio moves
+    channels: tuple[str, ...]  # What is drawn: thrust_N, torque_Nm; CT, CP over J
+    recorded: tuple[Dataset, ...]  # The points, with x, value and u under the names of the axes
+    model: tuple[Dataset, ...]  # The prediction at the same points; u is half the 95 % width
+    curve: Dataset  # The prediction along the drawn line; u is half the 95 % width
+    notes: tuple[str, ...]  # What the picture leaves out or simplifies
 
     def inside(self, channel: str) -> tuple[int, int, float]:
         """Points inside the band, points judged, and the median of recorded over predicted, less 1 [1]."""
@@ -117,9 +94,7 @@ class PredictionView:
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
             words = (self.sentence.replace(" %", "\N{NO-BREAK SPACE}%"), *self.notes[:2])
             figure.suptitle("\n".join(line for w in words for line in textwrap.wrap(w, _WIDE)), fontsize=9)
-            page = io.BytesIO()
-            figure.savefig(page, format="png", dpi=canvas.DPI, metadata={"Software": None})
-        return page.getvalue()
+            return canvas.png(figure, canvas.DPI)
 
     def _panel(self, axis: Any, channel: str) -> None:
         x, y, half = self.curve[self.over], self.curve[channel], self.curve.u[channel]
@@ -140,25 +115,9 @@ class PredictionView:
 
 
 def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
-    """Put recordings inside the prediction band of a case.
+    """Put recordings inside the prediction band of a case; refused where no point has a speed and a load.
 
-    Parameters
-    ----------
-    case : Case
-        Case of the rotor.
-    recordings : sequence of Dataset
-        Each with ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as
-        bars.
-
-    Returns
-    -------
-    PredictionView
-        The points, the prediction at them and along a line; `sentence`, `document()` and `png()` show it.
-
-    Raises
-    ------
-    InputError
-        If no point has a speed and a load.
+    Each has ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as bars.
     """
     parts = [_usable(d) for d in recordings]
     parts = [d for d in parts if len(d)]

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.compare.stand_run import StandRun
-
-Array = NDArray[np.float64]
 
 LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ", "electrical_power_W")}
 """Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""

@@ -27,8 +27,6 @@ from bemt.recordings.cfd_run import is_run
 from bemt.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.recordings.channels import named
 
-__all__ = ["SCHEMA", "cfd_points", "compare_run", "text"]
-
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
 _ROWS = 6  # points on one screen
@@ -65,27 +63,10 @@ def cfd_points(path: str) -> tuple[Dataset, Dataset]:
 def compare_run(
     path: str | os.PathLike[str], case: Case | str | os.PathLike[str], progress: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
-    """Put one run and the model of a case side by side.
+    """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
-    Parameters
-    ----------
-    path : str or path
-        run.toml, a folder of exports, or a table of CFD points.
-    case : Case or path
-        Case of the rotor.
-    progress : callable, optional
-        Told what is being solved.
-
-    Returns
-    -------
-    dict
-        ``bemt.run-comparison/1``: ``points`` (each with ``loads``: cfd, u_cfd, bemt, u_bemt by origin, difference,
-        u_both), ``audit``, ``notes``, ``sentence``, ``next``.
-
-    Raises
-    ------
-    InputError
-        If the file is no run, or of another rotor.
+    ``bemt.run-comparison/1``: ``points`` (each with ``loads``: cfd, u_cfd, bemt, u_bemt by origin, difference, u_both),
+    ``audit``, ``notes``, ``sentence``, ``next``. A file that is no run, or of another rotor, is refused.
     """
     name = os.fspath(path)
     made = case if isinstance(case, Case) else _case(os.fspath(case))
@@ -238,20 +219,7 @@ def _next(document: Mapping[str, Any], name: str, case: str) -> str:
 
 
 def text(document: Mapping[str, Any], details: bool = False) -> str:
-    """Lay a comparison out on one screen.
-
-    Parameters
-    ----------
-    document : mapping
-        Of :func:`compare_run`.
-    details : bool
-        All points, notes and settings.
-
-    Returns
-    -------
-    str
-        Lines of at most 120 characters, where names allow it.
-    """
+    """Lay the document of `compare_run` out on one screen; with `details` all points, notes and settings."""
     told = document["conditions"]
     set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
     set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []

@@ -9,14 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.compare.doubts import LOAD_CHANNELS, one_rotor, speed_in_doubt, wind_of
-from bemt.compare.selection import COLD, HOT, conditions_of, moves
+from bemt.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, moves, one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import DIMENSIONLESS, Dataset
 from bemt.recordings.channels import named
 from bemt.recordings.reduce import reduce, reduction
-
-Array = NDArray[np.float64]
 
 _WANTED = (
     *LOAD_CHANNELS,

@@ -14,25 +14,14 @@ from bemt.dataset import Dataset
 from bemt.recordings.cfd_setup import GRID_FLOOR, GRID_FLOOR_SOURCE, conditions_that_differ, grid_that_differs
 from bemt.recordings.channels import named
 
-__all__ = ["compare_grids", "text"]
-
 _LIKE = 0.01  # speeds and airspeeds that are one point, share
 
 
 def compare_grids(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[str] = ()) -> dict[str, Any] | None:
-    """Answer for two recordings whose grid differs; None where it does not, or is not stated.
+    """Answer for two CFD recordings whose grid differs; None where it does not, or is not stated.
 
-    Parameters
-    ----------
-    a, b : str
-        Recordings of CFD.
-    rows_a, rows_b : sequence of str
-        Rows to use, as ``level=5``.
-
-    Returns
-    -------
-    dict or None
-        ``bemt.comparison/1`` with the verdict ``insufficient``: what differs, ratios B over A at equal points.
+    ``bemt.comparison/1`` with the verdict ``insufficient``: what differs, ratios B over A at equal points. Rows to use
+    are named as ``level=5``.
     """
     from bemt.recordings.load import import_file
 

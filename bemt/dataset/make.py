@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset.channels import DIMENSIONLESS, ORIGINS, channel_fault
-from bemt.dataset.points import Array, Dataset
+from bemt.dataset.points import Dataset
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import plot as pictures
 from bemt.dataset import tables
 from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Dataset"]
 
-Array = NDArray[np.float64]
 _KIND = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -455,7 +454,7 @@ class Dataset:
         >>> d.plot().get_xlabel()
         'rpm'
         """
-        return pictures.plot(self, x, y, ax)
+        return tables.plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Convert to one plain dictionary per point, for JSON.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bemt.base import canvas
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.design.rotor_loads import size_in
 from bemt.design.search import Target
@@ -77,13 +77,9 @@ def front(table: pd.DataFrame) -> pd.DataFrame:
 
 def picture(table: pd.DataFrame) -> bytes:
     """Power over diameter of the best motor of each label, coloured by probability, with the front. PNG bytes."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     t: Target = table.attrs["target"]
     best = best_of_each(table).dropna(subset=["power_W"])
-    figure = Figure(figsize=(7.5, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas.figure(7.5, 4.6)
     ax = figure.add_subplot()
     size = [size_in(label) for label in best.label]
     dots = ax.scatter(size, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3)
@@ -98,12 +94,8 @@ def picture(table: pd.DataFrame) -> bytes:
         ax.legend(frameon=False, fontsize=8)
     ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
     ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
-    ax.grid(True, alpha=0.3)
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    canvas.frame(ax)
+    return canvas.png(figure)
 
 
 def _banded(value: float, u: float) -> str:

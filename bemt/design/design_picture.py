@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base import canvas
 from bemt.base.canvas import BLUE, GREY, ORANGE
 from bemt.design.blade_design import Design
 
@@ -20,11 +20,7 @@ LIMIT: dict[str, Any] = {"color": GREY, "ls": ":", "lw": 1.3}
 
 def picture(d: Design) -> bytes:
     """Draw the start and the result. PNG bytes."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10.0, 7.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas.figure(10.0, 7.2)
     axes = figure.subplot_mosaic([["blade", "blade"], ["chord", "twist"], ["lift", "load"]],
                                  height_ratios=[0.75, 1.0, 1.0])  # fmt: skip
     shape, R = d.found.problem.shape, d.need.R
@@ -61,12 +57,8 @@ def picture(d: Design) -> bytes:
     axes["chord"].legend(frameon=False, fontsize=8)
     axes["lift"].legend(frameon=False, fontsize=8)
     for ax in axes.values():
-        ax.grid(True, alpha=0.3)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+        canvas.frame(ax)
+    return canvas.png(figure)
 
 
 def _outline(ax: Any, r: Array, chord: Array, look: dict[str, Any]) -> None:

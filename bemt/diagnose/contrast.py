@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
-from bemt.compare.change_document import document, next_step
-from bemt.compare.invocation import Invocation
+from bemt.compare.change_document import Invocation, document, next_step
 from bemt.compare.recordings import ERROR_IN, RunChange
 from bemt.compare.selection import conditions_of, selected, with_air
 from bemt.compare.stand_run import stand_run

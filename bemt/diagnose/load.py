@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.case import find_cases, load_case
 from bemt.case.prepare import prepare_case
-from bemt.compare.doubts import one_rotor, speed_in_doubt, wind_of
+from bemt.compare.selection import one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import Dataset
 from bemt.diagnose import record as records
 from bemt.readers._headings import surely_shaft_speed

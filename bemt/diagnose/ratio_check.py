@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.errors import InputError
-from bemt.compare.change_document import next_step
-from bemt.compare.invocation import Invocation
+from bemt.compare.change_document import Invocation, next_step
 from bemt.compare.matched import LOADS
 from bemt.compare.recordings import RunChange, changed
 from bemt.compare.stand_run import StandRun, stand_run

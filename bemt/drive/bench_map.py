@@ -22,11 +22,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.drive.map_points import CHANNELS
 
-Array = NDArray[np.float64]
 NODES = 49
 SMOOTHNESS = 10.0 ** np.arange(-10.0, 0.1, 2.0)
 OWN_VOLTAGE = 0.01

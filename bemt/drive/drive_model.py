@@ -38,11 +38,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.drive.rotor_table import RotorMap
 from bemt.effects.motor_heating import COPPER, MAGNET
 
-Array = NDArray[np.float64]
 EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
 """Effects of the drive that can be switched off; ids of the diagnosis."""
 REFERENCE_C = 25.0

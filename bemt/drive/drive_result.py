@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
@@ -27,7 +27,6 @@ from bemt.drive import case_drive, mission, outputs, picture, rotor_table
 from bemt.drive.drive_model import EFFECTS, Drive, Steady
 from bemt.drive.rotor_table import RotorMap
 
-Array = NDArray[np.float64]
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
 CARRIED = ("rpm", "thrust_N", "battery_A", "power_W")
@@ -48,7 +47,7 @@ OPTIONS = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Band:
+class DriveBand:
     """Value with its standard uncertainty, and that which would be left with a motor sheet."""
 
     value: float
@@ -66,7 +65,7 @@ class DriveResult:
         With its table [drive].
     airspeed_m_s : float
         Of flight. [m/s]
-    full, hover : mapping of str to Band
+    full, hover : mapping of str to DriveBand
         ``rpm``, ``thrust_N``, ``battery_A``, ``power_W``, ``g_per_W`` and, in hover, ``throttle`` [-] and
         ``minutes`` (of the capacity, or per A h where none is given).
     steady : bemt.drive.drive_model.Steady
@@ -90,8 +89,8 @@ class DriveResult:
 
     case: Case
     airspeed_m_s: float
-    full: Mapping[str, Band]
-    hover: Mapping[str, Band]
+    full: Mapping[str, DriveBand]
+    hover: Mapping[str, DriveBand]
     steady: Steady
     u: Mapping[str, Array]
     drive: Drive
@@ -186,7 +185,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
     return DriveResult(case, airspeed_m_s, full_b, hover, steady, u, drive, tuple(steps), course, settled, tuple(notes))
 
 
-def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, Band]:
+def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, DriveBand]:
     """Speed, thrust, current and power at full throttle and the stated charge: the one source of maximum thrust."""
     found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[1]
     return {key.partition(".")[2]: band for key, band in found.items()}
@@ -201,7 +200,7 @@ def full_document(case: Case) -> dict[str, Any] | None:
             **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
 
 
-def _line(case: Case, full: Mapping[str, Band]) -> str:
+def _line(case: Case, full: Mapping[str, DriveBand]) -> str:
     t = case_drive.drive_table(case)
     return (
         f"full throttle, {t.kv:g} rev/min/V on {t.cells}S at {t.soc:.0%} charge: "
@@ -219,7 +218,7 @@ def _carried(
     ask: Ask,
     bands: bool = True,
     speeds: Array = rotor_table.SPEEDS,
-) -> tuple[Drive, dict[str, Band], dict[str, Array]]:
+) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()
@@ -243,7 +242,7 @@ def _carried(
             for key, v in values.items()}  # fmt: skip
     sheet = {key: rest[key] + sum(m.u[key] ** 2 for m in moved if m.unknown.key not in SHEET) for key in values}
     both = {key: rest[key] + sum(m.u[key] ** 2 for m in moved) for key in values}
-    made = {key: Band(float(v[0]), math.sqrt(both[key][0]), math.sqrt(sheet[key][0]))
+    made = {key: DriveBand(float(v[0]), math.sqrt(both[key][0]), math.sqrt(sheet[key][0]))
             for key, v in values.items() if not key.startswith("steady.")}  # fmt: skip
     u = {key.partition(".")[2]: np.sqrt(both[key]) for key in values if key.startswith("steady.")}
     return drive, made, u
@@ -308,7 +307,7 @@ def _unusual(case: Case) -> list[str]:
     ]  # fmt: skip
 
 
-def shown(band: Band, unit: str, scale: float = 1.0) -> str:
+def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:
     """Value ± u with digits that u deserves."""
     value, u = band.value * scale, band.u * scale
     if not math.isfinite(value):
@@ -343,7 +342,7 @@ def text(found: DriveResult) -> str:
         gives = f"{full['thrust_N'].value:.1f} N" if math.isfinite(full["thrust_N"].value) else "an unknown maximum"
         lines.append(f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}")
     at = range(4, 21, 4)
-    curve = [shown(Band(float(found.steady.thrust_N[i]), float(found.u["thrust_N"][i]), 0.0), "N") for i in at]
+    curve = [shown(DriveBand(float(found.steady.thrust_N[i]), float(found.u["thrust_N"][i]), 0.0), "N") for i in at]
     lines += ["", "thrust at   " + ", ".join(f"{5 * i} %: {words}" for i, words in zip(at, curve, strict=True))]
     lines += [f"response    thrust {s.before_N:.2f} to {s.after_N:.2f} N: 63 % after {1e3 * s.time63_s:.0f} ms"
               for s in found.response[:1]]  # fmt: skip

@@ -6,12 +6,11 @@ import re
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.tables import csv_text
 from bemt.drive.bench_map import BenchMap
 
-Array = NDArray[np.float64]
 COLUMNS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "power_W"}
 
 

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset, concat
 from bemt.readers._recording import FULL_THROTTLE
 from bemt.recordings import plateaus
 from bemt.recordings.channels import THROTTLE_IS_PULSE, pulse_of
 
-Array = NDArray[np.float64]
 CHANNELS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "electrical_power_W"}
 """What a map gives beside the pulse width, and the channel it is fitted to."""
 _RECORDED = (*CHANNELS.values(), "voltage_V")

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.dataset import Dataset
 
-Array = NDArray[np.float64]
 LEAST_THRUST = 0.05
 """Share of the greatest thrust below which a level does not speak for T/rpm^2: there it is mostly zero point."""
 

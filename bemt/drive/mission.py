@@ -6,12 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.drive import transient
 from bemt.drive.drive_model import Drive
 
-Array = NDArray[np.float64]
 G0 = 9.80665
 
 

@@ -26,11 +26,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-Array = NDArray[np.float64]
 VOLTAGES = {"peak": 1.0, "peak_to_peak": 2.0, "rms": math.sqrt(0.5)}
 """Measure of a sinusoidal voltage over its peak. [1]"""
 CURRENTS = {"peak": 1.0, "rms": math.sqrt(0.5), "q_power_invariant": math.sqrt(1.5), "q_amplitude_invariant": 1.0}

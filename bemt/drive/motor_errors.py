@@ -23,12 +23,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import unit_errors
+from bemt.base.arrays import Array
 from bemt.drive.motor_constant import Line
 
-Array = NDArray[np.float64]
 METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001
 """Probability at which agreement is rejected."""

@@ -10,21 +10,20 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import readers as importers
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import inside
-from bemt.base.toml import Limits, Table, entry, read_model
+from bemt.base.toml import FieldLimits, Table, entry, read_model
 from bemt.dataset import Dataset
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import Measured
 
-Array = NDArray[np.float64]
 Volt = Literal["peak", "rms", "peak_to_peak"]
 Ampere = Literal["q_power_invariant", "q_amplitude_invariant", "peak", "rms"]
 Between = Literal["line", "phase"]
-_PCT = Limits("%", 0.0, 50.0)
+_PCT = FieldLimits("%", 0.0, 50.0)
 
 
 class MotorHead(Table):

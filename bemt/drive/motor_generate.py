@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.drive import motor_constant as mc
 from bemt.drive.motor_errors import FACTORS
 
-Array = NDArray[np.float64]
 PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
 """Errors that can be planted: offsets in V and N m, R_true/R_assumed, a factor on the method's result."""
 LABEL = "# generated, not measured"

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
 from bemt.drive.motor_constant import Line
 
-Array = NDArray[np.float64]
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
 

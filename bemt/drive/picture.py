@@ -2,44 +2,32 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.drive.map_points import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.drive.bench_map import BenchMap
 
-Array = NDArray[np.float64]
-# Okabe and Ito (2008): colours that colour-blind readers tell apart
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-
 
 def _figure(columns: int = 1, width: float = 6.0, height: float = 4.0) -> tuple[Any, list[Any]]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width * columns, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas.figure(width * columns, height)
     axes = [figure.add_subplot(1, columns, i + 1) for i in range(columns)]
     for ax in axes:
-        ax.grid(True, alpha=0.3)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
+        canvas.frame(ax)
     return figure, axes
 
 
 def _png(figure: Any, title: str) -> bytes:
     """PNG with a title that is wrapped where it is wider than the figure."""
     figure.suptitle(textwrap.fill(title, int(10 * figure.get_figwidth())))
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    return canvas.png(figure)
 
 
 def bench_map(chart: BenchMap, name: str) -> bytes:
@@ -54,9 +42,9 @@ def bench_map(chart: BenchMap, name: str) -> bytes:
             if chart.with_voltage:
                 ratio = chart.points.voltage_V / chart.voltage_ref
                 y, words = y / ratio ** chart.curves[quantity].exponent, f"recorded, taken to {chart.voltage_ref:.1f} V"
-            ax.plot(chart.points.pulse_us, y, "o", ms=4, mfc="none", color=COLOURS[6], label=words)
+            ax.plot(chart.points.pulse_us, y, "o", ms=4, mfc="none", color=canvas.CYCLE[6], label=words)
         reference = f"map at {chart.voltage_ref:.1f} V" if chart.with_voltage else "map"
-        ax.plot(pulse, chart.at(quantity, pulse), color=COLOURS[0], label=reference)
+        ax.plot(pulse, chart.at(quantity, pulse), color=canvas.CYCLE[0], label=reference)
         ax.set_xlabel("pulse width [µs]")
         ax.set_ylabel(label[quantity])
     axes[0].legend(frameon=False)
@@ -70,12 +58,12 @@ def box_plot(values: Mapping[str, Array], marks: Mapping[str, float], ylabel: st
     for i, name in enumerate(names):
         v = values[name]
         if len(v) > 1:
-            ax.boxplot([v], positions=[i], widths=0.45, showfliers=False, medianprops={"color": COLOURS[5]})
-            ax.plot(i + np.linspace(-0.15, 0.15, len(v)), v, "o", ms=3, alpha=0.6, color=COLOURS[0])
+            ax.boxplot([v], positions=[i], widths=0.45, showfliers=False, medianprops={"color": canvas.CYCLE[5]})
+            ax.plot(i + np.linspace(-0.15, 0.15, len(v)), v, "o", ms=3, alpha=0.6, color=canvas.CYCLE[0])
         else:
-            ax.plot([i], v, "D", color=COLOURS[0])
+            ax.plot([i], v, "D", color=canvas.CYCLE[0])
     for k, (name, value) in enumerate(marks.items()):
-        ax.axhline(value, ls="--", lw=1.2, color=COLOURS[(2, 3, 1)[k % 3]], label=name)
+        ax.axhline(value, ls="--", lw=1.2, color=canvas.CYCLE[(2, 3, 1)[k % 3]], label=name)
     ax.set_xticks(range(len(names)), [f"{n}\n(n = {len(values[n])})" for n in names])
     ax.set_xlim(-0.6, len(names) - 0.4)
     ax.set_ylabel(ylabel)
@@ -89,7 +77,7 @@ def curves(panels: Sequence[Mapping[str, Any]], title: str = "") -> bytes:
     figure, axes = _figure(len(panels), 5.0, 3.9)
     for ax, panel in zip(axes, panels, strict=True):
         for k, (label, x, y, style) in enumerate(panel["series"]):
-            ax.plot(x, y, style, color=COLOURS[k % len(COLOURS)], ms=4, mfc="none", label=label)
+            ax.plot(x, y, style, color=canvas.CYCLE[k % len(canvas.CYCLE)], ms=4, mfc="none", label=label)
         ax.set_xlabel(panel["x"])
         ax.set_ylabel(panel["y"])
         ax.set_title(panel.get("title", ""), fontsize=10)

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +51,6 @@ class RotorMap:
         return 8.0 / 3.0 * self.rho * self.radius_m**3
 
 
-def from_coefficients(
-    CT: float,
-    CQ: float,
-    diameter_m: float,
-    rho: float = 1.225,
-    inertia_kg_m2: float = 0.0,
-    solidity: float | None = None,
-) -> RotorMap:
-    """Rotor with constant coefficients.
-
-    With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
-    Leishman, "Principles of Helicopter Aerodynamics", 2006, ch. 3; not checked).
-    """
-    kT = rho * CT * diameter_m**4 / (2.0 * math.pi) ** 2
-    kQ = rho * CQ * diameter_m**5 / (2.0 * math.pi) ** 2
-    return quadratic(kT, kQ, diameter_m, rho, inertia_kg_m2, solidity)
-
-
 def quadratic(
     kT: float,
     kQ: float,
@@ -78,7 +59,11 @@ def quadratic(
     inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
 ) -> RotorMap:
-    """Rotor whose loads go with the square of the speed."""
+    """Rotor whose loads go with the square of the speed.
+
+    With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
+    Leishman, "Principles of Helicopter Aerodynamics", 2006, ch. 3; not checked).
+    """
     R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
     slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
     return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)

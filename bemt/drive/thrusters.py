@@ -23,9 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

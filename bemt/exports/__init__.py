@@ -23,15 +23,8 @@ _SHARED = {"base", "blades", "folder", "hub", "parts", "performance", "printing"
 
 
 def target_ids() -> list[str]:
-    """Words of ``--format``; imports no target.
+    """Words of ``--format``, sorted; imports no target.
 
-    Returns
-    -------
-    list of str
-        Sorted.
-
-    Examples
-    --------
     >>> {"stl", "openfoam", "jsbsim"} <= set(target_ids())
     True
     """
@@ -41,18 +34,7 @@ def target_ids() -> list[str]:
 
 @cache
 def exports() -> Mapping[str, Export]:
-    """Find the targets of this folder.
-
-    Returns
-    -------
-    mapping of str to Export
-        By id, sorted; read-only.
-
-    Raises
-    ------
-    TypeError
-        When a file holds no export of its own name (a bug, not an input error).
-    """
+    """Targets of this folder by id, sorted; TypeError when a file holds no export of its own name."""
     from bemt.exports.base import Export
 
     found = {}

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import header, plain_name
 from bemt.exports.px4 import thrust_factor
 
-Array = NDArray[np.float64]
 G0 = 9.80665
 ROTORS = 4
 HOVER = 0.5

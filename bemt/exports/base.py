@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.exports.hub import CHECK_ANGLES, HubTable, hub_of
 from bemt.exports.performance import (
@@ -45,7 +45,6 @@ __all__ = [
     "entry",
 ]
 
-Array = NDArray[np.float64]
 Files = Mapping[str, str | bytes]
 """Content by path below the folder of the export."""
 

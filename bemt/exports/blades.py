@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.sections.polars import Polar
 
 if TYPE_CHECKING:
     from bemt.exports.base import Job
 
-Array = NDArray[np.float64]
 MOST_STATIONS = 60
 """Stations that QPROP (81) and XROTOR (60 to 100, by compilation) take."""
 

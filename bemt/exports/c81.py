@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import BladeExport, Files, Job
 from bemt.exports.blades import Frozen, baked
 from bemt.exports.parts import plain_name
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from bemt.case import Case
 
-Array = NDArray[np.float64]
 WIDTH, PER_LINE = 7, 9
 NEAR = np.radians(10.0)
 """Angles around the working point that keep every node of the solver's tables [rad]."""

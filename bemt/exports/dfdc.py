@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.exports.base import BladeExport, Files, Job
 from bemt.exports.blades import section_errors, stations
@@ -17,7 +17,6 @@ from bemt.exports.xrotor import section_lines, section_notes, sections_of
 if TYPE_CHECKING:
     from bemt.case import Case
 
-Array = NDArray[np.float64]
 MOST_STATIONS = 30
 """IRX of DFDC.INC; a file with more is read and gives NaN."""
 

@@ -6,12 +6,10 @@ import json
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import DiskExport, Files, Job
 from bemt.exports.blades import baked
-
-Array = NDArray[np.float64]
 
 
 class Flow360Export(DiskExport):

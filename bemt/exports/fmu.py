@@ -7,13 +7,9 @@ import json
 import tempfile
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import plain_name, run_hub, run_module, table_document, table_module
-
-Array = NDArray[np.float64]
 
 _SLAVE = '''
 

@@ -53,20 +53,9 @@ def export_case(
 ) -> dict[str, Any]:
     """Write one case for one or more targets; each is whole or not there.
 
-    Formats of an earlier export of the same case stay, in the folder and in its manifest.
-
-    Returns
-    -------
-    dict
-        Manifest of what was written now; ``kept``: formats that stay from before, ``stale``: those of them that were
-        written from another state of the case.
-
-    Raises
-    ------
-    PartlyRefused
-        If some targets were refused; the others are written.
-    InputError
-        If all were, or the folder holds another case; nothing is written.
+    Formats of an earlier export of the same case stay, in the folder and in its manifest: the answer has those in
+    ``kept``, and in ``stale`` the ones written from another state of the case. If some targets were refused, the others
+    are written (`PartlyRefused`); if all were, or the folder holds another case, nothing is.
     """
     run, before = flow or Run(), _manifest(out)
     if before.get("name", case.name) != case.name:

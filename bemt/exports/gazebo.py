@@ -5,12 +5,10 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import edgewise, header, inertia_estimate, plain_name, slope, static_fit
-
-Array = NDArray[np.float64]
 
 
 class GazeboExport(LoadsExport):

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.model import HUB_LOADS
 from bemt.case.prepare import prepare_case
@@ -24,10 +24,6 @@ from bemt.exports.performance import Performance
 
 if TYPE_CHECKING:
     from bemt.case import Case
-
-__all__ = ["COEFFICIENTS", "HubTable", "hub_document", "hub_loads", "hub_of"]
-
-Array = NDArray[np.float64]
 
 COEFFICIENTS = ("dCT", "dCP", "CH", "CY", "CMroll", "CMpitch")
 """Values of the table, in this order."""

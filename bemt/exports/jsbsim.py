@@ -6,14 +6,13 @@ import xml.etree.ElementTree as ET
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.hub import COEFFICIENTS, hub_loads
 from bemt.exports.parts import header, inertia_estimate, plain_name, still_hub
 from bemt.exports.performance import table_loads
 
-Array = NDArray[np.float64]
 SMALLEST_INERTIA = 1.4e-6
 """JSBSim raises what is smaller. [kg m2]"""
 

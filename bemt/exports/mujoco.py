@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import header, plain_name, run_hub, run_module, table_module
-
-Array = NDArray[np.float64]
 
 _CALLBACK = '''
 

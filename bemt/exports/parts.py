@@ -6,16 +6,14 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.base.arrays import Array
 from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document, hub_loads
 from bemt.exports.performance import Performance, table_loads
 
 if TYPE_CHECKING:
     from bemt.exports.base import Job
-
-Array = NDArray[np.float64]
 
 BLADE_DENSITY = 1400.0
 """Of moulded blades, glass-filled nylon; for the estimate of inertia alone [kg/m3]."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.model import HUB_LOADS
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from bemt.bem.model import Model
     from bemt.case import Case
     from bemt.dataset import Dataset
-
-Array = NDArray[np.float64]
 
 LOWEST = 0.25
 """Lowest speed of a table over its greatest."""

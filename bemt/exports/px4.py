@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import header, plain_name
 
-Array = NDArray[np.float64]
 INCH = 0.0254
 MOST_CT = 100.0
 """Greatest CA_ROTORi_CT that the firmware takes (control_allocator/module.yaml)."""

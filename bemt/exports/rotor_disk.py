@@ -12,13 +12,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import DiskExport, Files, Job
 from bemt.exports.openfoam.text import dictionary, vector
 from bemt.exports.performance import Loading
-
-Array = NDArray[np.float64]
 
 FAR = 8.0
 """Radius of the domain [R]."""

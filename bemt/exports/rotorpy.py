@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import edgewise, header, plain_name, slope
-
-Array = NDArray[np.float64]
 
 
 class RotorpyExport(LoadsExport):

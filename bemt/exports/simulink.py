@@ -6,13 +6,11 @@ import io
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.hub import hub_document, hub_loads
 from bemt.exports.parts import plain_name, still_hub, table_document, table_of_document
-
-Array = NDArray[np.float64]
 
 
 class SimulinkExport(LoadsExport):

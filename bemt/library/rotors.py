@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
 from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.dataset import Dataset
-from bemt.library.given import numbers, path_text
+from bemt.library.given import conditions, numbers, path_text, turned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,14 +27,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Propeller", "load", "propeller"]
 
-Array = NDArray[np.float64]
 CHANNELS = (
     "rpm", "airspeed_m_s", "density_kg_m3", "J", "thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "M_tip",
 )  # fmt: skip
 DUCTED = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "exhaust_speed_m_s", "duct_share")
 PAIRED = ("lower_rpm", *LOADS, *RATIOS)
 OBLIQUE = ("sideslip_rad", "H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
-RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +161,7 @@ class Propeller:
         """
         from bemt.case import lattice
 
-        n, V = self._conditions(rpm, airspeed_m_s, J)
-        n, V, angle = self._turned(n, V, angle_deg)
+        n, V, angle = turned(self.case, *conditions(self.case, rpm, airspeed_m_s, J), angle_deg)
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
         found = lattice.solve(self.case, n, V, density, bands, angle)
         more = DUCTED if self.case.ducted else (*OBLIQUE, *PAIRED)
@@ -313,7 +310,7 @@ class Propeller:
         from bemt.bem import kernel as K
         from bemt.bem import solver
 
-        n, V = self._conditions(rpm, airspeed_m_s, J)
+        n, V = conditions(self.case, rpm, airspeed_m_s, J)
         if n.size != 1:
             raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
         density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
@@ -358,7 +355,7 @@ class Propeller:
         """
         from bemt.bem.gradient import gradient
 
-        one, V = self._conditions(rpm, airspeed_m_s, J)
+        one, V = conditions(self.case, rpm, airspeed_m_s, J)
         if one.size != 1:
             raise InputError(Fault("", "rpm", f"{one.size} points", "one operating point"))
         return gradient(self._model, self._model.effects, float(one[0]), float(V[0]), self.case.air())
@@ -437,59 +434,6 @@ class Propeller:
         except OSError as error:
             raise InputError(system_fault(error)) from error
         return file
-
-    def _turned(self, n: Array, V: Array, angle_deg: Any) -> tuple[Array, Array, Array]:
-        """Points with their angle between wind and shaft [deg]."""
-        given = self.case.angle_deg if angle_deg is None else angle_deg
-        angle = np.atleast_1d(numbers("angle_deg", given)).astype(float)
-        if np.any((angle < 0.0) | (angle > 180.0)):
-            odd = float(angle[(angle < 0.0) | (angle > 180.0)][0])
-            raise InputError(Fault("", "angle_deg", f"{odd:g}", "0 (climb) to 180 deg (descent)"))
-        if self.case.ducted and np.any(angle):
-            raise InputError(Fault("", "angle_deg", f"{angle.max():g} deg on a ducted rotor", "0 deg"))
-        try:
-            n, V, angle = np.broadcast_arrays(n, V, angle.ravel())
-        except ValueError:
-            got = f"{angle.size} of angle_deg for {n.size} points"
-            raise InputError(Fault("", "angle_deg", got, "as many of each, or one")) from None
-        return n, V, angle
-
-    def _conditions(self, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, Array]:
-        faults = []
-        if J is not None and airspeed_m_s is not None:
-            faults.append(Fault("", "J, airspeed_m_s", "both", "one of them"))
-        given = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "J": J}
-        found: dict[str, Array] = {}
-        for name, value in given.items():
-            if value is None:
-                continue
-            try:
-                found[name] = numbers(name, value)
-            except InputError as error:
-                faults += error.faults
-        if "rpm" in found and np.any(found["rpm"] <= 0.0):
-            faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
-        elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
-            faults.append(Fault("", "rpm", f"{np.max(found['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
-        fast = np.max(np.abs(found.get("airspeed_m_s", np.zeros(1))))
-        if fast > AIRSPEED_MAX:
-            hint = "km/h? Divide by 3.6"
-            faults.append(Fault("", "airspeed_m_s", f"{fast:g}", f"up to {AIRSPEED_MAX:g} m/s", hint))
-        shapes = {name: value.shape for name, value in found.items()}
-        try:
-            np.broadcast_shapes(*shapes.values())
-        except ValueError:
-            got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
-            faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
-        if faults:
-            raise InputError(faults)
-        n = found.get("rpm", np.asarray(self.case.rpm, dtype=float))
-        if J is not None:
-            V = found["J"] * n / 60.0 * self.diameter_m
-        else:
-            V = found.get("airspeed_m_s", np.asarray(self.case.airspeed_m_s, dtype=float))
-        n, V = np.broadcast_arrays(n, V)
-        return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
 
 
 def propeller(

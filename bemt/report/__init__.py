@@ -24,11 +24,10 @@ sys.modules[__name__].__class__ = CallableRoom  # bemt.report(...) is bemt.libra
 def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
     from bemt.report.case_page import case_sections, reproduction_table
-    from bemt.report.cfd_page import CFD_WORDS, cfd_sections
+    from bemt.report.cfd import CFD_WORDS, FIDELITY_WORDS, cfd_sections, fidelity_sections
     from bemt.report.diagnosis_block import diagnosis_parts, page_verdict
-    from bemt.report.fidelity import FIDELITY_WORDS, fidelity_sections
     from bemt.report.front import answers, front_parts
-    from bemt.report.trend_page import trend_sections
+    from bemt.report.trends import trend_sections
     from bemt.report.values import sections
     from bemt.report.verdicts import headline
 
@@ -49,7 +48,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
     thesis = (
         "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
-        "bemt reproduce where those data are."
+        "reports/studies/reproduce.py where those data are."
     )
     told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
     for key, title, top, found in (
@@ -99,12 +98,12 @@ def write(
     ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
     """
     from bemt.base.tables import write_atomic
+    from bemt.report.front import summary
     from bemt.report.gather import gather
-    from bemt.report.summary import summary
 
     folder = Path(out)
     if recordings:
-        from bemt.report.recorded import diagnose_into
+        from bemt.report.gather import diagnose_into
 
         diagnose_into(paths, recordings, folder, progress)
     book = {**gather(paths, folder, progress), "about": dict(about or {})}

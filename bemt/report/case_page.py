@@ -10,14 +10,12 @@ import numpy as np
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.audit_block import audit_parts
+from bemt.report.cfd import audit_parts
 from bemt.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.report.rotor_view import viewer
 from bemt.report.values import Section, sections, uri
 from bemt.report.verdicts import headline, stand
-
-__all__ = ["case_sections", "reproduction_table"]
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip

@@ -1,6 +1,7 @@
 """This project's own CFD: recordings of campaigns (schema ``bemt.cfd-recording/1``) found in the folder of results.
 
 A recording is audited like anybody else's number. What has another shape than expected is left out.
+Its pages: the recordings, and one rotor by blade elements, as a disk in a flow solver and with its blades resolved.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bemt.base.page import Cell, num, table
 from bemt.readers import number
 from bemt.recordings.audit import CfdFacts, audit, audit_document
 from bemt.report.found_files import read_json, safe_files
+from bemt.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
+from bemt.report.values import Part, Section, picture, sections
 from bemt.rotors.validity import serious
 from bemt.sweep.agreement import agreement
-
-__all__ = ["attach", "cfd_runs", "is_plain", "operating_run", "radial_of", "read_rows", "value"]
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
@@ -204,3 +206,138 @@ def attach(book: dict[str, Any]) -> None:
                 "doubts": list(serious(bemt.get("flags", ())))}  # fmt: skip
         line["verdict"] = agreement(line)
         page["result"] = {**result, "comparisons": [*result["comparisons"], line]}
+
+
+FIDELITY_WORDS = (
+    "The disk prescribes BEMT's load and shows what the wake does with it; resolved blades compute their own. "
+    "The far wake of BEMT is drawn without contraction. CPU seconds; other work ran at the same time."
+)
+
+
+def fidelities(out: Path, cases: Sequence[str]) -> dict[str, Any]:
+    """Loads (``disk/loads.csv``) and axial speeds behind the rotor (``disk/wake.csv``) of the report's own cases."""
+    loads = [row for row in read_rows(out / "disk" / "loads.csv") if row.get("case") in cases]
+    runs = {row.get("run"): row.get("source") for row in loads if row.get("run")}
+    wake: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for row in read_rows(out / "disk" / "wake.csv"):
+        if name := runs.get(row.get("run")):
+            point = value(row.get("r_over_R")), value(row.get("axial_speed_m_s"))
+            wake.setdefault((name, row.get("z_over_R", "")), []).append(point)
+    return {"loads": loads, "wake": wake}
+
+
+def fidelity_sections(found: Mapping[str, Any]) -> list[Section]:
+    """Table of loads, and the axial speed at two distances behind."""
+    rows = [[row["source"], num(value(row.get("J")), 2), num(value(row.get("thrust_N")), 4),
+             num(value(row.get("torque_Nm")), 3), num(value(row.get("seconds")), 2), row.get("what", "")]
+            for row in found["loads"]]  # fmt: skip
+    heads = ["source", "J", "thrust [N]", "torque [N m]", "CPU [s]", "how"]
+    plots = []
+    places = {"0": " at the disk", "-inf": " far behind"}
+    for behind in ("0.5", "2"):
+        traces: list[Trace] = []
+        for (name, at), points in found["wake"].items():
+            if at == f"-{behind}" or at in places:
+                i = len(traces)
+                x, y = zip(*points, strict=True)
+                traces.append(
+                    Trace(name + places.get(at, ""), x, y, None, SERIES[i % len(SERIES)], DASHES[i % len(DASHES)])
+                )
+        if len(traces) > 1:
+            title = f"Axial speed {behind} R behind the rotor, compared with BEMT"
+            plots.append(figure(Plot(title, "r/R [-]", "axial speed [m/s]", traces)))
+    return sections(("Loads and cost", [("table", table(heads, rows))] if rows else []), ("Wake", [("figures", plots)]))
+
+
+KIND = {"fine": "fine", "doubtful": "doubtful", "fault": "fault", "not stated": "unknown"}
+
+
+def _share(value: Any) -> str:
+    return "unknown" if value is None or value != value else f"{100 * value:.1f} %"
+
+
+def audit_parts(audit: Mapping[str, Any]) -> list[Part]:
+    """Say what an audit comes to, and give its lines."""
+    rows = []
+    for line in audit["lines"]:
+        u, status = line["u_relative"], str(line["status"])
+        rows.append([str(line["topic"]), Cell(status, badge=KIND.get(status, "unknown")), str(line["finding"]),
+                     str(line["consequence"]), num(None if u is None else 100 * u, 2, none="unknown")])  # fmt: skip
+    known = audit["u_relative_known"]
+    rest = f"the known parts make {_share(known)} together" if known else "no part of it is known"
+    words = f"{audit['reference']}: uncertainty of the thrust {_share(audit['u_relative'])}; {rest}."
+    head = ["setting", "status", "what is known", "consequence for the thrust", "u %"]
+    return [("words", words), ("table", table(head, rows))]
+
+
+CFD_WORDS = (
+    "OpenFOAM runs on the solids of the cases: rotating frame, wall functions, forces integrated over the blades. "
+    "Each run is audited like any other CFD result."
+)
+
+VARIED = (("J", "J [-]"), ("wall_distance_m", "distance of the plate [m]"), ("tip_gap_mm", "tip gap [mm]"),
+          ("sideslip_deg", "angle of the inflow [deg]"), ("pitch_offset_deg", "offset of the blade angle [deg]"),
+          ("cells", "cells [-]"))  # fmt: skip
+COLUMNS = (("rpm", "rpm", 6), ("airspeed_m_s", "V [m/s]", 4), ("J", "J", 3), ("thrust_N", "T [N]", 4),
+           ("u_thrust_N", "u [N]", 2), ("torque_Nm", "Q [N m]", 4), ("wall_distance_m", "plate [m]", 3),
+           ("tip_gap_mm", "gap [mm]", 3), ("sideslip_deg", "skew [deg]", 3), ("pitch_offset_deg", "dβ [deg]", 3),
+           ("cells", "cells", 6), ("yplus_avg", "y+", 3), ("drift_thrust", "drift", 2))  # fmt: skip
+
+
+def _plots(item: Mapping[str, Any]) -> list[dict[str, Any] | None]:
+    """Thrust and torque over the quantity that was varied most, one line per group of the others."""
+    runs = [r for r in item["runs"] if r["converged"] == 1]
+
+    def values(key: str) -> set[float]:
+        return {round(r[key], 6) for r in runs if math.isfinite(r[key])}
+
+    name, label = max(VARIED, key=lambda v: (len(values(v[0])), -VARIED.index(v)))
+    if len(values(name)) < 2:
+        return []
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for run in runs:
+        words = [run["solver"], run["domain"], f"{run['rpm']:g} rev/min"]
+        if name != "J" and len(values("J")) > 1:
+            words.append(f"J {run['J']:.2g}")
+        if len({r["turbulence"] for r in runs}) > 1:
+            words.append(run["turbulence"])
+        groups.setdefault(", ".join(words), []).append(run)
+    if name == "cells" and len(values(name)) < 3:
+        return []
+    plots = []
+    for key, word in (("thrust_N", "thrust [N]"), ("torque_Nm", "torque [N m]")):
+        traces = []
+        for i, (group, rows) in enumerate(groups.items()):
+            rows = sorted(rows, key=lambda r: float(r[name]))
+            x, y, u = [r[name] for r in rows], [r[key] for r in rows], [r[f"u_{key}"] for r in rows]
+            look = SERIES[i % len(SERIES)], DASHES[i % len(DASHES)], SHAPES[i % len(SHAPES)]
+            traces.append(Trace(group, x, y, u, *look, points=len(rows) == 1))
+        plots.append(figure(Plot(f"{word.split(' [')[0].capitalize()}: {item['title']}", label, word, traces)))
+    return plots
+
+
+def _runs(item: Mapping[str, Any]) -> dict[str, Any] | None:
+    used = [
+        c
+        for c in COLUMNS
+        if any(math.isfinite(r[c[0]]) and (r[c[0]] != 0 or c[0] in ("J", "airspeed_m_s")) for r in item["runs"])
+    ]
+    rows = []
+    for run in item["runs"]:
+        audit = run.get("audit")
+        u = None if not audit or audit["u_relative"] is None else 100 * audit["u_relative"]
+        state = "settled" if run["converged"] == 1 else "did not settle"
+        rows.append([run["run"][:6], run["solver"], run["domain"], *(num(run[key], digits) for key, _, digits in used),
+                     num(u, 2, none="unknown"), state])  # fmt: skip
+    return table(["run", "flow", "domain", *(label for _, label, _ in used), "u of T by audit [%]", "state"], rows)
+
+
+def cfd_sections(found: Sequence[Mapping[str, Any]]) -> list[Section]:
+    """Give the figures of all campaigns of this project's own CFD, then the runs and an audit of each."""
+    figures, tables = [], []
+    for item in found:
+        figures += [*_plots(item), *(picture(name, data) for name, data in item["figures"])]
+        first = next((run["audit"] for run in item["runs"] if run.get("audit")), None)
+        parts = [("table", _runs(item)), *(audit_parts(first) if first else [])]
+        tables.append(("more", (f"{item['title']}: {len(item['runs'])} runs, audit of the first", parts)))
+    return sections(("Figures", [("figures", figures)]), ("Campaigns", tables))

@@ -9,15 +9,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import InputError
 from bemt.case import Case
 from bemt.drive.drive_result import full_throttle
-
-__all__ = ["case_curves", "geometry_curves", "radial_curves", "refinement"]
-
-Array = NDArray[np.float64]
 
 N_J, N_RPM = 29, 21
 REFINED = (10, 20, 40, 80)

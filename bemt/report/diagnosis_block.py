@@ -11,8 +11,6 @@ from bemt.diagnose.figures_recording import FIRST
 from bemt.report.values import Part, picture
 from bemt.report.verdicts import NOTHING_RECORDED, verdict
 
-__all__ = ["diagnosis_parts", "diagnosis_verdict", "first_pictures", "page_verdict"]
-
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip
 RANKED, LEAST = 8, 1e-3

@@ -13,8 +13,6 @@ from bemt.effects import catalogue, source_of
 if TYPE_CHECKING:
     from bemt.effects import Effect
 
-__all__ = ["document", "markdown", "text"]
-
 SCHEMA = "bemt.effects/1"
 KINDS = {
     "air": "Air: the flow around the rotor",

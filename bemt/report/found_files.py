@@ -7,8 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-__all__ = ["read_json", "safe_files"]
-
 FIGURE_BYTES = 600_000
 FIGURES = 12
 JSON_BYTES = 20_000_000

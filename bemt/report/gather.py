@@ -1,30 +1,27 @@
-"""Everything a report shows, as plain values: results, curves, pictures, diagnoses, CFD runs."""
+"""Everything a report shows, as plain values: results, curves, pictures, diagnoses (made here), CFD runs."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import bemt
-from bemt.base.errors import InputError
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, write_atomic
 from bemt.case import Case, find_cases, load_case
-from bemt.compare.thesis import ORIGIN
 from bemt.report import curves, trends
-from bemt.report.cfd import attach, cfd_runs
-from bemt.report.fidelity import fidelities
+from bemt.report.cfd import attach, cfd_runs, fidelities
 from bemt.report.found_files import read_json, safe_files
 from bemt.report.rotor_view import still
 from geometry.common import GeometryError
 from geometry.surface import surfaces
 
-__all__ = ["attach_diagnoses", "gather"]
-
 Progress = Callable[[str], None]
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
+REPRODUCED = {"section", "quantity", "stated", "ours", "unit", "status", "note"}
 ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
 
@@ -43,12 +40,12 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         if case is not None and result["rows"]:
             solved.append((case, page))
     tell("report: trends")
-    of_thesis = any(result.get("origin") == ORIGIN for result in document["cases"])
+    of_thesis = any(result.get("origin") == trends.ORIGIN for result in document["cases"])
     book = {
         "version": bemt.__version__,
         "cases": pages,
         "trends": _trends(solved, document["cases"]),
-        "reproduction": _reproduction() if of_thesis else [],
+        "reproduction": _reproduction(out) if of_thesis else [],
         "exit_code": document["exit_code"],
         "cfd": cfd_runs(out),
         "fidelities": fidelities(out, [str(page["result"]["name"]) for page in pages]),
@@ -101,15 +98,17 @@ def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Map
             family = trends.families(base)
         except (InputError, GeometryError, ValueError):
             family = {}
-    thesis = [result for result in results if result.get("origin") == ORIGIN]  # the robot is that of the thesis
+    thesis = [result for result in results if result.get("origin") == trends.ORIGIN]  # the robot is that of the thesis
     return {"family": family, "choice": trends.choice(thesis), "moments": trends.moments(thesis)}
 
 
-def _reproduction() -> list[dict[str, Any]]:
-    """Give the numbers of the thesis beside ours, without the database statistics, which need data from outside."""
-    from bemt.compare import reproduce
-
-    return [asdict(item) for item in reproduce.items(None) if not item.status.startswith("not checked")]
+def _reproduction(out: Path) -> list[Mapping[str, Any]]:
+    """Numbers of the thesis beside ours, of a study in the folder of results; the database statistics left out."""
+    document = read_json(out / "reproduction.json")
+    if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.reproduce/"):
+        return []
+    rows = [item for item in document.get("items", []) if isinstance(item, Mapping) and item.keys() >= REPRODUCED]
+    return [item for item in rows if not str(item["status"]).startswith("not checked")]
 
 
 def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
@@ -133,3 +132,38 @@ def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
         else:
             others.append(item)
     book["diagnoses"] = others
+
+
+def diagnose_into(
+    paths: Sequence[str | Path], recordings: Sequence[str], out: Path, progress: Callable[[str], None] | None = None
+) -> None:
+    """Diagnose recordings of the one case of a report into ``out/NAME/diagnosis``.
+
+    They are analysed together; too few readings are shown beside the model.
+    """
+    from bemt.compare.one_run import compare_run
+    from bemt.diagnose import folder
+    from bemt.diagnose.chain import diagnose
+    from bemt.diagnose.document import document
+    from bemt.diagnose.figures_recording import FIRST, first_picture
+    from bemt.diagnose.load import load_all
+
+    cases = find_cases(paths)
+    if len(cases) != 1:
+        raise InputError(Fault("--recording", "", f"{len(cases)} cases", "one case, the rotor that was recorded"))
+    found, records = load_all(list(recordings), [str(cases[0])])
+    target = (out / found[0].name / "diagnosis").as_posix()
+    folder.check(target, found)
+    about: dict[str, Any] = {"recordings": list(recordings), "cases": [c.name for c in found]}
+    try:
+        answer = diagnose(records, found, None, progress)
+    except InputError as error:
+        if len(recordings) > 1 or any(f.where != "readings" for f in error.faults):
+            raise
+        told = compare_run(recordings[0], found[0], progress) | about
+        few = f"Too few readings for a diagnosis ({error.faults[0].got}). {told['sentence']} Next: {told['next']}."
+        told |= {"verdict": "insufficient", "effects": [], "explanation": few}
+        write_atomic(Path(target) / "diagnosis.json", json_text(told))
+        write_atomic(Path(target) / f"{FIRST}.png", first_picture(records, found)[0].png())
+        return
+    folder.write(target, answer, document(answer) | about, found)

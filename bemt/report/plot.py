@@ -14,8 +14,6 @@ from urllib.parse import quote
 
 from bemt.base.tables import number_text
 
-__all__ = ["COLOURS", "Mark", "Plot", "Trace", "figure", "points", "ticks"]
-
 COLOURS = {
     "bemt": "#0072B2",
     "bemt variant": "#56B4E9",

@@ -8,13 +8,9 @@ import json
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from geometry.surface import Surface
-
-__all__ = ["still", "viewer"]
-
-Array = NDArray[np.float64]
 
 COLOURS = {"blade": "#4f93c4", "hub": "#8d99a6", "duct": "#c9973f", "cut": "#e3c58c", "stator": "#b58a4a"}
 OPEN, CUT_OPEN = (-0.25, 0.95, 1.25), (0.45, 1.05, 0.95)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 from typing import Any
 
-__all__ = ["Part", "Section", "picture", "sections", "uri"]
-
 Part = tuple[str, Any]
 """What it is, and its value: words, command, verdict, table, list, figures, more (see `templates/report.html`)."""
 Section = tuple[str, list[Part]]

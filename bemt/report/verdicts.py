@@ -9,8 +9,6 @@ from typing import Any
 from bemt.base.tables import number_text
 from bemt.sweep.agreement import doubted, needed
 
-__all__ = ["answer", "headline", "recorded", "stand", "verdict"]
-
 NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight", "openfoam": "own CFD"}
 """Sources in the order in which they are spoken of."""
 

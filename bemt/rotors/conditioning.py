@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.latents import STEP, Prior
 
-Array = NDArray[np.float64]
 Readings = Callable[[Array], Array]
 
 TOLERANCE = 0.25
@@ -26,45 +26,26 @@ _SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Conditioned:
-    """Outcome of `condition`.
+    """Outcome of `condition`."""
 
-    Attributes
-    ----------
-    mean, cov : (K,), (K, K) float
-        Posterior of the latent numbers, in the units of the prior.
-    at : (K,) float
-        Where the tangents were taken, within `TOLERANCE` of the mean when converged [units of the prior].
-    f, T : (M,), (M, K) float
-        The solver and its tangents there [unit of the readings].
-    f0 : (M,) float
-        ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [of the
-        readings].
-    sizes, weights : (S,) float
-        Heavy tail: factors on the prior's standard deviations and their posterior probabilities [1].
-    steps : int
-        Tangents taken [1].
-    converged : bool
-        Whether the point stood still to within `TOLERANCE` posterior standard deviations.
-    noise_size : float
-        Root mean square of the factor on the noise, posterior [1].
-    log_evidence : float
-        Laplace's logarithm of the evidence of the reference [1].
-    excess : float
-        Factor on the covariance of the noise, above 1 for readings that no rotor of the prior could give [1].
-    """
-
+    # (K,), (K, K) Posterior of the latent numbers, in the units of the prior
     mean: Array
     cov: Array
-    at: Array
+    at: Array  # (K,) Where the tangents were taken, within `TOLERANCE` of the mean when converged [units of the prior]
+    # (M,), (M, K) The solver and its tangents there [unit of the readings]
     f: Array
     T: Array
+    # (M,) ``f - T (at - prior mean)``: the baseline for which a prior centred at the case counts nothing twice [of the
+    # readings]
     f0: Array
+    # (S,) Heavy tail: factors on the prior's standard deviations and their posterior probabilities [1]
     sizes: Array
     weights: Array
-    steps: int
-    converged: bool
-    noise_size: float
-    log_evidence: float
+    steps: int  # Tangents taken [1]
+    converged: bool  # Whether the point stood still to within `TOLERANCE` posterior standard deviations
+    noise_size: float  # Root mean square of the factor on the noise, posterior [1]
+    log_evidence: float  # Laplace's logarithm of the evidence of the reference [1]
+    # Factor on the covariance of the noise, above 1 for readings that no rotor of the prior could give [1]
     excess: float = 1.0
 
 

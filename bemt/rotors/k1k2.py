@@ -15,26 +15,23 @@ References
        15 to 30 % too low.
 .. [2] T. Cahill, "System Identification of Thrust and Torque Characteristics for a Bipedal Robot with Integrated
        Propulsion", MS thesis, Northeastern University, 2025: uses [1]; its final printed equation is dimensionally
-       wrong, see `printed_equation`.
+       wrong, see ``reports/studies/thesis.py``.
 .. [3] F. E. Weick, "Full Scale Tests on a Thin Metal Propeller at Various Tip Speeds", NACA Report 302, 1928: effect of
        tip speed on efficiency negligible from 0.6 to 0.9 of the speed of sound (read in the summary).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-
-Array = NDArray[np.float64]
 
 K1 = 1.0 / 3.29546
 """Coefficient of D/p [-], reference [1]."""
@@ -50,14 +47,14 @@ U_CLAIMED = 0.13
 """Relative standard uncertainty claimed by [1]: 68 % of static points within 13 % [-]."""
 U_MEASURED = 0.196
 """Standard deviation of F/measured on 4122 static points of 248 UIUC propellers, nominal D and p, nothing fitted [-];
-`bemt.compare.reproduce` recomputes it where the data are."""
+`reports/studies/reproduce.py` recomputes it where the data are."""
 M_TIP_LIMIT = 0.9
 """Tip Mach number above which a model without Mach number is flagged [-]: upper end of the tests of [3]."""
 ZERO_THRUST_MEASURED = 1.19
 """Measured zero-thrust J over P/D, mean over UIUC propellers [-]; the formula says 1."""
 FLIGHT_RATIO = ((0.1, 0.3, 0.5, 0.7, 0.9), (0.86, 0.77, 0.64, 0.53, 0.31))
 """Median F/measured in flight [-] over J/(P/D) [-], bins of 0.2, 9257 points of 128 UIUC propellers of volumes 1-2,
-nominal D and p; `bemt.compare.reproduce` recomputes it where the data are."""
+nominal D and p; `reports/studies/reproduce.py` recomputes it where the data are."""
 
 
 def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
@@ -67,37 +64,6 @@ def corrected_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any)
     61.25
     """
     return rho * area * (v_pitch**2 - v_pitch * V) * (K1 * d_over_p) ** K2
-
-
-def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
-    """K1/K2 equation as printed in the thesis, kept ONLY to show that it cannot be right.  Never use it.
-
-    The term with V stands outside the bracket that density and area multiply, (rho A v_p^2 - v_p V)(K1 D/p)^K2.  A
-    change of units therefore changes the ratio to `corrected_equation`; see `unit_defect`.  Static values agree.
-
-    >>> static = (1.225, 0.05, 40.0, 0.0, 1.6)
-    >>> printed_equation(*static) == corrected_equation(*static)
-    True
-    """
-    return (rho * area * v_pitch**2 - v_pitch * V) * (K1 * d_over_p) ** K2
-
-
-def unit_defect(formula: Callable[..., float], mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
-    """Relative error that a mere change of units makes in a thrust formula; zero for a right one. [-]
-
-    Any physical equation is homogeneous in mass, length and time (Bridgman, "Dimensional Analysis", 1922), so that the
-    result is zero for every choice of units.  Evaluated for an 8x5 at 6000 rev/min and half its pitch speed.
-
-    >>> abs(unit_defect(corrected_equation, length=0.0254)) < 1e-12
-    True
-    >>> abs(unit_defect(printed_equation, length=0.0254)) > 0.5
-    True
-    """
-    rho, area, v, V, ratio = 1.225, math.pi * 0.2032**2 / 4.0, 12.7, 6.35, 1.6
-    si = formula(rho, area, v, V, ratio)
-    speed = length / time
-    other = formula(rho / (mass / length**3), area / length**2, v / speed, V / speed, ratio)
-    return float(other * mass * length / time**2 / si - 1.0)
 
 
 def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array) -> None:

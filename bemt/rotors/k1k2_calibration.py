@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
 from bemt.base.tables import json_text, text_table, write_atomic
@@ -26,7 +27,6 @@ from bemt.base.units import INCH
 from bemt.rotors import k1k2_fit as fitting
 from bemt.rotors.k1k2_points import FitPoints, files, load
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SCHEMA = "bemt.calibration/2"

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.rotors import k1k2 as empirical
 from bemt.rotors.k1k2_points import FitPoints
-
-Array = NDArray[np.float64]
 
 HUBER = 1.345
 """Huber's threshold in robust standard deviations (95 % efficiency on normal errors) [-]."""

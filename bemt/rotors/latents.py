@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.effects.base import Baking
-
-Array = NDArray[np.float64]
 
 KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
 """How the blade of a case is known; ``reference``: from a run of this very rotor."""
@@ -26,22 +25,13 @@ _ATTACHED, _SEPARATED = math.radians(30.0), math.radians(60.0)
 
 @dataclass(frozen=True)
 class AsBuilt(Effect):
-    """What the rotor as built has and its drawing has not.
+    """What the rotor as built has and its drawing has not."""
 
-    Parameters
-    ----------
-    angle_deg : float
-        Turn of the whole blade [deg].
-    lift, drag : float
-        Natural logarithm of the factor on cl and on cd [1].
-    camber_deg : float
-        Lowering of the zero-lift angle at the same drag [deg].
-    """
-
-    angle_deg: float = 0.0
+    angle_deg: float = 0.0  # Turn of the whole blade [deg]
+    # Natural logarithm of the factor on cl and on cd [1]
     lift: float = 0.0
     drag: float = 0.0
-    camber_deg: float = 0.0
+    camber_deg: float = 0.0  # Lowering of the zero-lift angle at the same drag [deg]
 
     id = "as_built"
     title = "Rotor as built"
@@ -79,25 +69,14 @@ def as_built(z: Array) -> AsBuilt:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the latent numbers of one rotor: a normal law whose size is itself uncertain.
+    """What is known of the latent numbers of one rotor: a normal law whose size is itself uncertain."""
 
-    Attributes
-    ----------
-    mean : (K,) float
-        Expectation, in the order and units of `NAMES`.
-    cov : (K, K) float
-        Covariance at size 1 [units of `NAMES`, squared].
-    sizes, weights : (S,) float
-        Factors on all standard deviations of this rotor, and their probabilities: the heavy tail [1].
-    known_from : str
-        One of `KNOWN_FROM`.
-    """
-
-    mean: Array
-    cov: Array
+    mean: Array  # (K,) Expectation, in the order and units of `NAMES`
+    cov: Array  # (K, K) Covariance at size 1 [units of `NAMES`, squared]
+    # (S,) Factors on all standard deviations of this rotor, and their probabilities: the heavy tail [1]
     sizes: Array
     weights: Array
-    known_from: str = "stations"
+    known_from: str = "stations"  # One of `KNOWN_FROM`
 
     @property
     def sd(self) -> Array:
@@ -115,27 +94,17 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """The solver at points of one rotor, with its slopes.
-
-    Attributes
-    ----------
-    diameter_m : float
-        Diameter [m].
-    J, alpha_deg, Re : (P,) float
-        Advance ratio; angle of attack at 0.75 R with the momentum theory's induction [deg]; Reynolds number there.
-    f, top : (2, P) float
-        CT and CP, and those at rest at the same rpm [1].
-    T : (2, K, P) float
-        Slopes of CT and CP with the latent numbers [1 over their units].
-    """
+    """The solver at points of one rotor, with its slopes."""
 
     diameter_m: float
+    # (P,) Advance ratio; angle of attack at 0.75 R with the momentum theory's induction [deg]; Reynolds number there
     J: Array
     alpha_deg: Array
     Re: Array
+    # (2, P) CT and CP, and those at rest at the same rpm [1]
     f: Array
     top: Array
-    T: Array
+    T: Array  # (2, K, P) Slopes of CT and CP with the latent numbers [1 over their units]
 
     @property
     def beta75_deg(self) -> Array:

@@ -6,9 +6,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 LEVELS = (math.erf(math.sqrt(0.5)), math.erf(math.sqrt(2.0)))
 """Probabilities within one and two standard deviations of a normal law; called 68 and 95 % [1]."""

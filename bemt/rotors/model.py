@@ -1,4 +1,4 @@
-"""A model of a rotor with other latent numbers, and what the population expects of it."""
+"""A model of a rotor with other latent numbers: what the population expects of it, and what a run of it adds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.rotors.latents import AsBuilt, Prior, Sensed, as_built
 from bemt.rotors.population import population
 from bemt.rotors.predict import Prediction, Solve, predict, sense
@@ -19,9 +21,8 @@ from bemt.rotors.predict import Prediction, Solve, predict, sense
 if TYPE_CHECKING:
     from bemt.air import Air
     from bemt.bem.model import Model
+    from bemt.rotors.latents import Prior
     from bemt.rotors.reference import ReferenceRun
-
-Array = NDArray[np.float64]
 
 
 def air_fields(air: Air) -> dict[str, Array]:
@@ -64,31 +65,19 @@ def beta75_deg(model: Model) -> float:
 class RealRotor:
     """A real rotor at any points: expectation, tangents and covariance of CT and CP, before or after a run of it.
 
-    Attributes
-    ----------
-    solve : Solve
-        The solver with any latent numbers.
-    diameter_m, beta75_deg : float
-        Diameter [m]; blade angle at 0.75 R as drawn [deg].
-    prior : Prior
-        What is known of the latent numbers, after the run if there is one.
-    drawn : (K,) float
-        Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`].
-    reference : ReferenceRun or None
-        The run's rows.
-
     Notes
     -----
     Readings of rotors of this description have the mean `expected` and, at size 1 of the heavy tails (`Prior.sizes`,
     `Population.rest_sizes`), the covariance ``T prior.cov T^T + rest``, T and rest as `tangents` and `rest` give them.
     """
 
-    solve: Solve
+    solve: Solve  # The solver with any latent numbers
+    # Diameter [m]; blade angle at 0.75 R as drawn [deg]
     diameter_m: float
     beta75_deg: float
-    prior: Prior
-    drawn: Array
-    reference: ReferenceRun | None = None
+    prior: Prior  # What is known of the latent numbers, after the run if there is one
+    drawn: Array  # (K,) Latent numbers with which slopes are taken [units of `bemt.rotors.latents.NAMES`]
+    reference: ReferenceRun | None = None  # The run's rows
 
     @staticmethod
     def of(model: Model, air: Air, prior: Prior, drawn: Array, reference: ReferenceRun | None = None) -> RealRotor:
@@ -125,3 +114,42 @@ class RealRotor:
     def predict(self, at: Sensed, mean: Array | None = None) -> Prediction:
         """Expectation and scatter at points; ``mean`` (2, P): the solver at the prior's mean, where that was solved."""
         return predict(population(), self._from_drawn, at, mean, self.reference)
+
+
+_NODES_J, _NODES_RE, _OCTAVES = 81, 5, 1.0
+_PAST_RUN = 0.6
+"""The table ends this far beyond the run's advance ratios, where a run tells nothing any more [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """Change of CT and CP over advance ratio and Reynolds number; beyond the table as at its end."""
+
+    J: Array  # (N,) Advance ratios [1]
+    ln_Re: Array  # (M,) Logarithm of the Reynolds number at 0.75 R of the rotation alone [1]
+    change: Array  # (2, M, N) What is added to CT and CP [1]
+
+    def __call__(self, J: Array, Re: Array) -> Array:
+        """Change of CT and CP at points (P,), bilinear, (2, P)."""
+        along = np.array([[np.interp(J, self.J, row) for row in one] for one in self.change])
+        place = np.interp(np.log(Re), self.ln_Re, np.arange(float(self.ln_Re.size)))
+        low = np.minimum(place.astype(np.intp), self.ln_Re.size - 2)
+        points, share = np.arange(J.size), place - low
+        return np.asarray((1.0 - share) * along[:, low, points] + share * along[:, low + 1, points])
+
+
+def with_run(model: Model, air: Air, prior: Prior, drawn: Array, run: ReferenceRun) -> Model:
+    """Model that adds what a run of this rotor tells of the solver's rest, so that it gives the expected loads."""
+    rotor = RealRotor.of(model, air, prior, drawn, run)
+    D, J = model.diameter_m, np.linspace(run.at.J.min() - _PAST_RUN, run.at.J.max() + _PAST_RUN, _NODES_J)
+    still = run.at.Re * 0.75 * np.pi / np.hypot(0.75 * np.pi, run.at.J)
+    ln_Re = np.linspace(np.log(still.min()) - _OCTAVES * np.log(2.0), np.log(still.max()) + _OCTAVES * np.log(2.0),
+                        _NODES_RE)  # fmt: skip
+    state = air_fields(air)
+    rho, mu = float(state["rho"][0]), float(state["mu"][0])
+    n_Re = float(co.Re75(model.chord75_m, 1.0, D, 0.0, rho, mu))
+    n, j = (v.ravel() for v in np.meshgrid(np.exp(ln_Re) / n_Re, J, indexing="ij"))
+    Re = np.asarray(co.Re75(model.chord75_m, n, D, j * n * D, rho, mu))
+    at = rotor.at(60.0 * n, j, Re)
+    change = np.nan_to_num(rotor.expected(at) - at.f).reshape(2, _NODES_RE, _NODES_J)
+    return replace(model, learned=Learned(J, ln_Re, change))

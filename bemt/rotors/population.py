@@ -4,8 +4,8 @@ A reading is f(z) + bias + rest + noise. The latent numbers z of `bemt.rotors.la
 with a size that differs from rotor to rotor (a mixture of sizes at quantiles of Student's t: heavy tails). The rest is
 a Gaussian process over the angle of attack at 0.75 R and ln Re: errors of the section tables, which enter as a change
 of zero-lift angle and of ln(drag) through the solver's own slopes, a remainder of CT and CP, and a part at rest that
-flight does not share. All numbers are fitted by maximum likelihood to measured propellers (`bemt.rotors.fit`); the file
-beside this module holds them and where they come from.
+flight does not share. All numbers are fitted by maximum likelihood to measured propellers
+(`reports/studies/population_fit.py`); the file beside this module holds them and where they come from.
 
 What the label says of the blade angle is weighed against the stations by their variances: stations err by s, the label
 lies below the blade angle by the offset usual for its family (known to tau where the family is unknown) and errs by l.
@@ -23,12 +23,10 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.latents import KNOWN_FROM, NAMES, Prior, Sensed
 from bemt.rotors.validity import Validity
-
-Array = NDArray[np.float64]
 
 SMALL_IN = 7.0
 """Diameter below which the rest, and the chord of a label, scatter more [in]."""
@@ -90,107 +88,67 @@ def sizes(nu: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """What measured propellers of one family have in common, from the population's spread between families.
+    """What measured propellers of one family have in common, from the population's spread between families."""
 
-    Attributes
-    ----------
-    offset_deg, offset_sd_deg : float
-        Blade angle over the label's and its standard deviation [deg].
-    mean, cov : (3,), (3, 3) float
-        Shift of `SHARED` from what is usual, and its covariance [units of `NAMES`].
-    """
-
+    # Blade angle over the label's and its standard deviation [deg]
     offset_deg: float
     offset_sd_deg: float
+    # (3,), (3, 3) Shift of `SHARED` from what is usual, and its covariance [units of `NAMES`]
     mean: Array
     cov: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Fitted numbers of the population.
+    """Fitted numbers of the population."""
 
-    Attributes
-    ----------
-    stations_deg, label_deg, family_deg, offset_deg : float
-        Error of the stations' angle, of the label's, scatter of the offset between families, and the offset: blade
-        angle at 0.75 R over the label's [deg].
-    camber_deg, drag, lift : float
-        Standard deviations of zero-lift angle [deg], ln(drag) and ln(lift) of a known section [1].
-    unknown_camber_deg, unknown_drag : float
-        The same of a section that nobody published, besides.
-    camber_drag : float
-        Correlation of zero-lift angle and ln(drag) [1].
-    slow_flyer_deg : float
-        Further zero-lift angle of slow flyers [deg].
-    rest_small : float
-        Exponent of (7 in / D) on the rest of smaller propellers [1].
-    local_camber_deg, local_drag, local_correlation : float
-        Errors of the section tables that change with the angle of attack: zero-lift angle [deg], ln(drag) [1].
-    local_deg, local_ln_Re : float
-        Their lengths in angle of attack [deg] and in ln Re.
-    rest_CT, rest_CP, rest_correlation, rest_deg, rest_ln_Re : float
-        Remainder over the coefficient at rest, correlation of CT and CP [1], lengths as above.
-    rest_share : float
-        The remainder is as large as f^share f0^(1 - share), f the coefficient and f0 that at rest [1].
-    reach : float
-        Exponent of the rational quadratic covariance, (1 + d^2 / 2 a)^-a (Rasmussen and Williams 2006, eq. 4.19): the
-        smaller, the more lengths it has at once [1].
-    hover_CT, hover_CP : float
-        Part of the rest that flight does not share with hover, over the coefficient at rest [1].
-    noise : float
-        Scatter of single readings, of the coefficient [1].
-    hub_cd : float
-        Drag coefficient of the hub in flight, on a disk of `HUB` diameters [1].
-    lift_Re : float
-        Expectation of ln(lift) at small angles of attack and Re 100,000, with the opposite sign at 30,000 [1].
-    nu, nu_rest : float
-        Degrees of freedom of the heavy tails: latent numbers; rest and noise, which also differ in size by rotor [1].
-    between : tuple of float
-        Share of the variances of `SHARED` that is between families [1].
-    families : mapping of str to Family
-        Families at hand.
-    provenance : mapping
-        Folders, propellers, points, command, version.
-    validity : Validity
-        Ranges of the propellers it was fitted to.
-    """
-
+    # Error of the stations' angle, of the label's, scatter of the offset between families, and the offset: blade angle
+    # at 0.75 R over the label's [deg]
     stations_deg: float
     label_deg: float
     family_deg: float
     offset_deg: float
+    # Standard deviations of zero-lift angle [deg], ln(drag) and ln(lift) of a known section [1]
     camber_deg: float
     drag: float
     lift: float
+    # The same of a section that nobody published, besides
     unknown_camber_deg: float
     unknown_drag: float
-    camber_drag: float
-    slow_flyer_deg: float
-    rest_small: float
+    camber_drag: float  # Correlation of zero-lift angle and ln(drag) [1]
+    slow_flyer_deg: float  # Further zero-lift angle of slow flyers [deg]
+    rest_small: float  # Exponent of (7 in / D) on the rest of smaller propellers [1]
+    # Errors of the section tables that change with the angle of attack: zero-lift angle [deg], ln(drag) [1]
     local_camber_deg: float
     local_drag: float
     local_correlation: float
+    # Their lengths in angle of attack [deg] and in ln Re
     local_deg: float
     local_ln_Re: float
+    # Remainder over the coefficient at rest, correlation of CT and CP [1], lengths as above
     rest_CT: float
     rest_CP: float
     rest_correlation: float
     rest_deg: float
     rest_ln_Re: float
-    rest_share: float
+    rest_share: float  # The remainder is as large as f^share f0^(1 - share), f the coefficient and f0 that at rest [1]
+    # Exponent of the rational quadratic covariance, (1 + d^2 / 2 a)^-a (Rasmussen and Williams 2006, eq. 4.19): the
+    # smaller, the more lengths it has at once [1]
     reach: float
+    # Part of the rest that flight does not share with hover, over the coefficient at rest [1]
     hover_CT: float
     hover_CP: float
-    noise: float
-    hub_cd: float
+    noise: float  # Scatter of single readings, of the coefficient [1]
+    hub_cd: float  # Drag coefficient of the hub in flight, on a disk of `HUB` diameters [1]
+    # Expectation of ln(lift) at small angles of attack and Re 100,000, with the opposite sign at 30,000 [1]
     lift_Re: float
+    # Degrees of freedom of the heavy tails: latent numbers; rest and noise, which also differ in size by rotor [1]
     nu: float
     nu_rest: float
-    between: tuple[float, ...] = (0.5, 0.5, 0.5)
+    between: tuple[float, ...] = (0.5, 0.5, 0.5)  # Share of the variances of `SHARED` that is between families [1]
     families: Mapping[str, Family] = field(default_factory=dict)
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-    validity: Validity | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)  # Folders, propellers, points, command, version
+    validity: Validity | None = None  # Ranges of the propellers it was fitted to
 
     @property
     def rest_sizes(self) -> Array:

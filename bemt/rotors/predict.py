@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.conditioning import tangents
 from bemt.rotors.latents import NAMES, Prior, Sensed, inflow_angle_deg
 from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun
 
-Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
 """(K,) latent numbers, (P,) rpm, (P,) advance ratio and the points whose air holds, (P,), to (2, P) CT and CP."""
 
@@ -24,22 +24,14 @@ _SCAN = np.linspace(0.05, 2.5, 50)
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Expectation and scatter of CT and CP of a rotor as built.
+    """Expectation and scatter of CT and CP of a rotor as built."""
 
-    Attributes
-    ----------
-    mean : (2, P) float
-        Expectation of CT and CP [1].
-    latent_sd, rest_sd, noise_sd : (2, P) float
-        Standard deviations from the latent numbers at size 1, from the solver's rest, from single readings [1].
-    sizes, weights, rest_sizes, rest_weights : (S,), (S,), (R,), (R,) float
-        Heavy tails of the latent part and of rest and readings.
-    """
-
-    mean: Array
+    mean: Array  # (2, P) Expectation of CT and CP [1]
+    # (2, P) Standard deviations from the latent numbers at size 1, from the solver's rest, from single readings [1]
     latent_sd: Array
     rest_sd: Array
     noise_sd: Array
+    # (S,), (S,), (R,), (R,) Heavy tails of the latent part and of rest and readings
     sizes: Array
     weights: Array
     rest_sizes: Array

@@ -7,14 +7,11 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.rotors.conditioning import Conditioned
 from bemt.rotors.latents import Sensed
 from bemt.rotors.population import Population
-
-Array = NDArray[np.float64]
-
 
 SESSION = 0.01
 """Gain of a stand that all points of a run share, where the recording does not state it: retests of a propeller in one
@@ -56,23 +53,12 @@ def noise_of_run(
 
 @dataclass(frozen=True, eq=False)
 class ReferenceRun:
-    """Rows of a reference run after conditioning, M points (or bins), CT rows first.
+    """Rows of a reference run after conditioning, M points (or bins), CT rows first."""
 
-    Attributes
-    ----------
-    at : Sensed
-        The solver at the points of the run, its slopes at the posterior.
-    left : (2 M,) float
-        Readings less the solver at the posterior mean; zero where nothing was read [1].
-    noise : (2 M, 2 M) float
-        Covariance without the latent numbers: rest, instrument [1].
-    size : float
-        Size of the rest of this rotor, as `Population.rest_sizes` count it; predictions are never narrower for it [1].
-    """
-
-    at: Sensed
-    left: Array
-    noise: Array
+    at: Sensed  # The solver at the points of the run, its slopes at the posterior
+    left: Array  # (2 M,) Readings less the solver at the posterior mean; zero where nothing was read [1]
+    noise: Array  # (2 M, 2 M) Covariance without the latent numbers: rest, instrument [1]
+    # Size of the rest of this rotor, as `Population.rest_sizes` count it; predictions are never narrower for it [1]
     size: float = 1.0
 
     @property

@@ -29,9 +29,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
+
 Range = tuple[float, float]
 
 DUCT = 1.5
@@ -91,30 +92,14 @@ def counted(flags: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Validity:
-    """Ranges of the measured rotors. Smallest and largest value each.
-
-    Attributes
-    ----------
-    diameter_m : (float, float)
-        Diameter [m].
-    x : (float, float)
-        J over the solver's J of zero thrust [1].
-    Re : (float, float)
-        Reynolds number at 0.75 R [1].
-    M_tip : float
-        Largest rotational tip Mach number [1].
-    blades : (int, int)
-        Number of blades.
-    pitch_over_D : (float, float)
-        Geometric pitch at 0.75 R over the diameter [1].
-    """
+    """Ranges of the measured rotors. Smallest and largest value each."""
 
     diameter_m: Range
-    x: Range
-    Re: Range
-    M_tip: float
+    x: Range  # J over the solver's J of zero thrust [1]
+    Re: Range  # Reynolds number at 0.75 R [1]
+    M_tip: float  # Largest rotational tip Mach number [1]
     blades: tuple[int, int]
-    pitch_over_D: Range
+    pitch_over_D: Range  # Geometric pitch at 0.75 R over the diameter [1]
 
     @staticmethod
     def of_rotor(

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.sections.polars import ALPHA_GRID, Polar, first_stall
-
-__all__ = ["METHODS", "ExtrapolatedTable", "extend", "from_tables", "viterna_cd_max"]
-
-Array = NDArray[np.float64]
 
 METHODS = ("viterna", "normal")
 """Names of the post-stall models of `extend`."""

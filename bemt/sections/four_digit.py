@@ -18,9 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.cache import shipped_arrays
-
-Array = NDArray[np.float64]
 
 FILE = "four_digit.npz"
 STEPS = (2e-4, 5e-4, 1e-2)

@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import cache
+from bemt.base.arrays import Array
+from bemt.base.cache import Kept
 from bemt.base.errors import needs
-from bemt.base.kept import Kept
 from bemt.sections import four_digit, rule
 from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
 from bemt.sections.four_digit import RawPolar
@@ -26,10 +26,6 @@ from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
-
-__all__ = ["neuralfoil_polar", "tunnel_polar"]
-
-Array = NDArray[np.float64]
 
 TABLE_VERSION = 5
 """Raise when the making of tables changes: older cache entries are then ignored."""

@@ -10,13 +10,11 @@ from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.sections.polars import Polar, first_stall
 
-__all__ = ["QpropSection", "XrotorSection", "fit_qprop", "fit_xrotor"]
-
-Array = NDArray[np.float64]
 LOW, HIGH = np.radians(-16.0), np.radians(22.0)
 """Angles of attack that a fit of lift looks at [rad]."""
 WIDEST_STALL = 0.3

@@ -15,13 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base import cache
-
-__all__ = [
-    "ALPHA_COARSE_STEP", "ALPHA_FINE_HI", "ALPHA_FINE_LO", "ALPHA_FINE_STEP", "ALPHA_GRID", "DEFAULT_RE", "DLOG_RE",
-    "LOG_RE0", "RE_FIXED", "Polar", "blend", "first_stall", "fixed_re", "linear_polar",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 ALPHA_FINE_LO = float(np.deg2rad(-30.0))
 ALPHA_FINE_HI = float(np.deg2rad(40.0))

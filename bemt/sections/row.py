@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
+
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
-
-Array = NDArray[np.float64]
 
 PANELS = 72
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(3)

@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import __version__, effects
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.case import Case
 from bemt.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
@@ -37,8 +37,6 @@ COMPARED = {
     "CP": "-",
 }  # fmt: skip
 """Channels that are compared, with their units."""
-
-Array = NDArray[np.float64]
 
 
 def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[float, float, float]]:

@@ -5,29 +5,43 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.readers._uiuc_names import class_of
-from bemt.rotors.conditioning import condition
-from bemt.rotors.fit import MeasuredRotor, law
-from bemt.rotors.latents import Prior
+from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside
-from bemt.rotors.population import WEIGHTS, Population, label_angle_deg
+from bemt.rotors.population import Population, label_angle_deg
 from bemt.rotors.predict import predict, sense
-from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.rotors.reference import ReferenceRun
 from bemt.sections import rule as section_rule
-from bemt.validate.points import J_SHARE, Rows, Solver, Stations, counted, rows
+from bemt.validate.points import KINDS, Rows, Solver, Stations, counted, errors, rows, statistics
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
     from bemt.readers.uiuc import UiucPropeller
 
-Array = NDArray[np.float64]
-RUN_POINTS = 24
-"""Points of a run on which a rotor is conditioned [1]."""
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRotor(Sensed):
+    """One measured propeller beside the solver at P readings; ``y`` (2, P) are CT and CP measured [1]."""
+
+    name: str
+    family: str
+    section: str
+    gap_deg: float
+    static: NDArray[np.bool_]
+    y: Array
+    blade_class: str | None = None
+    known_from: str = "stations"
+
+
+def law(p: Population, m: MeasuredRotor) -> Prior:
+    """What is known of a propeller before it is measured."""
+    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,40 +87,12 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     return Observed(propeller, solve, drawn, record)
 
 
-def conditioned(seen: Observed, p: Population, on: str) -> Expected:
-    """Expectation after conditioning on points of one kind; those of the other count.
-
-    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
-    too.
-    """
-    m, drawn = seen.record, seen.drawn
-    good = counted(drawn)
-    here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
-    rpm, J = drawn.rpm[here], drawn.J[here]
-    run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
-    run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
-    if on.endswith("_and_one"):
-        middle = 0.5 * (drawn.J0_bemt if math.isfinite(drawn.J0_bemt) else float(m.J.max()) / J_SHARE)
-        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
-    prior, at, y = law(p, m), m.part(run), m.y[:, run]
-    still = m.static[run]
-    rough = np.array([[scatter(a, at.Re[still])] for a in (y - at.f)[:, still]]) * still
-    noise = noise_of_run(p, at, y, np.hypot(p.noise_sd(at), rough))
-    bias = p.bias(m)[:, run].reshape(-1)
-    found = condition(
-        lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
-    )
-    reference = ReferenceRun.given(at, noise, y.reshape(-1), found)
-    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
-    return _lying(seen, p, posterior, reference)
-
-
 def expect(seen: Observed, p: Population) -> Expected:
     """Expectation of a propeller and how its points lie in it."""
-    return _lying(seen, p, law(p, seen.record))
+    return lying(seen, p, law(p, seen.record))
 
 
-def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
+def lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun | None = None) -> Expected:
     """How the points lie in a prediction."""
     m = seen.record
     now = rows(seen.propeller, seen.solve, prior.mean)
@@ -130,3 +116,63 @@ def _lying(seen: Observed, p: Population, prior: Prior, reference: ReferenceRun 
             width[kind][q] = half_width(LEVELS[0], sd, found.chances) / np.abs(mean)
             log_density[kind][q] = density[i][k]
     return Expected(now, probability, width, log_density)
+
+
+class Pool:
+    """Errors of many propellers, together; with intervals also how many points they hold and how wide they are."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, str, str], list[Array]] = {}
+
+    def add(self, rows: Rows, expected: Expected | None = None) -> dict[str, Any]:
+        """Take the points of one propeller; returns its own statistics."""
+        own = Pool()
+        for kind, found in errors(rows).items():
+            for q, e in found.items():
+                own._found[kind, q, "error"] = [e]
+                if expected is not None:
+                    own._found[kind, q, "probability"] = [expected.probability[kind][q]]
+                    own._found[kind, q, "width"] = [expected.width[kind][q]]
+                    own._found[kind, q, "log_density"] = [expected.log_density[kind][q]]
+        for key, values in own._found.items():
+            self._found.setdefault(key, []).extend(values)
+        out = own.total()
+        for kind in KINDS:
+            out[kind].pop("propellers")
+        return out
+
+    def add_kind(self, expected: Expected, kind: str) -> None:
+        """Take the points of one kind only."""
+        own = Pool()
+        own.add(expected.rows, expected)
+        for key, values in own._found.items():
+            if key[0] == kind:
+                self._found.setdefault(key, []).extend(values)
+
+    def total(self) -> dict[str, Any]:
+        """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their
+        points.
+        """
+        out: dict[str, Any] = {}
+        for kind in KINDS:
+            sizes = [e.size for e in self._found.get((kind, "CT", "error"), [])]
+            out[kind] = {"propellers": sum(size > 0 for size in sizes), "points": sum(sizes)}
+            for q in ("CT", "CP"):
+                e, probability, width = (
+                    np.concatenate([*self._found.get((kind, q, what), []), np.empty(0)])
+                    for what in ("error", "probability", "width")
+                )
+                out[kind][q] = statistics(e)
+                if (kind, q, "probability") in self._found:
+                    out[kind][q] |= coverage(probability, width)
+                    means = [float(np.mean(v)) for v in self._found[kind, q, "log_density"] if v.size]
+                    out[kind][q]["log_score"] = float(np.mean(means)) if means else None
+        return out
+
+
+def coverage(probability: Array, width: Array) -> dict[str, Any]:
+    """Share of points inside the 68 and 95 % intervals, and the median half width of the first [1]."""
+    if probability.size == 0:
+        return {"coverage": {"68": None, "95": None}, "width68": None}
+    held = {name: float(np.mean(probability <= level)) for name, level in zip(("68", "95"), LEVELS, strict=True)}
+    return {"coverage": held, "width68": float(np.median(width))}

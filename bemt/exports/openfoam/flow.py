@@ -18,8 +18,6 @@ from typing import Any
 from bemt.exports.openfoam.settings import Settings
 from bemt.exports.openfoam.text import dictionary, vector
 
-__all__ = ["constants", "fields", "schemes", "solution"]
-
 CP = 1005.0
 PRANDTL = 0.71
 GAMMA = 1.4

@@ -18,8 +18,6 @@ from typing import Any
 from bemt.exports.openfoam.settings import PIPE_RADIUS, Settings
 from bemt.exports.openfoam.text import dictionary, vector
 
-__all__ = ["block_mesh", "create_patch", "extent", "lines", "mrf_zone", "set_fields", "snappy", "topo_set"]
-
 SURFACE_LEVEL = 6
 LINES = "lines.obj"
 LINE_LEVEL = 4

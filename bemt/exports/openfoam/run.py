@@ -7,8 +7,6 @@ from typing import Any
 from bemt.exports.openfoam.settings import Settings
 from bemt.exports.openfoam.text import dictionary, vector
 
-__all__ = ["BALANCE", "BINS", "OPEN", "SIDES", "all_run", "control", "through"]
-
 BINS = 24
 """Bins along the radius in which the blade's loads are recorded."""
 OPEN = ("inlet", "outlet", "side")

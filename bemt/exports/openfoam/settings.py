@@ -7,19 +7,6 @@ from dataclasses import dataclass, field
 
 from bemt.base.errors import Fault, InputError
 
-__all__ = [
-    "DOMAINS",
-    "GASES",
-    "MACH_COMPRESSIBLE",
-    "SECTORS",
-    "TURBULENCE",
-    "ZONES",
-    "Body",
-    "Settings",
-    "Sweep",
-    "sector_choice",
-]
-
 DOMAINS = ("free", "pipe")
 SECTORS = ("half", "blade", "full")
 TURBULENCE = ("kOmegaSST", "realizableKE")

@@ -20,7 +20,9 @@ from bemt.base.toml import Table, check_field, entry
 from bemt.base.toml_text import Collector
 from bemt.case import Case
 from bemt.case.schema import AIRSPEED, RPM
-from bemt.exports.openfoam.case import case_files
+from bemt.exports.openfoam.flow import constants, fields, schemes, solution
+from bemt.exports.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
+from bemt.exports.openfoam.run import all_run, control
 from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
@@ -33,7 +35,20 @@ if TYPE_CHECKING:
     from geometry.mesh import MeshModel
     from geometry.rotor import Rotor
 
-__all__ = ["Run", "RunRanges", "check_run", "settings_of", "write_openfoam"]
+
+def case_files(s: Settings, title: str = "") -> dict[str, str]:
+    """Write every file of a case, the surfaces in ``constant/triSurface`` aside."""
+    title = title or f"rotor of {2e3 * s.R:g} mm, {s.B} blades, {s.rpm:g} rev/min, {s.V:g} m/s"
+    out = {
+        "system/blockMeshDict": block_mesh(s), "system/snappyHexMeshDict": snappy(s), "system/topoSetDict": topo_set(s),
+        "system/createPatchDict": create_patch(s), "system/setFieldsDict": set_fields(s),
+        "system/controlDict": control(s),
+        "system/fvSchemes": schemes(s), "system/fvSolution": solution(s), "Allrun": all_run(s, title),
+        "constant/triSurface/lines.obj": lines(s),
+    }  # fmt: skip
+    out |= {f"0.orig/{name}": text for name, text in fields(s).items()}
+    return out | {f"constant/{name}": text for name, text in constants(s).items()}
+
 
 FACETS = 96  # of the centre body
 

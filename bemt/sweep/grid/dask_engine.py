@@ -29,7 +29,7 @@ from bemt.base import cache
 from bemt.base.errors import Fault, InputError
 from bemt.case import Case
 from bemt.case.schema import CaseFile
-from bemt.sweep.grid.identity import program_hash
+from bemt.sweep.grid.formats import program_hash
 from bemt.sweep.grid.run import Grid, GridSolver, Solved, solve_chunk
 
 IN_FLIGHT = 2

@@ -6,18 +6,39 @@ brings. The bytes of a block depend on its numbers alone, and joining reads one 
 
 from __future__ import annotations
 
+import hashlib
+import importlib.metadata
 import importlib.util
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import bemt
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_block, file_hash
+
+
+@lru_cache(maxsize=1)
+def program_hash() -> str:
+    """Hash of the program text and of the libraries that decide numbers."""
+    digest = hashlib.sha256(bemt.__version__.encode())
+    here = Path(bemt.__file__).parent
+    for folder in (here, here.parent / "geometry"):
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    for library in ("numpy", "numba", "neuralfoil"):
+        try:
+            digest.update(f"{library} {importlib.metadata.version(library)}\0".encode())
+        except importlib.metadata.PackageNotFoundError:
+            digest.update(f"{library} absent\0".encode())
+    return digest.hexdigest()
+
 
 FORMATS = ("csv", "parquet")
 ROW_GROUP = 50_000

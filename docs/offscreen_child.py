@@ -1,4 +1,4 @@
-"""Drawing itself, in the child process of :mod:`geometry.picture`: one job file in, PNG files out."""
+"""Drawing itself, in the child process of ``offscreen.py``: one job file in, PNG files out."""
 
 from __future__ import annotations
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import drive_identify as identify
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.dataset import Dataset
-from bemt.drive import identify, transient
 from bemt.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.drive.rotor_table import quadratic
 
@@ -116,7 +116,7 @@ def check_steps(
     from scipy.optimize import least_squares
     from scipy.special import expit
 
-    seen = [transient.first_order(s.time_s, s.thrust_N) for s in steps]
+    seen = [identify.first_order(s.time_s, s.thrust_N) for s in steps]
     held = [i for i, got in enumerate(seen) if got.u_tau_s < 0.3 * got.tau_s]
     pulse, thrust = levels
 

@@ -1,18 +1,29 @@
-"""Another solver on the same propellers, paired: whose error is smaller, and is the difference more than chance."""
+"""Another solver on the same propellers, paired: whose error is smaller, and is the difference more than chance.
+
+``python reports/studies/paired.py uiuc [--peer ccblade] [--out DIR]``. A peer is a file ``peer_NAME.py`` with ``TITLE``
+and ``solve(rotor, tables, rpm, J, air)``: rotor, section tables at r/R, (P,) points at sea level; it gives (2, P) CT
+and CP in the propeller convention, NaN where it gives none.
+"""
 
 from __future__ import annotations
 
+import argparse
+import importlib
+import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from left_out import watch
 from numpy.typing import NDArray
 
+from bemt.base.tables import json_text, write_atomic
 from bemt.rotors.population import population
 from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from bemt.validate.built import Observed, expect
-from bemt.validate.peers import peer
-from bemt.validate.points import KINDS, counted
+from bemt.validate.points import KINDS, counted, read_folders
+from bemt.validate.propellers import effects_without, where
 
 Array = NDArray[np.float64]
 
@@ -31,7 +42,7 @@ def paired(seen: Sequence[Observed], name: str, say: Callable[[str], None] | Non
     """
     from geometry.airfoil import naca
 
-    module = peer(name)
+    module = importlib.import_module(f"peer_{name}")
     usual = [(0.75, tunnel_polar(naca(USUAL)))]
     errors: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
     for i, one in enumerate(seen):
@@ -100,3 +111,27 @@ def text(document: dict[str, Any]) -> str:
                     lines.append(" ".join(cells))
     lines.append(f"{document['points_each']} points of each kind per propeller; differences are means over propellers.")
     return "\n".join(lines)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the peer, print the table."""
+    parser = argparse.ArgumentParser(description="Another solver on the same propellers, paired.")
+    parser.add_argument("folders", metavar="DIR", nargs="+", help="folders in the UIUC layout, or uiuc")
+    parser.add_argument("--peer", metavar="NAME", default="ccblade", help="file peer_NAME.py (default ccblade)")
+    parser.add_argument("--out", metavar="DIR", help="write the table and its document to this folder")
+    args = parser.parse_args(words)
+
+    def say(line: str) -> None:
+        print(line, file=sys.stderr)
+
+    seen = watch(read_folders([where(name) for name in args.folders]), effects_without([]), say)
+    document = paired(seen, args.peer, say)
+    if args.out:
+        write_atomic(Path(args.out) / f"paired_{args.peer}.json", json_text(document))
+        write_atomic(Path(args.out) / f"paired_{args.peer}.txt", text(document) + "\n")
+    print(text(document))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -46,14 +44,9 @@ class _TurbineFoil:
 
 
 def solve(rotor: Rotor, tables: Sequence[tuple[float, Polar]], rpm: Array, J: Array, air: Air) -> Array:
-    """CT and CP at points, (2, P), NaN where CCBlade gives none; InputError without the package."""
-    try:
-        from wisdem.ccblade.ccblade import CCBlade
-    except ImportError as error:
-        hint = "pip install 'bemt[wisdem]'"
-        raise InputError(
-            Fault("--peer", "ccblade", "a package that is not installed", "the package wisdem", hint)
-        ) from error
+    """CT and CP at points, (2, P), NaN where CCBlade gives none."""
+    from wisdem.ccblade.ccblade import CCBlade  # extra wisdem
+
     s = rotor.blade.midpoints(STATIONS)
     at = np.array([x for x, _ in tables])
     grids = [p.on_grid() for _, p in tables]

@@ -1,7 +1,10 @@
-"""Time per operating point.
+"""Time per operating point: ``python reports/studies/bench.py [--json] [--quick] [--work DIR]``.
+
+``--log N`` times `import` and `diagnose` on a generated log of N rows instead, ``--waiting [--tree CHECKOUT]`` what a
+user waits for.
 
 The work: one two-bladed 10x5 in 30 elements with one NACA 4412 table of one Reynolds number, at 3000, 5000 and 6700
-rev/min and 20 advance ratios from 0 to 0.8.  See `bemt.compare.bench.work`; ``--work DIR`` times the same on other
+rev/min and 20 advance ratios from 0 to 0.8.  See `bench_work.py`; ``--work DIR`` times the same on other
 files of its layout (``<name>_edges31.csv``, ``<name>_mid30.csv``, ``polar_*.csv``).
 
 All times are CPU time of one thread, best of several repeats, after compilation.  Physics as in the peers: tip and hub
@@ -10,21 +13,27 @@ loss, swirl; ``standard`` repeats the batch with every standard effect on.  JSON
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
 import os
 import platform
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bench_log
+import bench_waiting
+import bench_work
 import numpy as np
+from bench_work import BLADES, DIAMETER, RE, RPM, Work, prepare
 from numpy.typing import ArrayLike
 
 from bemt import __version__
 from bemt import coefficients as co
 from bemt.air import Air
-from bemt.compare.bench.work import BLADES, DIAMETER, RE, RPM, Work, prepare
 
 SCHEMA = "bemt.bench/1"
 
@@ -202,3 +211,30 @@ def table(doc: dict[str, Any]) -> str:
     for _, J, CT, CP in rows[::3]:
         out.append(f"{J:>6.3f} " + " ".join(f"{'-':>8}" if c is None else f"{c:>8.4f}" for c in (CT, CP)))
     return "\n".join(out)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Print the times; 1 when a point of the work did not converge."""
+    parser = argparse.ArgumentParser(description="Time per operating point, ours and the peers'.")
+    parser.add_argument("--json", action="store_true", help="print the document")
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
+    parser.add_argument("--work", metavar="DIR", help="the benchmark in this folder")
+    parser.add_argument("--log", type=int, metavar="N", help="time and memory for a generated log of N rows instead")
+    parser.add_argument("--waiting", action="store_true", help="time what users wait for instead")
+    parser.add_argument("--tree", type=Path, metavar="DIR", help="with --waiting: another checkout, in the same run")
+    args = parser.parse_args(words)
+    if args.waiting:
+        found, shown = bench_waiting.document(args.tree, args.quick), bench_waiting.table
+    elif args.log is not None:
+        found, shown = bench_log.document(args.log), bench_log.table
+    else:
+        found, shown = document(bench_work.load(args.work), args.quick), table
+    print(json.dumps(found, indent=1, allow_nan=False) if args.json else shown(found))
+    lost = found.get("points", 0) - found.get("converged", 0)
+    if lost:
+        print(f"{lost} points did not converge", file=sys.stderr)
+    return int(lost > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

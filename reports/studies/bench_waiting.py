@@ -87,8 +87,8 @@ def measure(tree: Path, quick: bool = False) -> dict[str, float]:
 
 
 def here() -> Path:
-    """Folder that holds this package."""
-    return Path(__file__).resolve().parents[3]
+    """This checkout."""
+    return Path(__file__).resolve().parents[2]
 
 
 def document(other: Path | None = None, quick: bool = False) -> dict[str, Any]:

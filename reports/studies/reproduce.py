@@ -1,4 +1,4 @@
-"""Every number of the source thesis beside ours.
+"""Every number of the source thesis beside ours: ``python reports/studies/reproduce.py [--json]``.
 
 Statuses: "reproduced" (rounds to the printed digits), "reproduced within rounding" (last digit cut off, or reached with
 an input rounded as the note says), "not reproduced, because ...", "input, not computed", "not checked: data absent".
@@ -7,6 +7,8 @@ JSON is one document of schema ``bemt.reproduce/1``.
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
 import textwrap
 from collections import Counter
@@ -15,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import thesis as th
 
 from bemt import __version__
 from bemt import coefficients as co
 from bemt.air import Air
 from bemt.base.folders import find_data
 from bemt.base.units import INCH, KGF, RPM
-from bemt.compare import thesis as th
 from bemt.rotors import k1k2 as k
 
 SCHEMA = "bemt.reproduce/1"
@@ -93,8 +95,8 @@ def _model(f: th.ThesisFacts, uiuc: dict[str, Any] | None) -> None:
     f.given("best D/p, to", "1.8")
     f.check("zero-thrust J over P/D, by the formula", "1.00", _zero_thrust())
     defect = {
-        name: k.unit_defect(g, length=INCH)
-        for name, g in (("right", k.corrected_equation), ("printed", k.printed_equation))
+        name: th.unit_defect(g, length=INCH)
+        for name, g in (("right", k.corrected_equation), ("printed", th.printed_equation))
     }
     f.word(
         "printed final equation",
@@ -309,8 +311,8 @@ def findings() -> dict[str, Any]:
         "mach": th.mach_blindness(),
         "k1k2_print": [{"variant": n, "kgf": list(v)} for n, v in th.k1k2_variants()],
         "printed_equation": {
-            "inch_for_metre_changes_thrust_by": k.unit_defect(k.printed_equation, length=INCH),
-            "right_form_changes_by": k.unit_defect(k.corrected_equation, length=INCH),
+            "inch_for_metre_changes_thrust_by": th.unit_defect(th.printed_equation, length=INCH),
+            "right_form_changes_by": th.unit_defect(k.corrected_equation, length=INCH),
         },
     }
 
@@ -357,3 +359,18 @@ def _number(value: float, stated: str) -> str:
         return f"{value:.4e}"
     digits = len(stated.partition(".")[2])
     return f"{value:.0f}" if digits == 0 and value == round(value) else f"{value:.{digits + 1}f}"
+
+
+def main(words: list[str] | None = None) -> int:
+    """Print the table or the document; a number that is not reproduced is a finding, not a failure."""
+    parser = argparse.ArgumentParser(description="Every number of the source thesis beside ours.")
+    parser.add_argument("--json", action="store_true", help=f"print {SCHEMA}")
+    as_json = parser.parse_args(words).json
+    folder = find_uiuc()
+    uiuc = uiuc_statistics(folder) if folder else None
+    print(json.dumps(document(uiuc), indent=1, allow_nan=False) if as_json else table(items(uiuc)))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

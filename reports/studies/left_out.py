@@ -1,30 +1,40 @@
-"""The population fitted to folders of measured propellers, and how well it does for families left out of it."""
+"""The population fitted to folders of measured propellers, and how well it does for families left out of it.
+
+``python reports/studies/left_out.py uiuc uiuc_2 --out reports/validation/left_out`` writes the table; ``--fit FILE``
+writes the population that the package ships (`bemt/rotors/population.json`).
+"""
 
 from __future__ import annotations
 
+import argparse
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from population_fit import fit
 
 from bemt import __version__
-from bemt.base.tables import plain
+from bemt.base.tables import json_text, plain, write_atomic
 from bemt.coefficients import M_tip
-from bemt.rotors.fit import fit
-from bemt.rotors.population import Population
+from bemt.rotors.conditioning import condition
+from bemt.rotors.latents import Prior
+from bemt.rotors.population import WEIGHTS, Population
+from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validity import Validity
-from bemt.validate.built import Observed, conditioned, expect, observe
-from bemt.validate.points import KINDS
-from bemt.validate.pool import Pool
+from bemt.validate.built import Expected, Observed, Pool, expect, law, lying, observe
+from bemt.validate.points import J_SHARE, KINDS, Folder, counted, read_folders
+from bemt.validate.propellers import effects_without, where
 
 if TYPE_CHECKING:
     from bemt.effects import Effect
-    from bemt.validate.folder import Folder
 
 SCHEMA = "bemt.left_out/3"
+RUN_POINTS = 24
+"""Points of a run on which a rotor is conditioned [1]."""
 GROUPS = 6
 """Families are left out in so many groups, dealt out by name."""
 # Steps of the search with a family left out, from the numbers of all families.
@@ -57,7 +67,7 @@ def fit_population(seen: Sequence[Observed], name: str) -> tuple[Population, Any
         "folder": name,
         "families": sorted({s.record.family for s in seen}),
         "version": __version__,
-        "command": f"bemt validate {name} --fit-population FILE",
+        "command": f"reports/studies/left_out.py {name} --fit FILE",
         "source": "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)",
     }
     p, numbers = fit([s.record for s in seen], provenance=provenance)
@@ -110,6 +120,34 @@ def transfer(seen: Sequence[Observed], numbers: Any, say: Say = None) -> dict[st
     return out
 
 
+def conditioned(seen: Observed, p: Population, on: str) -> Expected:
+    """Expectation after conditioning on points of one kind; those of the other count.
+
+    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
+    too.
+    """
+    m, drawn = seen.record, seen.drawn
+    good = counted(drawn)
+    here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
+    rpm, J = drawn.rpm[here], drawn.J[here]
+    run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
+    run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
+    if on.endswith("_and_one"):
+        middle = 0.5 * (drawn.J0_bemt if math.isfinite(drawn.J0_bemt) else float(m.J.max()) / J_SHARE)
+        run = np.append(run, np.argmin(np.where(m.static, np.inf, np.abs(m.J - middle))))
+    prior, at, y = law(p, m), m.part(run), m.y[:, run]
+    still = m.static[run]
+    rough = np.array([[scatter(a, at.Re[still])] for a in (y - at.f)[:, still]]) * still
+    noise = noise_of_run(p, at, y, np.hypot(p.noise_sd(at), rough))
+    bias = p.bias(m)[:, run].reshape(-1)
+    found = condition(
+        lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
+    )
+    reference = ReferenceRun.given(at, noise, y.reshape(-1), found)
+    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
+    return lying(seen, p, posterior, reference)
+
+
 def log_score(total: dict[str, Any]) -> float:
     """Mean log score over CT and CP, static and forward."""
     return float(sum(total[kind][q]["log_score"] for kind in KINDS for q in ("CT", "CP")) / 4.0)
@@ -146,7 +184,31 @@ def table(document: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def document_of(p: Population) -> dict[str, Any]:
-    """Plain values of a population for its file."""
-    out: dict[str, Any] = plain(p.document(), 6)
-    return out
+def main(words: list[str] | None = None) -> int:
+    """Fit the population; write it, or leave families out of it."""
+    parser = argparse.ArgumentParser(description="Families held out of the population of measured rotors.")
+    parser.add_argument("folders", metavar="DIR", nargs="+", help="folders in the UIUC layout, or uiuc")
+    parser.add_argument("--fit", metavar="FILE", help="write the population, and leave no family out")
+    parser.add_argument("--off", metavar="EFFECT", action="append", default=[], help="without this effect")
+    parser.add_argument("--out", metavar="DIR", help="write the table and its document to this folder")
+    args = parser.parse_args(words)
+    folder, name = read_folders([where(f) for f in args.folders]), " ".join(args.folders)
+
+    def say(line: str) -> None:
+        print(line, file=sys.stderr)
+
+    seen = watch(folder, effects_without(args.off), say)
+    fitted = fit_population(seen, name)
+    if args.fit:
+        write_atomic(Path(args.fit), json_text(plain(fitted[0].document(), 6)))
+        return 0
+    document = leave_out(seen, name, fitted, say)
+    if args.out:
+        write_atomic(Path(args.out) / "left_out.json", json_text(document))
+        write_atomic(Path(args.out) / "left_out.txt", table(document) + "\n")
+    print(table(document))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

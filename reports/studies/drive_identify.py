@@ -160,13 +160,60 @@ def battery_of(points: Dataset) -> tuple[float, float]:
     return _battery(current, voltage, {})
 
 
+@dataclass(frozen=True)
+class FirstOrder:
+    """Delayed first-order step."""
+
+    # time constant, its standard uncertainty from the scatter of the samples, time of the step. [s]
+    tau_s: float
+    u_tau_s: float
+    delay_s: float
+    # levels, in the unit of the samples
+    before: float
+    after: float
+
+
+def first_order(time_s: ArrayLike, values: ArrayLike) -> FirstOrder:
+    """Fit a delayed first-order step, as load-cell logs are usually read.
+
+    Least squares of before + (after - before) (1 - exp(-(t - t0)/tau)), levels solved linearly.
+
+    >>> t = np.arange(0.0, 1.0, 0.02)
+    >>> got = first_order(t, np.where(t > 0.31, 2.0 * (1 - np.exp(-(t - 0.31) / 0.05)), 0.0))
+    >>> round(got.tau_s, 3), round(got.delay_s, 3), round(got.after, 3)
+    (0.05, 0.31, 2.0)
+    """
+    from scipy.optimize import least_squares
+
+    t, y = np.asarray(time_s, dtype=float), np.asarray(values, dtype=float)
+
+    def basis(p: Array) -> tuple[Array, Array]:
+        rise = np.where(t > p[1], -np.expm1(-np.maximum(t - p[1], 0.0) / math.exp(p[0])), 0.0)
+        a = np.column_stack([1.0 - rise, rise])
+        return a, np.linalg.lstsq(a, y, rcond=None)[0]
+
+    def misfit(p: Array) -> Array:
+        a, c = basis(p)
+        return np.asarray(y - a @ c)
+
+    starts = [np.array([math.log(tau), t0]) for tau in (0.02, 0.06, 0.2) for t0 in np.linspace(t[0], t[-1], 26)[1:-1]]
+    start = min(starts, key=lambda p: float(np.sum(misfit(p) ** 2)))
+    bounds = ([math.log(1e-4), t[0]], [math.log(10.0 * (t[-1] - t[0])), t[-1]])
+    found = least_squares(misfit, start, bounds=bounds, x_scale=[0.1, 0.01], diff_step=1e-5)
+    before, after = basis(found.x)[1]
+    tau = math.exp(found.x[0])
+    sigma2 = 2.0 * float(found.cost) / max(len(t) - 4, 1)
+    spread = np.linalg.pinv(found.jac.T @ found.jac) * sigma2
+    return FirstOrder(tau, tau * math.sqrt(float(spread[0, 0])), float(found.x[1]), float(before), float(after))
+
+
 def fit_inertia(
     drive: Drive, time_s: ArrayLike, thrust_N: ArrayLike, before_us: float, after_us: float
 ) -> tuple[float, float]:
     """Inertia of motor and rotor together from a recorded step."""
     from scipy.optimize import brentq
 
-    step = transient.first_order(time_s, thrust_N)
+    step = first_order(time_s, thrust_N)
     tau, delay = step.tau_s, step.delay_s
     t = np.asarray(time_s, dtype=float)
 
@@ -195,4 +242,4 @@ def step_constant(
         float(t[-1]),
         t,
     )
-    return transient.first_order(t, got.thrust_N).tau_s
+    return first_order(t, got.thrust_N).tau_s

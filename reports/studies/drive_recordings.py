@@ -1,16 +1,20 @@
 """The drive model against thrust maps and step logs of public stands.
 
-DIR holds the folders ``jmajew``, ``thrust_map``, ``thrust_step``, ``mit_copter_rcbenchmark`` as their publishers laid
-them out (see README, Data). What a data sheet gives stays: K_v and I_0 of the MN2206 come from its run without
-propeller. No data sheet of the other motors is known; there K_v and I_0 are fitted too, and said to be.
+Run ``python reports/studies/drive_recordings.py DIR [--out DIR]``; DIR holds the folders ``jmajew``, ``thrust_map``,
+``thrust_step``, ``mit_copter_rcbenchmark`` as their publishers laid them out. What a data sheet gives stays: K_v and
+I_0 of the MN2206 come from its run without propeller. No data sheet of the other motors is known; there K_v and I_0 are
+fitted too, and said to be.
 """
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 from pathlib import Path
 from typing import Any
 
+import drive_checks as validation
+import drive_identify as identify
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +22,7 @@ from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.dataset import Dataset
-from bemt.drive import identify, map_points, picture, validation
+from bemt.drive import map_points, picture
 from bemt.drive.drive_model import Drive
 
 Array = NDArray[np.float64]
@@ -165,3 +169,19 @@ def compare(path: str, out: str | None = None) -> tuple[dict[str, Any], str]:
         ]
         write_atomic(results / "maps.png", picture.curves(panels))
     return document, text
+
+
+def main(words: list[str] | None = None) -> int:
+    """Compare, print, and write with ``--out``."""
+    parser = argparse.ArgumentParser(description="The drive model against recordings of public stands.")
+    parser.add_argument("folder", metavar="DIR", help="holds jmajew, thrust_map, thrust_step, mit_copter_rcbenchmark")
+    parser.add_argument("--out", metavar="DIR", help="write tables and a picture to this folder")
+    parser.add_argument("--json", action="store_true", help="print the document")
+    args = parser.parse_args(words)
+    document, text = compare(args.folder, args.out)
+    print(json_text(document) if args.json else text, end="")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

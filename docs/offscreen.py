@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from offscreen_child import PictureError, times
 
 from geometry.common import Array, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, build, rotor_mesh
-from geometry.picture_child import PictureError, times
 from geometry.rotor import Rotor
 from geometry.solid import Faces, Mesh
 
@@ -183,11 +183,12 @@ def _child(folder: str, job: dict[str, Any], targets: Sequence[Path]) -> None:
     """Draw in another process; move the pictures to their places only when all are there."""
     here = Path(folder)
     (here / "job.json").write_text(json.dumps(job), encoding="utf-8")
-    root = Path(__file__).resolve().parents[1]
+    docs = Path(__file__).resolve().parent
     call = [
         sys.executable,
         "-c",
-        f"import sys; sys.path.insert(0, {str(root)!r}); from geometry.picture_child import draw; draw({folder!r})",
+        f"import sys; sys.path[:0] = [{str(docs)!r}, {str(docs.parent)!r}]; from offscreen_child import draw; "
+        f"draw({folder!r})",
     ]
     try:
         run = subprocess.run(call, capture_output=True, text=True, errors="replace", timeout=SECONDS, check=False)
@@ -198,7 +199,7 @@ def _child(folder: str, job: dict[str, Any], targets: Sequence[Path]) -> None:
         raise PictureError(f"drawing died of signal {-run.returncode}; {NEEDS}")
     if run.returncode > 0:
         words = [line for line in run.stderr.splitlines() if line.strip()]
-        last = words[-1].removeprefix("geometry.picture_child.PictureError: ") if words else "no reason given"
+        last = words[-1].removeprefix("offscreen_child.PictureError: ") if words else "no reason given"
         raise PictureError(last if "PictureError" in (words[-1] if words else "") else f"{last}; {NEEDS}")
     for file in made:
         if not file.is_file() or not file.read_bytes().startswith(b"\x89PNG"):

@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.rotors.latents import NAMES, Prior, Sensed
+from bemt.rotors.latents import NAMES, Sensed
 from bemt.rotors.population import SHARED, WEIGHTS, Family, Population, bias_columns, sizes
+from bemt.validate.built import MeasuredRotor, law
 
 Array = NDArray[np.float64]
 
@@ -57,25 +58,6 @@ _WIDTH = np.array([row[3] for row in _FREE])
 _STEP = 1e-5
 # The label's gap to the stations is heavy-tailed within families: degrees of freedom of its Student law.
 _GAP_NU = 4.0
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredRotor(Sensed):
-    """One measured propeller beside the solver at P readings; ``y`` (2, P) are CT and CP measured [1]."""
-
-    name: str
-    family: str
-    section: str
-    gap_deg: float
-    static: NDArray[np.bool_]
-    y: Array
-    blade_class: str | None = None
-    known_from: str = "stations"
-
-
-def law(p: Population, m: MeasuredRotor) -> Prior:
-    """What is known of a propeller before it is measured."""
-    return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
 
 def counted(m: MeasuredRotor) -> NDArray[np.intp]:

@@ -2,14 +2,14 @@
 
 Only facts and figures of T. Cahill, "System Identification of Thrust and Torque Characteristics for a Bipedal Robot
 with Integrated Propulsion", MS thesis, Northeastern University, April 2025, and of public data they were checked with.
-Nothing here prints; `bemt.compare.reproduce` does.
+Nothing here prints; `reproduce.py` does.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
@@ -20,9 +20,6 @@ from bemt import coefficients as co
 from bemt.base import unit_errors
 from bemt.base.units import G0, INCH, KGF, LBF
 from bemt.rotors import k1k2 as k
-
-ORIGIN = "Cahill 2025"
-"""What a case of the thesis states as its ``origin``."""
 
 REPRODUCED = "reproduced"
 ROUNDING = "reproduced within rounding"
@@ -72,6 +69,37 @@ def matches(stated: str, value: float) -> str | None:
     if error <= 0.5 * step * (1.0 + 1e-9):
         return REPRODUCED
     return ROUNDING if error < step else None
+
+
+def printed_equation(rho: Any, area: Any, v_pitch: Any, V: Any, d_over_p: Any) -> Any:
+    """K1/K2 equation as printed in the thesis, kept ONLY to show that it cannot be right.  Never use it.
+
+    The term with V stands outside the bracket that density and area multiply, (rho A v_p^2 - v_p V)(K1 D/p)^K2.  A
+    change of units therefore changes the ratio to `k.corrected_equation`; see `unit_defect`.  Static values agree.
+
+    >>> static = (1.225, 0.05, 40.0, 0.0, 1.6)
+    >>> printed_equation(*static) == k.corrected_equation(*static)
+    True
+    """
+    return (rho * area * v_pitch**2 - v_pitch * V) * (k.K1 * d_over_p) ** k.K2
+
+
+def unit_defect(formula: Callable[..., float], mass: float = 1.0, length: float = 1.0, time: float = 1.0) -> float:
+    """Relative error that a mere change of units makes in a thrust formula; zero for a right one. [-]
+
+    Any physical equation is homogeneous in mass, length and time (Bridgman, "Dimensional Analysis", 1922), so that the
+    result is zero for every choice of units.  Evaluated for an 8x5 at 6000 rev/min and half its pitch speed.
+
+    >>> abs(unit_defect(k.corrected_equation, length=0.0254)) < 1e-12
+    True
+    >>> abs(unit_defect(printed_equation, length=0.0254)) > 0.5
+    True
+    """
+    rho, area, v, V, ratio = 1.225, math.pi * 0.2032**2 / 4.0, 12.7, 6.35, 1.6
+    si = formula(rho, area, v, V, ratio)
+    speed = length / time
+    other = formula(rho / (mass / length**3), area / length**2, v / speed, V / speed, ratio)
+    return float(other * mass * length / time**2 / si - 1.0)
 
 
 def k1k2_variants() -> list[tuple[str, tuple[float, ...]]]:

@@ -1,1 +1,0 @@
-"""Time per operating point, beside any peer that is installed."""
