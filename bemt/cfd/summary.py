@@ -17,6 +17,7 @@ from bemt.bem import solver
 from bemt.bem.model import Model
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
+from bemt.case.propagate import parted
 from bemt.cfd.schema import Campaign, load_campaign
 
 __all__ = ["BANDS", "summary", "summary_text"]
@@ -44,8 +45,8 @@ class _Bemt:
         key = changed.file.model_dump_json()
         if key not in self.ready:
             self.ready[key] = prepare_case(changed)
-        V = float(row["airspeed_m_s"]) * math.cos(math.radians(float(row["sideslip_deg"] or 0)))
-        return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True)
+        V, side = parted(np.float64(row["airspeed_m_s"]), np.float64(row["sideslip_deg"] or 0))
+        return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True, side=side)
 
 
 def _case_of(campaign: Campaign, row: Mapping[str, str]) -> Case:
