@@ -107,7 +107,6 @@ class Pair:
         outside = self.upper.rotor.R * _OUTSIDE[:, None]
         return ahead(stations, upper[1:], z), ahead(outside, upper[1:], z), ahead(stations, lower[1:], z)
 
-
     def _grown(self, upper: _Rotor) -> Array:
         """What hover adds to the induced velocity on the way to the lower disk, s in v (1 + s), (P, 1) [1]."""
         rotor, k = self.upper.rotor, self.wake_radius
@@ -317,8 +316,8 @@ def _streamtubes(
 ) -> tuple[Array, Array, Array]:
     """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area over that in the disk [1].
 
-    ``faster`` is what a cylinder adds behind the disk [m/s], ``hovering`` (P, 1) the s of hover [1]. The third is what is
-    left of a property per mass that the wake shares with the air that it takes along [1].
+    ``faster`` is what a cylinder adds behind the disk [m/s], ``hovering`` (P, 1) the s of hover [1]. The third is what
+    is left of a property per mass that the wake shares with the air that it takes along [1].
     """
     if pair.spacing_m <= 0.0:
         return v, np.ones_like(v), np.ones_like(v)
