@@ -45,7 +45,7 @@ class _Bemt:
         key = changed.file.model_dump_json()
         if key not in self.ready:
             self.ready[key] = prepare_case(changed)
-        V, side = parted(np.float64(row["airspeed_m_s"]), np.float64(row["sideslip_deg"] or 0))
+        V, side = parted(np.array(float(row["airspeed_m_s"])), np.array(float(row["sideslip_deg"] or 0)))
         return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True, side=side)
 
 
