@@ -25,7 +25,7 @@ from bemt.cfd.campaign import run_campaign
 from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
 from bemt.cfd.schema import load_campaign
 from bemt.cfd.start import StartField, splice
-from bemt.cfd.summary import summary
+from bemt.cfd.summary import _Bemt, summary
 from bemt.cfd.worker import point_key, radial_of
 from bemt.commands.cli import main
 from bemt.exports.openfoam.write import settings_of
@@ -656,3 +656,13 @@ def test_beside_a_run_stands_the_rotor_of_that_run(project: Path, tmp_path: Path
         assert thrust[name, False] > thrust[name, True] + 0.5
     for gap in (False, True):
         assert thrust["vaned", gap] > thrust["bare", gap] + 2.0
+
+
+def test_beside_a_run_in_oblique_wind_stands_the_rotor_in_that_wind(project: Path) -> None:
+    """Wind from the side adds thrust to that at the same speed along the shaft."""
+    campaign = load_campaign(project / "reports" / "cfd" / "prop_8x5_skew")
+    with (campaign.path.parent / "recording.csv").open(encoding="utf-8") as file:
+        row = next(r for r in csv.DictReader(file) if r["sideslip_deg"] == "60")
+    along = row | {"sideslip_deg": "0", "airspeed_m_s": str(0.5 * float(row["airspeed_m_s"]))}
+    bemt = _Bemt()
+    assert bemt.solve(campaign, row).T[0] > 1.02 * bemt.solve(campaign, along).T[0]

@@ -111,6 +111,19 @@ def test_the_lower_rotor_in_the_developed_wake_is_that_of_leishman_and_ananthan(
     assert measured == pytest.approx(lost / thrust(upper, 0.0, 1.0), rel=0.01)
 
 
+def test_a_hovering_wake_contracts_as_the_tip_vortex_of_landgrebe() -> None:
+    z = np.linspace(0.0, 3.0, 301)
+    radius = np.array([coaxial.contracted(x, np.array([0.008]), 0.08, -12.0, 2)[0] for x in z])
+    assert radius[0] == 1.0 and radius[-1] == pytest.approx(0.78, abs=1e-3) and np.all(np.diff(radius) < 0.0)
+    # the next blade passes at psi = pi, when the vortex has sunk by 0.25 (0.1 - 0.012) pi
+    passage = 0.25 * (0.1 - 0.012) * math.pi
+    assert np.interp(passage, z, radius) == pytest.approx(0.78 + 0.22 * math.exp(-0.361 * math.pi), abs=1e-3)
+    prep = usual()
+    loss = [1.0 - solved(Pair(prep, prep, x * prep.D)).lower.T[0] / solver.solve(prep, 5000.0, 0.0, AIR).T[0]
+            for x in (0.0, 0.1, 1.0)]  # fmt: skip
+    assert loss[1] - loss[0] > 0.5 * (loss[2] - loss[0]) > 0.0  # most of it within a tenth of a diameter
+
+
 def test_without_swirl_the_sense_does_not_matter_and_with_it_against_is_better() -> None:
     still = usual(effects=without(standard(), ("swirl",)))
     pairs = [solved(Pair(still, still, 0.08, opposite=way)).lower for way in (True, False)]
@@ -281,4 +294,4 @@ def test_measured_pairs_lie_in_the_band_of_their_label(project: Path, shared_dat
             found = bemt.propeller(label).coaxial(z).solve(rpm)
             off.append((found["lower_thrust_ratio"][0] - row[1]) / found.u["lower_thrust_ratio"][0])
             together.append(found["thrust_ratio"][0] - 0.5 * (row[0] + row[1]))
-        assert np.abs(off).max() < 2.5 and np.median(np.abs(off)) < 2.0 and np.abs(together).max() < 0.045, label
+        assert np.abs(off).max() < 2.0 and np.median(np.abs(off)) < 1.0 and np.abs(together).max() < 0.03, label

@@ -77,6 +77,21 @@ def test_fast_edgewise_flow_meets_glauert_s_momentum_balance() -> None:
     assert found.T[0] > hover.T[0]
 
 
+def test_flat_blades_in_edgewise_wind_have_the_profile_loads_of_glauert() -> None:
+    """CH = sigma cd mu / 4 and CQ = sigma cd (1 + mu^2) / 8 (Johnson 1980, Helicopter Theory, sec. 5-6), no lift."""
+    cd, chord, R, B = 0.012, 0.02, 0.127, 2
+    r = np.linspace(0.01 * R, R, 60)
+    flat = Blade(r=r, chord=np.full(r.size, chord), beta=np.zeros(r.size), R=R, Rhub=0.01 * R)
+    tip, sigma = 6000.0 * np.pi / 30.0 * R, B * chord / (np.pi * R)
+    for mu in (0.05, 0.15, 0.3):
+        s = solver.solve(solver.prepare(Rotor(flat, B), [(0.75, linear_polar(cd=cd))], ()), 6000.0, 0.0, side=mu * tip)
+        q = 1.225 * np.pi * R**2 * tip**2
+        assert s.hub is not None and abs(s.T[0]) < 1e-9 * q
+        # reversed flow near the hub adds a share of mu^2
+        assert s.hub[0, oblique.H_FORCE] / q == pytest.approx(sigma * cd * mu / 4.0, rel=0.005 + 0.25 * mu * mu)
+        assert s.Q[0] / (q * R) == pytest.approx(sigma * cd * (1.0 + mu * mu) / 8.0, rel=0.005)
+
+
 def test_hub_loads_follow_the_wind() -> None:
     found = wind(np.array([30.0, 60.0, 90.0]), 10.0)
     assert found.hub is not None

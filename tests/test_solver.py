@@ -69,7 +69,7 @@ def test_prandtl_table_is_the_formula() -> None:
 
 
 def test_mass_flow_is_the_measured_curve_of_descent() -> None:
-    """Induced speed v over that of hover at sink rate x, x 1 to 2: the quartic of Leishman (2006), eq. 2.96."""
+    """Induced speed v over that of hover at sink rate x, x 1 to 2: the quartic of Leishman (2006), sec. 2.14.3."""
 
     @njit
     def run(y: float) -> tuple[float, float]:

@@ -8,7 +8,7 @@ References
 .. [1] H. Glauert, "Airplane Propellers", in Durand, Aerodynamic Theory IV, 1935, ch. VII.
 .. [2] S. A. Ning, "A simple solution method for the blade element momentum equations with guaranteed convergence", Wind
        Energy 17:1327, 2014, doi:10.1002/we.1636: one residual in phi; eq. 4-6 for the loss factors.
-.. [3] J. G. Leishman, Principles of Helicopter Aerodynamics, 2nd ed., 2006, eq. 2.96 (not checked): descent.
+.. [3] J. G. Leishman, Principles of Helicopter Aerodynamics, 2nd ed., 2006, sec. 2.14.3 (not checked): descent.
 """
 
 from __future__ import annotations

@@ -102,7 +102,8 @@ def loss(u):
 
 
 # Induced speed over that of hover at the same thrust, over the sink rate likewise, as measured: Leishman (2006),
-# Principles of Helicopter Aerodynamics, 2nd ed., eq. 2.96 with kappa = 1 (from memory, not checked).
+# Principles of Helicopter Aerodynamics, 2nd ed., sec. 2.14.3, with kappa = 1. Public codes that cite it have the same
+# coefficients up to a sink rate of 2, with kappa 0.974 to 1.15; the book itself was not checked.
 _DESCENT = (1.0, 1.125, -1.372, 1.718, -0.655)
 _S_STEP = 1e-3
 # Momentum theory holds to a sink rate of x = 0.45, where the vortex ring begins (Johnson 2005, NASA/TP-2005-213477,

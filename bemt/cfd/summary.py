@@ -17,6 +17,7 @@ from bemt.bem import solver
 from bemt.bem.model import Model
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
+from bemt.case.propagate import parted
 from bemt.cfd.schema import Campaign, load_campaign
 
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
@@ -42,8 +43,8 @@ class _Bemt:
         key = changed.file.model_dump_json()
         if key not in self.ready:
             self.ready[key] = prepare_case(changed)
-        V = float(row["airspeed_m_s"]) * math.cos(math.radians(float(row["sideslip_deg"] or 0)))
-        return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True)
+        V, side = parted(np.array(float(row["airspeed_m_s"])), np.array(float(row["sideslip_deg"] or 0)))
+        return solver.solve(self.ready[key].prep, float(row["rpm"]), V, case.air(), radial=True, side=side)
 
 
 def _case_of(campaign: Campaign, row: Mapping[str, str]) -> Case:
