@@ -147,8 +147,9 @@ def _predicts(a: VerdictQuery) -> bool:
 def _level(a: VerdictQuery) -> bool:
     """Whether the leading explanation changes each channel by the same share everywhere, to a fifth of that share."""
     problem = a.found.problem
-    share = (fitting.fit(a.found, a.leading).signature / problem.centre)[problem.free]
-    of = problem.channel[problem.free]
+    seen = problem.free & (problem.centre != 0.0)
+    share = fitting.fit(a.found, a.leading).signature[seen] / problem.centre[seen]
+    of = problem.channel[seen]
     largest = float(np.max(np.abs(share)))
     return all(np.ptp(share[of == c]) <= _SAME * largest for c in np.unique(of))
 
