@@ -271,7 +271,8 @@ class Flow:
         Their slopes with the axial onset speed [N s/m], [N s].
     extra : mapping of str to (P,) float
         Other channels of the recording, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
-        tip_gap_m, wall_distance_m, sideslip_rad, second_rotor_rad_s, run.  Absent: not recorded.
+        tip_gap_m, wall_distance_m, sideslip_rad, second_rotor_rad_s, run.  Absent: not recorded. usual_voltage_V is
+        that of the known speed at each pulse width.
     side : (P,) float or None
         In-plane onset speed [m/s]; None where there is none.
     """
