@@ -404,17 +404,19 @@ def _a_wrong_unit_but_which(a: VerdictQuery) -> Decision | None:
     return None
 
 
-@_rule("a wrong unit, or a law that is rough", "SMALL")
-def _a_wrong_unit_or_a_law(a: VerdictQuery) -> Decision | None:
+@_rule("a wrong unit of the airspeed, or the wind", "SMALL, NEAR")
+def _a_wrong_unit_or_the_wind(a: VerdictQuery) -> Decision | None:
     """Declared after a proof: three winds at 56 to 66 deg were named a wrong unit of the airspeed and untwist.
 
     A unit is exact, and the law of a flow is off by a share of what it explains: what explains nearly as much is not
     ruled out. True slips were never explained by half as much.
     """
     slips = [i for i in a.leading if effects.catalogue()[i].fault == "unit"]
+    if not slips or a.parameters[slips[0]]["channel"]["value"] != "airspeed_m_s":
+        return None
     laws = {i: a.found.log_bayes(Explanation.of(i)) for i in a.found.spans if rough(i)}
     best = max(laws.values(), default=-np.inf)
-    if not slips or best < (1.0 - SMALL) * a.odds:
+    if best < (1.0 - SMALL) * a.odds:
         return None
     members = (*slips, *(i for i in laws if laws[i] > best - NEAR))[:LARGEST]
     why = "a wrong unit fits best, but physics whose law may be off explains nearly as much"
