@@ -360,7 +360,7 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
 }  # fmt: skip
 # Rules that need a solved problem or a file: tested on one.
 BY_MODEL = (
-    "an exact relation in the file",
+    "an exact relation in the file", "a wrong unit of the airspeed, or the wind",
     "does not predict", "on, and out of its range", "a few are left", "many are left",
     "the ratios to the reference forbid a none",
 )  # fmt: skip

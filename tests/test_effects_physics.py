@@ -473,6 +473,9 @@ def test_inertia_is_the_derivative_of_the_speed() -> None:
     inertia = 2 * 1300.0 * 0.068 * flow.chord**2 * flow.R**3 / 3.0
     np.testing.assert_allclose(shown(flow, RotorInertia(3.0))["torque_Nm"] - flow.Q0, 3.0 * inertia * slope(flow))
     assert np.all(slope(recorded(rpm, time_s=100.0 * t * 2)) == 0.0), "steps of 2 s are plateaus"
+    # a sweep up and down, averaged by speed: all means have one time but for rounding
+    once = 60.0 + 1e-14 * np.arange(t.size)
+    assert np.all(slope(recorded(rpm, time_s=once)) == 0.0), "means of two sweeps are no transient"
 
 
 def test_inflow_lag_overshoots_when_the_speed_rises_and_settles() -> None:

@@ -98,13 +98,32 @@ def _outside(part: Part, case: Case) -> tuple[str, ...]:
 
 
 def _one_drive(parts: Sequence[Part]) -> tuple[Part, ...]:
-    """Parts whose speed over pulse width is measured against that of the references, where these show it."""
-    shown = [p.record for p in parts if p.record.reference and "rpm" in p.channels]
-    if not shown:
-        return tuple(parts)
+    """Parts whose speed and voltage over pulse width are measured against the references', where these show them."""
+    turning = [p for p in parts if "rpm" in p.channels]
+    shown = [p.record for p in turning if p.record.reference]
     join = np.concatenate
-    curve = SpeedCurve.of(join([r.extra["pwm_s"] for r in shown]), join([r.measured["rpm"] for r in shown]))
-    return tuple(replace(p, drive=curve) if "rpm" in p.channels else p for p in parts)
+    curve = None
+    if shown:
+        curve = SpeedCurve.of(join([r.extra["pwm_s"] for r in shown]), join([r.measured["rpm"] for r in shown]))
+
+    def driven(p: Part) -> Part:
+        extra = {**p.flow.extra, **_usual_voltage(shown or [p.record], p.record)}
+        return replace(p, drive=curve, flow=replace(p.flow, extra=extra))
+
+    return tuple(driven(p) if "rpm" in p.channels else p for p in parts)
+
+
+def _usual_voltage(shown: Sequence[Record], record: Record) -> dict[str, Array]:
+    """Voltage that belongs to the speed over pulse width of some recordings, at the pulse widths of one."""
+    if not all("voltage_V" in r.extra for r in shown):
+        return {}
+    pulse, volts = (np.concatenate([r.extra[k] for r in shown]) for k in ("pwm_s", "voltage_V"))
+    good, top = np.isfinite(volts), float(np.max(pulse))
+    if not good.any():
+        return {}
+    degree = min(2, np.unique(np.round(pulse[good], 6)).size - 1)
+    found = np.polynomial.polynomial.polyfit(pulse[good] / top, volts[good], degree)
+    return {"usual_voltage_V": np.polynomial.polynomial.polyval(record.extra["pwm_s"] / top, found)}
 
 
 def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:
@@ -125,7 +144,7 @@ def _with_blade(part: Part, blade: Effect) -> Part:
     baseline, old = part.turned(blade), part.flow
     plain = [e for e in baseline if not bem.acts_on_points(e)]
     flow = bem.flow_of(
-        part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, part.record.extra, old.chord
+        part.model.prepared(plain), part.record.rpm, part.record.V, part.record.air, old.extra, old.chord
     )
     return replace(part, baseline=baseline, flow=flow, _solved={})
 
@@ -199,9 +218,11 @@ def _with_noise(problem: Problem) -> Problem:
     sigma, known, notes = np.where(np.isfinite(stated), stated, usual), np.isfinite(stated), list(problem.notes)
     X, rows = problem.covariates, np.arange(problem.y.size)
     owner = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
-    lengths = [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X] + [
-        np.exp(X[k]) for k in ("sideslip_rad",) if k in X
-    ] + [100.0 + X[k] for k in ("second_rotor_rad_s",) if k in X]
+    lengths = (
+        [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X]
+        + [np.exp(X[k]) for k in ("sideslip_rad",) if k in X]
+        + [100.0 + X[k] for k in ("second_rotor_rad_s",) if k in X]
+    )
     label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
     label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
     run, place = in_time(X)

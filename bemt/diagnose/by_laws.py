@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# What a motor's losses may differ by from run to run, and with the load, share, where electrical power stands for
-# torque.
-_BY_POWER, _EFFICIENCY = 0.03, 0.08
+# What a motor's losses may differ by from run to run, and from row to row (heat), share, where electrical power stands
+# for torque.
+_BY_POWER, _EFFICIENCY = 0.03, 0.02
 # Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
 _SAME_DRIVE = 0.06
 # Speed below this share of the largest: a rotor that has just set off.
@@ -53,7 +53,7 @@ _FAR, _FAR_SHARE, _STRAYS = 5.0, 0.05, 0.1
 
 
 def law_effects() -> list[str]:
-    """Effects whose signature needs no blade.
+    """Effects whose signature needs no blade, and that steady points may show.
 
     >>> {"thrust_zero", "oblique_inflow", "propeller"} <= set(law_effects()), "stall_delay" in law_effects()
     (True, False)
@@ -61,6 +61,7 @@ def law_effects() -> list[str]:
     return [
         i for i, cls in effects.catalogue().items()
         if cls.kind != "drive" and not cls.on_by_default and (i in BLADE_LAWS or not acts_on_rotor(cls()))
+        and not cls.transient
     ]  # fmt: skip
 
 
@@ -203,7 +204,7 @@ def _record(
         u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
         if shift[c]:
             zero[k] = shift[c] * full
-        if c == "electrical_power_W":  # a motor's efficiency follows its load, and it takes power without any
+        if c == "electrical_power_W":  # a motor takes power without any load
             u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), _BY_POWER * full)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
@@ -228,6 +229,7 @@ def _record(
     record = Record(
         points.name, rpm, V, air_of(fields), measured, u, extra, {}, zero, recorded,
         reference=reference, repeatability=repeatability,
+        electrical=channels.get("torque_Nm") == "electrical_power_W",
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
 

@@ -66,6 +66,9 @@ class Laws:
         As ``kappa`` within a duct, whose wall carries the flow to the tips [1].
     size : float
         Diameter over the one that is guessed, where none is known [1].
+    copper, idle : float
+        Where electrical power stands for torque: voltage lost in the winding over that of rotation, and current without
+        load over the whole, both at the largest power: 0.05 to 0.25 and 0.02 to 0.1 of drone motors (declared) [1].
     """
 
     no_thrust: float = 1.65
@@ -76,13 +79,15 @@ class Laws:
     diameter: tuple[float, float] = (4.0, 5.0)
     ducted_kappa: float = 1.05
     size: float = 1.0
+    copper: float = 0.15
+    idle: float = 0.05
 
 
 LAWS = Laws()
 VARIANTS = (
     replace(LAWS, no_thrust=1.35), replace(LAWS, slope=0.25), replace(LAWS, last_torque=0.5), replace(LAWS, kappa=1.4),
     replace(LAWS, rise=3.0), replace(LAWS, diameter=(2.5, 3.0)), replace(LAWS, ducted_kappa=0.9),
-    replace(LAWS, size=0.8),
+    replace(LAWS, size=0.8), replace(LAWS, copper=0.25), replace(LAWS, idle=0.1),
 )  # fmt: skip
 """Laws in which one number is off by about its standard deviation."""
 
@@ -172,6 +177,9 @@ class LawRotor:
     diameter_m: float
     curves: Mapping[str, CoefficientCurve]
     laws: Laws = LAWS
+    # Largest electrical power, where it stands for torque [W], and its speed [rev/min]; NaN: torque itself
+    full_power: float = math.nan
+    full_rpm: float = math.nan
     duct: Any = None  # as of `bemt.bem.Model`: a recording does not say whether there is one
 
     @classmethod
@@ -192,7 +200,12 @@ class LawRotor:
             "torque_Nm": (-falls / last, (laws.last_torque - 1.0 + falls) / last**2, last),
         }
         J = record.V / (n * D)
-        return cls(D, {k: CoefficientCurve.of(v, J, record.rpm, at_rest[k]) for k, v in c.items()}, laws)
+        curves = {k: CoefficientCurve.of(v, J, record.rpm, at_rest[k]) for k, v in c.items()}
+        if not record.electrical:
+            return cls(D, curves, laws)
+        power = record.measured["torque_Nm"] * 2.0 * math.pi * n
+        k = int(np.nanargmax(power))
+        return cls(D, curves, laws, float(power[k]), float(record.rpm[k]))
 
     def flow(self, record: Record) -> Flow:
         """Conditions of a recording with the loads of the curves."""
@@ -215,7 +228,12 @@ class LawRotor:
             zero = np.zeros_like(flow.rpm)
             J = flow.V / (flow.n * D)
             out.append((zero, zero) if c is None else (unit * c(J, flow.rpm), unit * c.slope(J) / (flow.n * D)))
-        return out[0][0], out[1][0], out[0][1], out[1][1]
+        (T, dT), (Q, dQ) = out
+        if self.by_power:
+            i, n = self._current(Q, flow)
+            unit = self.full_power / flow.omega / (1.0 + self.laws.copper)
+            Q, dQ = n * (i - self.laws.idle) * unit, dQ * n / (n + 2.0 * self.laws.copper * i)
+        return T, Q, dT, dQ
 
     def respond(self, effects: Sequence[Effect], flow: Flow) -> tuple[Loads, Flow]:
         """Loads with effects on, and the flow that the rotor meets."""
@@ -229,7 +247,30 @@ class LawRotor:
             if law is not None:
                 law(e, loads, met, self.laws)
             e.loads(loads, met)
+        loads.Q = self._read_as(loads.Q, met) * met.rpm / flow.rpm if self.by_power else loads.Q
         return loads, met
+
+    @property
+    def by_power(self) -> bool:
+        """Whether its torque is electrical power over the speed."""
+        return math.isfinite(self.full_power)
+
+    def _current(self, Q: Array, flow: Flow) -> tuple[Array, Array]:
+        """Current of a motor that takes the power Q omega, and its speed, shares of those at full power, (P,) [1].
+
+        With i the current and n + r i the voltage, P = i (n + r i)/(1 + r), of which n (i - i0)/(1 + r) turns the
+        shaft: a motor of constant K_v, winding and idle current (Drela 2007, "First-Order DC Electric Motor Model",
+        eqs 1 to 5; not checked). A controller at part throttle passes power on.
+        """
+        r, n = self.laws.copper, flow.rpm / self.full_rpm
+        share = np.maximum(Q, 0.0) * flow.omega / self.full_power * (1.0 + r)
+        return (np.sqrt(n**2 + 4.0 * r * share) - n) / (2.0 * r), n
+
+    def _read_as(self, Q: Array, flow: Flow) -> Array:
+        """Electrical power over the speed for a torque of the shaft, (P,) [N m]."""
+        r, n, unit = self.laws.copper, flow.rpm / self.full_rpm, self.full_power / flow.omega
+        i = np.maximum(self.laws.idle + Q / unit * (1.0 + r) / n, 0.0)
+        return np.asarray(i * (n + r * i) / (1.0 + r) * unit)
 
 
 def _turned(degrees: Array | float, loads: Loads, flow: Flow, laws: Laws) -> None:

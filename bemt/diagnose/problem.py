@@ -29,26 +29,29 @@ _SLOWER, _FASTER = 0.7, 1.1
 
 @dataclass(frozen=True, eq=False)
 class SpeedCurve:
-    """Speed as a parabola over the pulse width.
+    """Speed over the pulse width, which is a parabola over the speed.
 
-    More terms would follow what drifts within a few settings of the pulse width, as steps.
+    The voltage of a motor is omega/K_v + R I, and its current goes with omega^2 (Drela 2007, "First-Order DC Electric
+    Motor Model", eqs 1 and 2; not checked). More terms would follow what drifts within a few pulse widths, as steps.
     """
 
-    coefficients: Array
-    middle: float  # of the pulse widths [s]
-    span: float  # of the pulse widths [s]
+    coefficients: Array  # of the pulse width over the speed over the largest one, from the constant on [s]
+    top: float  # largest speed [rev/min]
 
     @classmethod
     def of(cls, pulse: Array, rpm: Array) -> SpeedCurve:
         """Fit readings (N,) [s], [rev/min]."""
         good = np.isfinite(rpm)
         degree = min(2, np.unique(np.round(pulse[good], 6)).size - 1)
-        middle, span = float(pulse.mean()), max(float(np.ptp(pulse)), 1e-12)
-        return cls(np.polyfit((pulse[good] - middle) / span, rpm[good], degree), middle, span)
+        top = float(np.max(rpm[good]))
+        found = np.polynomial.polynomial.polyfit(rpm[good] / top, pulse[good], max(degree, 1))
+        return cls(np.pad(found, (0, 3 - found.size)), top)
 
     def __call__(self, pulse: Array) -> Array:
         """Speed [rev/min]."""
-        return np.asarray(np.polyval(self.coefficients, (pulse - self.middle) / self.span))
+        c0, c1, c2 = self.coefficients
+        root = np.sqrt(np.maximum(c1**2 + 4.0 * c2 * (pulse - c0), 0.0))
+        return np.asarray(self.top * 2.0 * (pulse - c0) / (c1 + root))
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,10 @@ _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
 def change_of(
-    records: Sequence[Record], diameter_m: float, absent: Collection[str], judge: Callable[[RunChange], Judgement],
+    records: Sequence[Record],
+    diameter_m: float,
+    absent: Collection[str],
+    judge: Callable[[RunChange], Judgement],
     files: Sequence[str] | None = None,
 ) -> RunChange | None:
     """Change of the one recording from its references; None where ratios are no measure of it.

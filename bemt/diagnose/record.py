@@ -14,6 +14,7 @@ from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.diagnose.repeats import conditions, spread_sizes
+from bemt.effects.base import follows
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -33,8 +34,6 @@ COVARIATES = (
 )  # fmt: skip
 """Channels of a series, besides the conditions, that an effect may know."""
 
-# Samples closer in time than this may show how loads follow a change of speed.
-_DENSE_S = 1.0
 # Pulse widths from here on are the end of the range, whatever was asked for [s].
 _FULL_THROTTLE = 1.9995e-3
 # Share of the rows from which on exact copies are copies, not repeats that came out the same.
@@ -86,6 +85,8 @@ class Record:
         Those of them that cannot be so.
     repeatability : float
         Standard deviation of what runs of this stand differ by, a share, as stated; NaN: not stated [1].
+    electrical : bool
+        Whether torque is electrical power over the indicated speed.
     """
 
     name: str
@@ -103,6 +104,7 @@ class Record:
     findings: tuple[str, ...] = ()
     contradictions: tuple[Finding, ...] = ()
     repeatability: float = np.nan
+    electrical: bool = False
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -242,7 +244,7 @@ def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
     if "time_s" not in extra or rpm.size < 5:
         return out
     step, rise = np.diff(extra["time_s"]), np.diff(rpm)
-    dense = (step > 0.0) & (step < _DENSE_S)
+    dense = follows(extra["time_s"])
     rate = np.where(dense, rise / np.where(dense, step, 1.0), 0.0)
     left, right = rate[:-1], rate[1:]
     size = np.maximum(np.abs(left), np.abs(right))
@@ -383,8 +385,8 @@ def dense(record: Record) -> bool:
     time, run = record.extra.get("time_s"), record.extra.get("run", np.zeros(len(record)))
     if time is None:
         return False
-    step = np.diff(time)[np.diff(run) == 0]
-    return bool(step.size) and bool(np.mean((step > 0.0) & (step < _DENSE_S)) > 0.5)
+    close = follows(time)[np.diff(run) == 0]
+    return bool(close.size) and bool(np.mean(close) > 0.5)
 
 
 def _alike(record: Record, run: Array) -> NDArray[np.intp]:

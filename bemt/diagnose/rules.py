@@ -147,8 +147,9 @@ def _predicts(a: VerdictQuery) -> bool:
 def _level(a: VerdictQuery) -> bool:
     """Whether the leading explanation changes each channel by the same share everywhere, to a fifth of that share."""
     problem = a.found.problem
-    share = (fitting.fit(a.found, a.leading).signature / problem.centre)[problem.free]
-    of = problem.channel[problem.free]
+    seen = problem.free & (problem.centre != 0.0)
+    share = fitting.fit(a.found, a.leading).signature[seen] / problem.centre[seen]
+    of = problem.channel[seen]
     largest = float(np.max(np.abs(share)))
     return all(np.ptp(share[of == c]) <= _SAME * largest for c in np.unique(of))
 
@@ -403,6 +404,25 @@ def _a_wrong_unit_but_which(a: VerdictQuery) -> Decision | None:
     return None
 
 
+@_rule("a wrong unit of the airspeed, or the wind", "SMALL, NEAR")
+def _a_wrong_unit_or_the_wind(a: VerdictQuery) -> Decision | None:
+    """Declared after a proof: three winds at 56 to 66 deg were named a wrong unit of the airspeed and untwist.
+
+    A unit is exact, and the law of a flow is off by a share of what it explains: what explains nearly as much is not
+    ruled out. True slips were never explained by half as much.
+    """
+    slips = [i for i in a.leading if effects.catalogue()[i].fault == "unit"]
+    if not slips or a.parameters[slips[0]]["channel"]["value"] != "airspeed_m_s":
+        return None
+    laws = {i: a.found.log_bayes(Explanation.of(i)) for i in a.found.spans if rough(i)}
+    best = max(laws.values(), default=-np.inf)
+    if best < (1.0 - SMALL) * a.odds:
+        return None
+    members = (*slips, *(i for i in laws if laws[i] > best - NEAR))[:LARGEST]
+    why = "a wrong unit fits best, but physics whose law may be off explains nearly as much"
+    return replace(a.says("class", why, members, mass(a.found, members)), sets=(members,))
+
+
 @_rule("another blade, or anything that scales all loads", "ANOTHER")
 def _another_blade_or_anything_that_scales_all_loads(a: VerdictQuery) -> Decision | None:
     """Declared: real recordings at another density than the case's were named section."""
@@ -631,9 +651,10 @@ def _density_not_recorded(a: VerdictQuery) -> Decision | None:
 @_rule("the drive changed, the loads say nothing", revises=True)
 def _drive_alone(a: VerdictQuery) -> Decision | None:
     """Declared: loads that stay open do not veto the drive, unless what changes with time may have loaded the motor."""
-    if a.drive is None or a.answer.effects or a.drive.verdict not in ("named", "class") or a.load_moves:
+    if a.drive is None or a.answer.effects or a.load_moves:
         return None
-    return replace(a.drive, by="drive")
+    changed = a.drive.verdict in ("named", "class") or (a.drive.verdict == "unknown" and a.answer.verdict == "none")
+    return replace(a.drive, by="drive") if changed else None
 
 
 @_rule("the drive changed as well", revises=True)

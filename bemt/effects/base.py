@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 # Reynolds number that represents blades where the Mach number matters.
 RE_FAST = 5e5
+# Points further apart than the second show no transient; nothing changes the speed of a rotor within the first [s].
+_SHORTEST_STEP, _LONGEST_STEP = 1e-4, 1.0
 
 
 @dataclass(frozen=True)
@@ -240,6 +242,15 @@ class Baking:
         return self.alpha[None, None, None, :]
 
 
+def follows(time_s: Array) -> NDArray[np.bool_]:
+    """Whether each point but the first follows the one before closely, (P-1,): by 0.1 ms to 1 s.
+
+    Points that are means of others may share one time but for rounding.
+    """
+    step = np.diff(time_s)
+    return np.asarray((step > _SHORTEST_STEP) & (step < _LONGEST_STEP))
+
+
 @dataclass
 class Flow:
     """Conditions at the rotor for P points of a recording; the hook ``flow`` changes them before the solver runs.
@@ -260,7 +271,8 @@ class Flow:
         Their slopes with the axial onset speed [N s/m], [N s].
     extra : mapping of str to (P,) float
         Other channels of the recording, SI by name: time_s, temperature_K, pressure_Pa, voltage_V, current_A, pwm_s,
-        tip_gap_m, wall_distance_m, sideslip_rad, second_rotor_rad_s, run.  Absent: not recorded.
+        tip_gap_m, wall_distance_m, sideslip_rad, second_rotor_rad_s, run.  Absent: not recorded. usual_voltage_V is
+        that of the known speed at each pulse width.
     side : (P,) float or None
         In-plane onset speed [m/s]; None where there is none.
     """
@@ -329,6 +341,11 @@ class Flow:
         return [m[np.argsort(t[m], kind="stable")] for m in members if m.size]
 
     @property
+    def transients(self) -> list[NDArray[np.intp]]:
+        """Those of the runs whose points mostly follow each other closely enough to show how loads follow the speed."""
+        return [run for run in self.runs if 2 * np.sum(follows(self.extra["time_s"][run])) >= run.size]
+
+    @property
     def clock(self) -> Array:
         """Time since the first point of the run, (P,), zero if not recorded [s]."""
         t = np.zeros_like(self.rpm)
@@ -395,6 +412,8 @@ class Effect:
     sensor: ClassVar[str] = ""
     # Covariates along which it shows first, of those that a diagnosis knows (J, rpm, Re, M_tip, time_s, ...).
     along: ClassVar[tuple[str, ...]] = ()
+    # Whether only a change of speed shows it: not steady points.
+    transient: ClassVar[bool] = False
     # Law of a flow without friction and compressibility: by similarity (Buckingham 1914) its dimensionless form may
     # depend on the advance ratio and on `along`, not on speed or density.
     inviscid: ClassVar[bool] = False

@@ -19,8 +19,9 @@ class BatterySag(Effect):
     Notes
     -----
     Equivalent circuit of a battery with one resistance (Tremblay and Dessaint 2009, World Electric Vehicle J. 3:289,
-    without its exponential zone; not checked). Recorded ``voltage_V`` is taken relative to its largest value. If that
-    circuit fits it over a run, the fit is used, without the noise of the meter; otherwise the voltage as recorded.
+    without its exponential zone; not checked). Recorded ``voltage_V`` is taken relative to ``usual_voltage_V``, that of
+    the known speed at the pulse width, or else to its largest value. If that circuit fits it over a run, the fit is
+    used, without the noise of the meter; otherwise the voltage as recorded.
     Otherwise the lost share is ``sag`` at the largest current (recorded ``current_A``, else power of shaft and copper),
     in proportion, plus ``discharge`` in proportion to the charge drawn, whole at the end of the run. The speed follows
     from (1 - lost) (1 + u) = y + u y^2, the motor at constant duty with torque as speed squared and copper drop u over
@@ -42,7 +43,7 @@ class BatterySag(Effect):
     parameters = (
         Parameter("sag", "1", 0.0, 0.25, "declared; 10 to 30 mOhm packs at full current", 3, 0.0),
         Parameter("discharge", "1", 0.0, 0.2, "lithium cell, 4.2 to 3.4 V", 3, 0.0),
-        Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 2),
+        Parameter("copper", "1", 0.03, 0.4, "declared, share of the back-EMF at full load", 3),
     )
     on_by_default = False
 
@@ -71,7 +72,7 @@ class BatterySag(Effect):
         volts = flow.extra["voltage_V"].copy()
         for run in flow.runs:
             volts[run] = _circuit(volts[run], power[run], charge[run])
-        return np.nan_to_num(1.0 - volts / np.nanmax(volts))
+        return np.nan_to_num(1.0 - volts / flow.extra.get("usual_voltage_V", np.nanmax(volts)))
 
 
 def _circuit(volts: Array, current: Array, charge: Array) -> Array:

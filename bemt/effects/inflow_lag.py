@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Loads, Parameter
-
-LONGEST_STEP_S = 1.0
+from bemt.effects.base import Array, Effect, Flow, Loads, Parameter, follows
 
 
 @dataclass(frozen=True)
@@ -29,6 +27,7 @@ class InflowLag(Effect):
     id = "inflow_lag"
     title = "lag of the induced flow"
     along = ("time_s",)
+    transient = True
     sign = "thrust and torque overshoot when the speed rises and undershoot when it falls; no change on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("tau_s", "s", 0.01, 0.2, "apparent mass of the disk, Carpenter and Fridovich", 5, 0.0),)
@@ -53,9 +52,9 @@ class InflowLag(Effect):
         v, out = flow.induced, np.zeros_like(flow.rpm)
         if self.tau_s <= 0.0:
             return out
-        for run in flow.runs:
-            step = np.diff(flow.extra["time_s"][run])
-            dense = (step > 0.0) & (step < LONGEST_STEP_S)
+        for run in flow.transients:
+            time = flow.extra["time_s"][run]
+            step, dense = np.diff(time), follows(time)
             late = 0.0
             for i, (dt, good, dv) in enumerate(zip(step, dense, np.diff(v[run]), strict=True)):
                 # steady value linear between points: exact solution of the first-order equation

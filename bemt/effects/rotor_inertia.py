@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
+from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, follows
 
 # Blade of chord 0.75 R all along, section area of a 10 % thick aerofoil (0.68 t c), fibre-filled nylon.
 _SECTION, _DENSITY = 0.068, 1300.0
-# Points further apart than this are no transient [s].
-LONGEST_STEP_S = 1.0
 # Change of the slope across a point, over the larger slope, from which it may be a kink.
 _KINK = 0.5
 
@@ -32,6 +30,7 @@ class RotorInertia(Effect):
     id = "rotor_inertia"
     title = "rotor inertia"
     along = ("time_s",)
+    transient = True
     sign = "only torque and only in transients: high while the speed rises, low while it falls, zero on plateaus"
     needs = ("time_s",)
     parameters = (Parameter("ratio", "1", 0.0, 10.0, "declared, blades alone to heavy bell", 3, 0.0),)
@@ -50,10 +49,10 @@ class RotorInertia(Effect):
 def slope(flow: Flow) -> Array:
     """Angular acceleration, zero where the points are too far apart to show one, (P,) [rad/s2]."""
     out = np.zeros_like(flow.rpm)
-    for run in flow.runs:
+    for run in flow.transients:
         t, omega = flow.extra["time_s"][run], flow.omega[run]
         step = np.diff(t)
-        good = (step > 0.0) & (step < LONGEST_STEP_S)
+        good = follows(t)
         rate = np.where(good, np.diff(omega) / np.where(good, step, 1.0), 0.0)
         out[run] = _kinked(np.where(good, rate, 0.0))
     return out
