@@ -131,7 +131,8 @@ def test_a_run_is_recommended_where_it_is_worth_its_time(
     alone = len(compared.problem.parts[0].record)
     monkeypatch.setattr(suggest, "_options", lambda part, of=suggest._options: of(part)[:1])
     monkeypatch.setattr(
-        suggest, "_distances",
+        suggest,
+        "_distances",
         lambda plan, *_: (now if plan.covariates["rpm"].size == alone else after) * (1.0 - np.eye(2)),
     )
     rival = "hub_loss" if lead == "compressibility" else "rpm_scale"

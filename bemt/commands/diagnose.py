@@ -137,5 +137,9 @@ def _given(args: argparse.Namespace) -> Given:
         words += ["--repeatability", f"{100.0 * args.repeatability:g}"]
     if args.baseline != "bemt":
         words += ["--baseline", args.baseline]
-    return Given(tuple(map(shlex.quote, args.recordings)), tuple(map(shlex.quote, args.reference)), shlex.join(words),
-                 tuple(args.ruled_out))
+    return Given(
+        tuple(map(shlex.quote, args.recordings)),
+        tuple(map(shlex.quote, args.reference)),
+        shlex.join(words),
+        tuple(args.ruled_out),
+    )

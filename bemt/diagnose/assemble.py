@@ -123,7 +123,7 @@ def _usual_voltage(shown: Sequence[Record], record: Record) -> dict[str, Array]:
         return {}
     degree = min(2, np.unique(np.round(pulse[good], 6)).size - 1)
     found = np.polynomial.polynomial.polyfit(pulse[good] / top, volts[good], degree)
-    return {"usual_voltage_V": np.polynomial.polynomial.polyval(record.extra["pwm_s"] / top, found)}
+    return {"usual_voltage_V": np.asarray(np.polynomial.polynomial.polyval(record.extra["pwm_s"] / top, found), float)}
 
 
 def _calibrated(problem: Problem, cases: Sequence[Case]) -> tuple[Problem, tuple[str, ...]]:
