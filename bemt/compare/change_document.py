@@ -85,8 +85,8 @@ SCHEMA = "bemt.comparison/1"
 _TORQUES = {"torque_Nm", "power_W", "CP", "CQ"}
 # Density is asked for unless it is this many times less likely than the likeliest cause.
 _FIRST = 5.0
-# Change of a load that days of one site can make, in ln.
-_DAY = 0.12
+# Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
+_DAY, _SEEN = 0.12, 0.03
 # Start of a verdict that rests on what both recordings state.
 _TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
@@ -99,6 +99,10 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     with_case = asked.command(case=asked.case or "CASE")
     checks = {k: check for k in said.effects if (check := _check(k))}
     loads = [r for r in change.ratios.values() if r["kind"] in LOADS]
+    apart = max((abs(math.log(r["ratio"])) for r in loads), default=0.0)
+    days = math.isnan(change.density_ratio) and apart < _DAY
+    if said.verdict == "none" and days and apart > _SEEN:
+        return {"text": DAYS, "command": asked.with_days()}
     if said.verdict == "none":
         text = "to see smaller changes, remove the propeller, mount it again and repeat each run once"
         return {"text": text, "command": ""}
@@ -128,8 +132,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
         return {"text": text, "command": asked.with_rows(letter, column)}
     likely = {k: p for k, p in said.probability.items() if k not in ("none", "unknown")}
     density = likely.get("air_density", 0.0) * _FIRST >= max(likely.values(), default=1.0)
-    small = max((abs(math.log(r["ratio"])) for r in loads), default=1.0) < _DAY
-    if density and small and math.isnan(change.density_ratio):
+    if density and loads and days:
         return {"text": DAYS, "command": asked.with_days()}
     if not _TORQUES & change.ratios.keys() and change.loads is said:
         text = "record torque in both runs: thrust alone cannot tell gain, air and blade apart"
