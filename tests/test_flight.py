@@ -15,11 +15,13 @@ from flight_files import broken_copies
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
+from bemt.diagnose.rules import decide
 from bemt.flight.answer import FlightAnswer, answer_on
+from bemt.flight.balance import axes_of, features
 from bemt.flight.change import change_in
 from bemt.flight.identify import identify
 from bemt.flight.inflow import inflow
-from bemt.flight.judge import _decide, axes_of, features, judge
+from bemt.flight.judge import BUILD, RULES, judge, weighed
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.picture import flight_picture
@@ -111,20 +113,20 @@ def test_cut_blade_is_found_whatever_the_name(flights: Path, tmp_path: Path) -> 
     """Content decides, and the right motor is named."""
     (tmp_path / "normal.txt").write_bytes((flights / "after.usdlog").read_bytes())
     got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights)).judged
-    assert (got.verdict, got.effects) == ("named", ("damaged blade, motor 3",))
+    assert (got.said.verdict, got.said.effects) == ("named", ("damaged blade, motor 3",))
     assert got.accused == 0 and got.healthy == 6 and 0.0 <= got.rate95[0] < got.rate95[1] < 1.0
 
 
 def test_without_healthy_flights_nothing_is_named(flights: Path) -> None:
     """One flight alone: what healthy vehicles show is the scale, and an uneven build is among the causes."""
     alone = answer_on(read_log(flights / "before_1.usdlog")).judged
-    assert alone.verdict == "insufficient" and 0.1 < alone.visible < 0.4
+    assert alone.said.verdict == "insufficient" and 0.1 < alone.visible < 0.4
     calm = read_log(flights / "before_1.usdlog")
     assert calm.command is not None
     got = answer_on(replace(calm, command=calm.command * [1.0, 1.0, 1.4, 1.0])).judged
-    assert got.verdict == "class" and {"damaged blade, motor 3", "an uneven build of this vehicle"} <= set(got.effects)
+    assert got.said.verdict == "class" and {"damaged blade, motor 3", BUILD} <= set(got.said.effects)
     few = answer_on(read_log(flights / "after.usdlog"), healthy(flights)[:2]).judged
-    assert few.verdict == "class" and "damaged blade, motor 3" in few.effects
+    assert few.said.verdict == "class" and "damaged blade, motor 3" in few.said.effects
 
 
 @pytest.mark.parametrize("name", sorted(LAYOUTS))
@@ -139,7 +141,7 @@ def test_every_layout_balances_and_every_motor_is_found(name: str) -> None:
     P = np.linalg.pinv(A) @ A
     for k in range(A.shape[1]):
         got = judge(np.mean(calm, axis=0) + 0.3 * P[:, k], calm, layout)
-        assert got.verdict in ("named", "class") and f"damaged blade, motor {k + 1}" in got.effects
+        assert got.said.verdict in ("named", "class") and f"damaged blade, motor {k + 1}" in got.said.effects
 
 
 @pytest.mark.parametrize("rotors", [4, 8])
@@ -150,7 +152,7 @@ def test_healthy_flights_are_accused_as_rarely_as_stated(rotors: int) -> None:
     hits, unlike = 0, np.array([0.4, 1.7, 0.8])
     for _ in range(200):
         spread = 0.01 * (rng.normal(size=(7, 3)) * unlike) @ np.linalg.pinv(axes_of(layout, rotors)).T
-        hits += _decide(spread[0], spread[1:], layout, 0.01).verdict != "none"
+        hits += decide(weighed(spread[0], spread[1:], layout, 0.01)[0], RULES).verdict != "none"
     assert hits <= 8
 
 
@@ -297,9 +299,9 @@ def test_recorded_quadrotor_with_cut_blades(shared_data: Path) -> None:
         got = judge(mine, read, layout)
         assert got.accused == 0
         if not file.name.startswith("cut"):
-            assert got.verdict == "none", file
-        assert not got.effects or got.effects[0] == "damaged blade, motor 3", file
-        found += file.name.startswith(THREE_MM) and bool(got.effects)
+            assert got.said.verdict == "none", file
+        assert not got.said.effects or got.said.effects[0] == "damaged blade, motor 3", file
+        found += file.name.startswith(THREE_MM) and bool(got.said.effects)
     assert found >= 8  # of ten
 
 
@@ -311,9 +313,9 @@ def test_recorded_flights_alone(shared_data: Path) -> None:
         layout, mine = layout_of(log.layout, 4), features(log)
         assert mine is not None and change_in(log, layout) is None, file
         got = judge(mine, [], layout)
-        assert got.verdict == "insufficient" or "damaged blade, motor 3" in got.effects, file
-        assert got.verdict == "insufficient" or file.name.startswith("cut"), file
-        seen += got.verdict == "class"
+        assert got.said.verdict == "insufficient" or "damaged blade, motor 3" in got.said.effects, file
+        assert got.said.verdict == "insufficient" or file.name.startswith("cut"), file
+        seen += got.said.verdict == "class"
     assert seen >= 3
 
 

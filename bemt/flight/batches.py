@@ -6,8 +6,6 @@ Official Statistics 17, 2001; neither checked there).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

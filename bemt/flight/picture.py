@@ -48,8 +48,8 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
         _flow(axes[0, 1], answer)
         _drives(axes[1, 0], answer)
         _balance(axes[1, 1], answer)
-        title = f"{answer.log.format}, {answer.log.rotors} rotors: {answer.judged.verdict}"
-        effects = ", ".join(answer.judged.effects)
+        title = f"{answer.log.format}, {answer.log.rotors} rotors: {answer.judged.said.verdict}"
+        effects = ", ".join(answer.judged.said.effects)
         figure.suptitle(title + (f"\n{effects}" if effects else ""), fontsize=11.0)
         out = io.BytesIO()
         figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
@@ -146,7 +146,7 @@ def _balance(ax: Any, answer: FlightAnswer) -> None:
     if not j.readings.size:
         _empty(ax, "no balance")
         return
-    accused = {int(n) - 1 for e in j.effects for n in re.findall(r"\d+", e)}
+    accused = {int(n) - 1 for e in j.said.effects for n in re.findall(r"\d+", e)}
     colours = [_ORANGE if i in accused else _BLUE for i in range(j.readings.size)]
     ax.bar(np.arange(1, j.readings.size + 1), 100 * j.readings, color=colours)
     if np.isfinite(j.scatter):

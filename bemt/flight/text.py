@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemt.diagnose.verdict import Decision
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
 from bemt.flight.judge import FlightVerdict
@@ -30,11 +31,12 @@ def text(a: FlightAnswer) -> str:
     if np.isfinite(j.visible):
         against = "against these healthy flights" if j.given else "without healthy flights of this vehicle"
         lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
-    if j.verdict == "none" and j.healthy:
+    if j.said.verdict == "none" and j.healthy:
         lines.append("  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data.")
-    if j.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
+    if j.said.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
         lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
                      f"±{100 * j.total_half:.1f} %): weight at the centre, battery or air.")  # fmt: skip
+    lines += [f"  Next: {j.next.text}."] if j.next.text else []
     lines += _seen(a)
     lines += ["", "Identified (± 95 %)"] if a.found.constants else []
     lines += [f"  {name:<34} {_number(c)}" for name, c in a.found.constants.items()]
@@ -132,13 +134,21 @@ def _figures(value: float, count: int) -> str:
 
 
 def _verdict(j: FlightVerdict) -> str:
-    leading = next((e for e in j.explanations if e.cause == j.effects[0]), None) if j.effects else None
-    size = "" if leading is None else f" ({100 * leading.size:+.0f} ± {100 * leading.half:.0f} % drive)"
+    said = j.said
+    found = j.found.get(said.leading)
+    size = "" if found is None or not found.size else f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
     words = {
         "none": "No cause found: ",
-        "named": f"Cause found: {', '.join(j.effects)}{size}: ",
-        "class": f"One of these: {', '.join(j.effects)}{size}:\n  ",
+        "named": f"Cause found: {' and '.join(said.effects)}{size}: ",
+        "class": f"One of these: {_open(said)}{size}:\n  ",
         "unknown": "Something unlisted: ",
         "insufficient": "Cannot tell: ",
     }
-    return f"{words[j.verdict]}{j.why}."
+    return f"{words[said.verdict]}{said.why}."
+
+
+def _open(said: Decision) -> str:
+    """Members of a class; of two at work, each with its look-alikes."""
+    if len(said.sets) > 1:
+        return " with ".join(" or ".join(s) for s in said.sets)
+    return ", ".join(said.effects)

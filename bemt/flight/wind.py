@@ -80,7 +80,8 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     heading = float(np.degrees(np.arctan2(axis[1], axis[0])))
     own = [_slope(f @ axis, v @ axis) for f, v in still]
     weight = np.array([u**-2.0 for _, u in own])
-    c, u_c = float(np.average([s for s, _ in own], weights=weight)), float(weight.sum() ** -0.5)
+    total = max(float(weight.sum()), 1e-300)
+    c, u_c = float(weight @ [s for s, _ in own]) / total, total**-0.5
     if not c > 2.0 * u_c:
         why = "the force does not depend on the velocity in the calm flights: fly one to and fro along the wind"
         return Wind(np.nan, np.nan, heading, why)
