@@ -15,6 +15,7 @@ from bemt.flight import px4
 from bemt.flight.answer import FlightAnswer, answer_on
 from bemt.flight.change import change_in
 from bemt.flight.inflow import inflow
+from bemt.flight.judge import judge
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.motor_speed import speed_changes
@@ -60,12 +61,47 @@ def test_damage_is_found_at_its_motor(kind: str, layout: str, tmp_path: Path) ->
     assert got.judged.accused <= 1 and got.found.constants["thrust constant"].unit == "N/rpm^2"
 
 
+@pytest.mark.parametrize(("airframe", "layout"), [(4001, "quad-x"), (6001, "hexa-x"), (8001, "octo-x"), (12001, "x8")])
+def test_pulse_widths_of_an_airframe(airframe: int, layout: str, tmp_path: Path) -> None:
+    """A PX4 log of before the control allocation: the layout is that of the airframe, no speeds are made up."""
+    flights = [Hover(layout, seconds=12.0, seed=k) for k in range(4)]
+    cut = Hover(layout, seconds=12.0, seed=9, loss=((flights[0].rotors - 1, 0.25),))
+    logs = [read(tmp_path, "px4", flight, airframe=airframe) for flight in (*flights, cut)]
+    assert all(log.rotors == cut.rotors and log.rpm is None and log.command_unit == "1" for log in logs)
+    np.testing.assert_allclose(logs[0].command[-1], flights[0].drives(np.arange(0.0, 12.0, 0.02))[0][-1], rtol=0.01)
+    got = answer_on(logs[-1], logs[:-1]).judged
+    assert got.said.effects[0] == f"damaged blade, motor {cut.rotors}" and got.accused == 0
+
+
+def test_another_battery_is_no_cause(tmp_path: Path) -> None:
+    """All motors driven harder alike: the total says so, and no rotor is accused."""
+    calm = [read(tmp_path, "px4", Hover(seconds=12.0, seed=k)) for k in range(4)]
+    got = answer_on(read(tmp_path, "px4", Hover(seconds=12.0, seed=9, battery=1.15)), calm).judged
+    assert got.said.verdict == "none" and abs(got.total - 0.14) < 0.01 + got.total_half
+
+
 @pytest.mark.parametrize("layout", ["quad-x", "hexa-x", "x8"])
 def test_two_damaged_rotors(layout: str, tmp_path: Path) -> None:
     """Both are named, or stand in the class of pairs that load the body alike."""
     got = answered(tmp_path, "ardupilot", layout, ((1, 0.25), (3, 0.3))).judged
     assert got.said.verdict in ("named", "class")
     assert {"damaged blade, motor 2", "damaged blade, motor 4"} <= set(got.said.effects)
+
+
+@pytest.mark.parametrize("layout", ["quad-x", "hexa-x", "octo-x", "x8"])
+def test_two_that_turn_against_each_other_stand_beside_a_weight(layout: str) -> None:
+    """The balance cannot tell them, so none of both is named alone."""
+    t = np.arange(0.0, 12.0, 0.02)
+    placed = layout_of(layout, len(LAYOUTS[layout].split()))
+    assert placed is not None
+
+    def drives(seed: int, loss: tuple[tuple[int, float], ...] = ()) -> np.ndarray:
+        return np.log(Hover(layout, seconds=12.0, seed=seed, loss=loss).drives(t)[0].mean(axis=0))
+
+    a, b = 0, int(np.flatnonzero(placed[:, 1] != placed[0, 1])[0])
+    said = judge(drives(9, ((a, 0.3), (b, 0.3))), [drives(k) for k in range(4)], placed).said
+    blades = {f"damaged blade, motor {k + 1}" for k in (a, b)}
+    assert said.verdict in ("named", "class") and blades <= set(said.effects)
 
 
 def test_blade_lost_in_flight(tmp_path: Path) -> None:
