@@ -98,7 +98,8 @@ def test_two_that_turn_against_each_other_stand_beside_a_weight(layout: str) -> 
     def drives(seed: int, loss: tuple[tuple[int, float], ...] = ()) -> np.ndarray:
         return np.log(Hover(layout, seconds=12.0, seed=seed, loss=loss).drives(t)[0].mean(axis=0))
 
-    a, b = 0, int(np.flatnonzero(placed[:, 1] != placed[0, 1])[0])
+    apart = np.cos(placed[:, 0] - placed[0, 0]) - 10.0 * (placed[:, 1] == placed[0, 1])
+    a, b = 0, int(np.argmax(apart))
     said = judge(drives(9, ((a, 0.3), (b, 0.3))), [drives(k) for k in range(4)], placed).said
     blades = {f"damaged blade, motor {k + 1}" for k in (a, b)}
     assert said.verdict in ("named", "class") and blades <= set(said.effects)
@@ -110,6 +111,8 @@ def test_blade_lost_in_flight(tmp_path: Path) -> None:
     got = change_in(log, layout_of(log.layout, 4))
     assert got is not None and got.kind == "step" and abs(got.at_s - 12.0) < 1.0
     assert got.causes[0] == "damaged blade, motor 2" and abs(got.size - 0.22) < 0.03
+    said = answer_on(log).judged.said
+    assert (said.verdict, said.effects) == ("named", ("damaged blade, motor 2",)), "no other flight is needed"
     calm = read(tmp_path, "px4", Hover(seconds=20.0))
     assert change_in(calm, layout_of(calm.layout, 4)) is None
 

@@ -108,8 +108,9 @@ def decide(query: Any, rules: Sequence[Rule] = RULES) -> Decision:
     for rule in rules:
         if rule.revises == (query.said is not None) and (answer := rule.ask(query)) is not None:
             query.steps.append(replace(answer, rule=rule.name))
-    assert query.said is not None, "the last rule that does not revise always holds"
-    return query.said
+    said: Decision | None = query.said
+    assert said is not None, "the last rule that does not revise always holds"
+    return said
 
 
 def _leaves_its_range(a: VerdictQuery) -> bool:

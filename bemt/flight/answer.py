@@ -17,7 +17,7 @@ from bemt.flight.balance import axes_of, features
 from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
 from bemt.flight.inflow import Inflow, inflow
-from bemt.flight.judge import FALSE_ALARM, FlightVerdict, judge
+from bemt.flight.judge import FALSE_ALARM, BesideBalance, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.motor_speed import speed_changes
@@ -207,7 +207,7 @@ def answer_on(
     found, air = identify(log, mass_kg), wind(log, healthy)
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
-    mine = features(log)
+    mine, changed = features(log), change_in(log, placed)
     if mine is None:
         why = "the log shows no flight with all motors running"
         said = Decision("insufficient", (), NONE, 1.0, float("nan"), (), why, "no flight")
@@ -215,9 +215,13 @@ def answer_on(
         judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
     else:
         kept = [(x, k) for k, h in enumerate(healthy) if (x := features(h)) is not None]
-        others_shake = [bool(shaken(calm[k], [*calm[:k], *calm[k + 1 :]])) for _, k in kept]
-        shakes = [k for k, _, known in moved if known], others_shake
-        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), turned, shakes)
+        upset = [bool(shaken(calm[k], [*calm[:k], *calm[k + 1 :]])) or change_in(healthy[k], placed) is not None
+                 for _, k in kept]  # fmt: skip
+        beside = BesideBalance(
+            tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
+            tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
+        )  # fmt: skip
+        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), beside)
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
         same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
@@ -231,7 +235,7 @@ def answer_on(
     if log.command is not None and log.command_unit == "1" and log.flying.any():
         limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
-        log, found, judged, air, balance, limited, change_in(log, placed), shake, moved,
+        log, found, judged, air, balance, limited, changed, shake, moved,
         turned, inflow(log), mass, simulator=simulator_constants(log, found),
     )  # fmt: skip
 

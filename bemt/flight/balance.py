@@ -23,11 +23,11 @@ from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
 from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
 
-__all__ = ["BLADE", "WEIGHT", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
+__all__ = ["BLADE", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
 
 Array = NDArray[np.float64]
 
-BLADE, WEIGHT = "damaged blade, motor ", "weight "
+BLADE, WEIGHT, WIND = "damaged blade, motor ", "weight ", "wind or forward flight"
 _COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
 _DRAWS = 10_000
 

@@ -94,5 +94,5 @@ def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
         keep = every.copy()
         keep[p] = False
         parts.append(fitted(keep))
-    u = np.sqrt((BATCHES - 1) * np.mean((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
-    return fitted(every), u
+    spread = np.array(parts) - np.mean(parts, axis=0)
+    return fitted(every), np.asarray(np.sqrt((BATCHES - 1) * np.mean(spread**2, axis=0)))

@@ -27,18 +27,29 @@ from bemt.diagnose.rules import Rule, decide
 from bemt.diagnose.suggest import Suggestion
 from bemt.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, MOST, NAMED, NEAR, RARE, SMALL, SURE
 from bemt.diagnose.verdict import CLAIMS, Decision, credible_sets
-from bemt.flight.balance import BLADE, WEIGHT, axes_of, blade, directions, healthy_flight
+from bemt.flight.balance import BLADE, WEIGHT, WIND, axes_of, blade, directions, healthy_flight
+from bemt.flight.change import FlightChange
 from bemt.flight.next_flight import next_flight
 
-__all__ = ["BUILD", "FALSE_ALARM", "RULES", "WIND", "FlightEvidence", "FlightQuery", "FlightVerdict", "judge"]
+__all__ = [
+    "BUILD",
+    "FALSE_ALARM",
+    "RULES",
+    "WIND",
+    "BesideBalance",
+    "FlightEvidence",
+    "FlightQuery",
+    "FlightVerdict",
+    "judge",
+]
 
 Array = NDArray[np.float64]
 
 FALSE_ALARM = GATE
 """Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
-WIND, BUILD, WIDE = (
-    "wind or forward flight", "an uneven build of this vehicle", "flights of this vehicle differ more than usual",
-)  # fmt: skip
+BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
+IN_FLIGHT = "a change within the flight"
+"""Rule whose size is that of the change, not of the whole flight."""
 _LEAST = 3  # healthy flights from which a cause is named
 _ALONG = 100.0  # condition number from which two rotors load the body along one line
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
@@ -66,6 +77,27 @@ class FlightEvidence:
     log_bayes: float
 
 
+@dataclass(frozen=True)
+class BesideBalance:
+    """What else the log shows of the rotors.
+
+    Attributes
+    ----------
+    faster, slower, shaken : tuple of int
+        Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor.
+    change : FlightChange or None
+        A change of the balance within the flight.
+    healthy : tuple of bool
+        Of each healthy flight, whether a rotor shakes or the balance changes within it.
+    """
+
+    faster: tuple[int, ...] = ()
+    slower: tuple[int, ...] = ()
+    shaken: tuple[int, ...] = ()
+    change: FlightChange | None = None
+    healthy: tuple[bool, ...] = ()
+
+
 @dataclass(eq=False)
 class FlightQuery:
     """What the rules ask of a flight.
@@ -82,8 +114,8 @@ class FlightQuery:
         Share of healthy flights that look as bad, and the one that is accepted [1].
     given : int
         Healthy flights to compare with.
-    faster, slower, shaken : tuple of int
-        Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor.
+    beside : BesideBalance
+        What else the log shows.
     steps : list of Decision
         Answers of the rules so far, the last one in force.
     """
@@ -94,9 +126,7 @@ class FlightQuery:
     p_value: float
     alarm: float
     given: int
-    faster: tuple[int, ...] = ()
-    slower: tuple[int, ...] = ()
-    shaken: tuple[int, ...] = ()
+    beside: BesideBalance = field(default_factory=BesideBalance)
     steps: list[Decision] = field(default_factory=list)
 
     @property
@@ -236,8 +266,8 @@ def _many(a: FlightQuery) -> Decision | None:
 def _speed(a: FlightQuery) -> Decision | None:
     """By definition: of the causes that look alike in the balance a damaged blade alone unloads its motor."""
     said = a.steps[-1]
-    turned = [blade(k) for k in a.faster if blade(k) in said.effects]
-    if said.verdict != "class" or len(turned) != 1 or len(a.faster) != 1 or said.leading.pair:
+    turned = [blade(k) for k in a.beside.faster if blade(k) in said.effects]
+    if said.verdict != "class" or len(turned) != 1 or len(a.beside.faster) != 1 or said.leading.pair:
         return None
     why = f"{said.why}; that motor alone turns faster at its drive, as with less blade"
     return replace(said, verdict="named", effects=(turned[0],), leading=Explanation.of(turned[0]), why=why,
@@ -247,7 +277,7 @@ def _speed(a: FlightQuery) -> Decision | None:
 def _slow(a: FlightQuery) -> Decision | None:
     """By definition: a blade that lost area does not load its motor more."""
     said = a.steps[-1]
-    weak = [k for k in a.slower if blade(k) in said.effects]
+    weak = [k for k in a.beside.slower if blade(k) in said.effects]
     if said.verdict not in ("class", "named") or not weak:
         return None
     gone = {blade(k) for k in weak}
@@ -256,12 +286,24 @@ def _slow(a: FlightQuery) -> Decision | None:
     return replace(said, effects=names, why=f"{said.why}; motor {weak[0]} turns slower at its drive")
 
 
+def _changed(a: FlightQuery) -> Decision | None:
+    """By definition: the flight before the change is the healthy one."""
+    said, change = a.steps[-1], a.beside.change
+    if said.verdict not in ("none", "insufficient") or change is None:
+        return None
+    names = change.causes[:LARGEST]
+    when = f" at {change.at_s:.1f} s" if change.kind == "step" else ", steadily"
+    why = f"the balance changed in flight{when}, by {100 * change.size:.0f} ± {100 * change.half:.0f} % drive"
+    return replace(said, verdict="named" if len(names) == 1 else "class", effects=names, sets=(names,), why=why,
+                   leading=Explanation.of(names[0]), probability=1.0 - GATE)  # fmt: skip
+
+
 def _shake(a: FlightQuery) -> Decision | None:
     """Declared: what shakes and does not move the balance is an imbalance or a small damage."""
     said = a.steps[-1]
-    if said.verdict != "none" or len(a.shaken) != 1:
+    if said.verdict != "none" or len(a.beside.shaken) != 1:
         return None
-    which = f"motor {a.shaken[0]}" if a.shaken[0] else "a rotor"
+    which = f"motor {a.beside.shaken[0]}" if a.beside.shaken[0] else "a rotor"
     why = "the balance did not move, but it shakes more at its shaft frequency than in healthy flights"
     return replace(said, verdict="class", effects=(f"imbalance or tape, {which}", f"damaged blade, {which}"), why=why)
 
@@ -276,6 +318,7 @@ RULES: list[Rule] = [
     Rule("two at work", _two, "EARNED, IN_SET, SURE"),
     Rule("look-alikes", _alike, "NEAR, RARE, LARGEST, SURE"),
     Rule("many are left", _many),
+    Rule(IN_FLIGHT, _changed, "GATE", revises=True),
     Rule("speed at equal drive tells a blade", _speed, "GATE", revises=True),
     Rule("speed at equal drive tells a motor", _slow, "GATE", revises=True),
     Rule("one rotor shakes", _shake, "GATE", revises=True),
@@ -337,8 +380,7 @@ def judge(
     layout: Array | None,
     false_alarm: float = FALSE_ALARM,
     windy: bool = False,
-    speeds: Sequence[tuple[int, float]] = (),
-    shaken: tuple[Sequence[int], Sequence[bool]] = ((), ()),
+    beside: BesideBalance | None = None,
 ) -> FlightVerdict:
     """Judge a flight by healthy ones.
 
@@ -355,11 +397,8 @@ def judge(
     windy : bool
         Whether the rotors met wind that they do not meet in the healthy flights: it tilts the body, so roll and pitch
         may change in any way, and yaw does not.
-    speeds : sequence of (int, float)
-        As :func:`bemt.flight.motor_speed.speed_changes` gives it.
-    shaken : (sequence of int, sequence of bool)
-        Motors (0 is the first, -1: not known which) that shake more than in healthy flights; of each healthy flight,
-        whether a motor does by the others.
+    beside : BesideBalance or None
+        What else the log shows.
 
     Returns
     -------
@@ -370,9 +409,7 @@ def judge(
 
     calm = np.array(healthy).reshape(-1, flight.size)
     query, out = weighed(flight, calm, layout, false_alarm, windy)
-    query.faster = tuple(k + 1 for k, change in speeds if change > 0.0)
-    query.slower = tuple(k + 1 for k, change in speeds if change < 0.0)
-    query.shaken = tuple(k + 1 for k in shaken[0])
+    query.beside = beside or BesideBalance()
     said = decide(query, RULES)
     out = replace(out, said=said, next=next_flight(said, layout, query.given))
     if query.few:
@@ -380,8 +417,8 @@ def judge(
     bad = []
     for k, h in enumerate(calm):
         other, _ = weighed(h, np.delete(calm, k, axis=0), layout, false_alarm)
-        other.shaken = (0,) if any(shaken[1][k : k + 1]) else ()
-        bad.append(decide(other, RULES).verdict in (*CLAIMS, "unknown"))
+        moved = any(query.beside.healthy[k : k + 1])
+        bad.append(moved or decide(other, RULES).verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
     return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)))
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose.suggest import Suggestion
 from bemt.diagnose.verdict import Decision
-from bemt.flight.balance import BLADE, WEIGHT
+from bemt.flight.balance import BLADE, WEIGHT, WIND
 
 __all__ = ["next_flight"]
 
@@ -37,6 +37,8 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) 
     text, kind = "no further flight is needed", ""
     if said.verdict == "none":
         text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
+    elif said.effects[:1] == (WIND,):
+        text, kind = _HOVER, "run"
     elif given < 3:
         text, kind = "three or more healthy flights of this vehicle, in still air, with --healthy", "reference"
         if motors:
