@@ -85,8 +85,7 @@ def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
     """
 
     def fitted(keep: NDArray[np.bool_]) -> Array:
-        out: Array = np.linalg.lstsq(X[keep], y[keep], rcond=None)[0]
-        return out
+        return np.asarray(np.linalg.lstsq(X[keep], y[keep], rcond=None)[0], dtype=float)
 
     every = np.ones(y.size, dtype=bool)
     parts = []

@@ -25,8 +25,21 @@ from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.prior import LEFT_OUT, log_priors
 from bemt.diagnose.rules import Rule, decide
 from bemt.diagnose.suggest import Suggestion
-from bemt.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, MOST, NAMED, NEAR, RARE, SMALL, SURE
-from bemt.diagnose.verdict import CLAIMS, Decision, credible_sets
+from bemt.diagnose.thresholds import (
+    EARNED,
+    GATE,
+    LARGEST,
+    LEFT_OVER,
+    LIKE,
+    MOST,
+    NAMED,
+    NEAR,
+    PARTNER,
+    RARE,
+    SMALL,
+    SURE,
+)
+from bemt.diagnose.verdict import BESIDE_IT, CLAIMS, Decision, credible_sets
 from bemt.flight.balance import BLADE, WEIGHT, WIND, axes_of, blade, directions, healthy_flight
 from bemt.flight.change import FlightChange
 from bemt.flight.next_flight import next_flight
@@ -156,11 +169,21 @@ class FlightQuery:
         lead = self.leading
         if not any(name.startswith(WEIGHT) for name in lead):
             return ()
-        as_good = [e for e, v in self.found.items() if e.pair and v.chi2 <= self.found[lead].chi2 and v.t > 2.0]
-        return tuple(sorted(as_good, key=lambda e: -self.P[e])[:MOST])
+        alike = [e for e, v in self.found.items() if e.pair and v.chi2 <= self.found[lead].chi2 and v.t > 1.0]
+        return tuple(sorted(alike, key=lambda e: -self.P[e])[:MOST])
 
     @property
-    def open(self) -> tuple[Explanation, ...]:
+    def partners(self) -> tuple[str, ...]:
+        """Rotors one of which may be damaged beside the leading one, likeliest first."""
+        lead = self.leading
+        together = {(e.ids - lead.ids): self.P[e] for e in self.found if e.pair and lead.ids < e.ids}
+        ranked = sorted(together, key=lambda i: -together[i])
+        if not ranked or together[ranked[0]] < PARTNER:
+            return ()
+        return tuple(name for i in ranked if together[i] >= LIKE * together[ranked[0]] for name in i)[: LARGEST - 1]
+
+    @property
+    def as_good(self) -> tuple[Explanation, ...]:
         """The leading explanation and those that are as good, or the next one where none is, likeliest first."""
         lead = self.leading
         least, low = RARE * self.P[lead], self.log_bayes[lead] - NEAR
@@ -207,7 +230,7 @@ def _few(a: FlightQuery) -> Decision | None:
         return None
     why = "more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
     left = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading] > LEFT_OVER
-    return a.says("class", why, () if left else a.open, (WIDE if a.given else BUILD,))
+    return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
 
 
 def _rest(a: FlightQuery) -> Decision | None:
@@ -216,6 +239,16 @@ def _rest(a: FlightQuery) -> Decision | None:
     if rest <= max(LEFT_OVER, SMALL * a.log_bayes[a.leading]):
         return None
     return a.says("unknown", "the balance moved, but not as one or two rotors or one weight move it")
+
+
+def _another(a: FlightQuery) -> Decision | None:
+    """As in the diagnosis: one is sure, another may be there."""
+    lead = a.leading
+    if len(lead) != 1 or a.share((lead,)) < NAMED or a.same or not a.partners:
+        return None
+    (name,) = lead
+    why = f"{name} is present; whether another effect is also present is left open"
+    return a.says("class", why, (lead,), a.partners, sets=((name,), a.partners))
 
 
 def _one(a: FlightQuery) -> Decision | None:
@@ -250,7 +283,7 @@ def _two(a: FlightQuery) -> Decision | None:
 
 def _alike(a: FlightQuery) -> Decision | None:
     """As of look-alikes in the diagnosis."""
-    members = a.open[:LARGEST]
+    members = a.as_good[:LARGEST]
     if a.leading.pair or a.share(members) < SURE:
         return None
     well = a.same or all(a.P[e] > RARE * a.P[a.leading] for e in members)
@@ -313,6 +346,7 @@ RULES: list[Rule] = [
     Rule("too few healthy flights", _few_and_within, "GATE"),
     Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
     Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
+    Rule(BESIDE_IT, _another, "NAMED, PARTNER, LIKE, LARGEST"),
     Rule("one is sure", _one, "NAMED"),
     Rule("both are sure", _both, "EARNED, NAMED"),
     Rule("two at work", _two, "EARNED, IN_SET, SURE"),

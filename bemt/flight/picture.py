@@ -38,7 +38,7 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.5, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
+    with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.0, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
         figure = Figure(figsize=(7.6, 6.6), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(2, 2)
@@ -82,7 +82,7 @@ def _flow(ax: Any, answer: FlightAnswer) -> None:
             ax.plot(model[0], 100 * model[1], color=colour, lw=1.5, label=f"model, {name}")
     ax.axhline(0.0, color="0.3", lw=0.8)
     ax.set_xlabel("velocity [m/s], climb above zero")
-    ax.set_ylabel("change of thrust at equal speed [%]")
+    ax.set_ylabel("thrust at equal speed [%]")
     ax.legend(frameon=False)
 
 

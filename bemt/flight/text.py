@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.diagnose.verdict import Decision
+from bemt.diagnose.verdict import BESIDE_IT, Decision
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
 from bemt.flight.judge import IN_FLIGHT, FlightVerdict
@@ -141,6 +141,8 @@ def headline(j: FlightVerdict) -> str:
     size = ""
     if found is not None and found.size and said.rule != IN_FLIGHT:
         size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
+    if said.rule == BESIDE_IT:
+        return f"Cause found: {said.effects[0]}{size}. Possibly also: {' or '.join(said.effects[1:])}"
     words = {
         "none": "No cause found",
         "named": f"Cause found: {' and '.join(said.effects)}{size}",
