@@ -6,6 +6,7 @@ import gzip
 import json
 import runpy
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from bemt.base.errors import InputError
 from bemt.commands.cli import main
 from bemt.diagnose.rules import decide
 from bemt.flight.answer import FlightAnswer, answer_on
-from bemt.flight.balance import axes_of, features
+from bemt.flight.balance import axes_of, blade, features
 from bemt.flight.change import change_in
 from bemt.flight.identify import identify
 from bemt.flight.inflow import inflow
@@ -303,6 +304,28 @@ def test_recorded_quadrotor_with_cut_blades(shared_data: Path) -> None:
         assert not got.said.effects or got.said.effects[0] == "damaged blade, motor 3", file
         found += file.name.startswith(THREE_MM) and bool(got.said.effects)
     assert found >= 8  # of ten
+
+
+def test_recorded_cuts_moved_to_two_motors(shared_data: Path) -> None:
+    """No rotor is named that is whole; both are named or in the class in two of three or more.
+
+    What a cut changed at motor 3 is turned to two motors and added: a flight of two cut propellers, as nearly as
+    recordings of one give it.
+    """
+    folder = shared_data / "flight_logs" / "crazypad_E8"
+    calm = np.array([features(read_log(p)) for p in sorted(folder.glob("normal*"))])
+    cuts = [features(read_log(folder / f"cut_propeller_M3_{c}.usdlog")) - calm.mean(axis=0)
+            for c in ("3mm_3mm_41mm__log00", "4mm_3.5mm_39.5mm__log01", "2mm_2mm_43mm__log03")]  # fmt: skip
+    layout, both, tried = layout_of("crazyflie", 4), 0, 0
+    for (a, one), (b, other) in product(product(range(4), cuts), repeat=2):
+        if a == b:
+            continue
+        x = calm.mean(axis=0) + np.roll(one, a - 2) + np.roll(other, b - 2)
+        said = decide(weighed(x, calm, layout, 0.01)[0], RULES)
+        cut = {blade(a + 1), blade(b + 1)}
+        assert said.verdict != "named" or set(said.effects) == cut
+        both, tried = both + (cut <= set(said.effects)), tried + 1
+    assert both >= 2 * tried / 3
 
 
 def test_recorded_flights_alone(shared_data: Path) -> None:

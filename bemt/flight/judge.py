@@ -34,7 +34,6 @@ from bemt.diagnose.thresholds import (
     MOST,
     NAMED,
     NEAR,
-    PARTNER,
     RARE,
     SMALL,
     SURE,
@@ -47,13 +46,14 @@ from bemt.flight.next_flight import next_flight
 __all__ = [
     "BUILD",
     "FALSE_ALARM",
+    "IN_FLIGHT",
     "RULES",
-    "WIND",
     "BesideBalance",
     "FlightEvidence",
     "FlightQuery",
     "FlightVerdict",
     "judge",
+    "weighed",
 ]
 
 Array = NDArray[np.float64]
@@ -66,6 +66,7 @@ IN_FLIGHT = "a change within the flight"
 _LEAST = 3  # healthy flights from which a cause is named
 _ALONG = 100.0  # condition number from which two rotors load the body along one line
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
+_POSITIVE = 1.0  # log odds from which evidence is positive (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995) [1]
 _LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforehand: beyond, a motor has no more [1]
 
 
@@ -169,18 +170,18 @@ class FlightQuery:
         lead = self.leading
         if not any(name.startswith(WEIGHT) for name in lead):
             return ()
-        alike = [e for e, v in self.found.items() if e.pair and v.chi2 <= self.found[lead].chi2 and v.t > 1.0]
+        alike = [e for e, v in self.found.items() if e.pair and v.chi2 <= self.found[lead].chi2 and v.t > 2.0]
         return tuple(sorted(alike, key=lambda e: -self.P[e])[:MOST])
 
     @property
     def partners(self) -> tuple[str, ...]:
         """Rotors one of which may be damaged beside the leading one, likeliest first."""
         lead = self.leading
-        together = {(e.ids - lead.ids): self.P[e] for e in self.found if e.pair and lead.ids < e.ids}
-        ranked = sorted(together, key=lambda i: -together[i])
-        if not ranked or together[ranked[0]] < PARTNER:
-            return ()
-        return tuple(name for i in ranked if together[i] >= LIKE * together[ranked[0]] for name in i)[: LARGEST - 1]
+        least = self.log_bayes[lead] + _POSITIVE
+        both = {e: self.P[e] for e in self.found if e.pair and lead.ids < e.ids and self.log_bayes[e] >= least}
+        ranked = sorted(both, key=lambda e: -both[e])
+        kept = [e for e in ranked if both[e] >= LIKE * both[ranked[0]]][:MOST]
+        return tuple(name for e in kept for name in e.ids - lead.ids)
 
     @property
     def as_good(self) -> tuple[Explanation, ...]:
@@ -288,7 +289,8 @@ def _alike(a: FlightQuery) -> Decision | None:
         return None
     well = a.same or all(a.P[e] > RARE * a.P[a.leading] for e in members)
     why = "these explain the balance nearly as well" if well else "the first is likely, but not sure enough for a name"
-    return a.says("class", why, members)
+    more = tuple(i for i in a.partners if all(i not in e for e in members))
+    return a.says("class", why, members, more)
 
 
 def _many(a: FlightQuery) -> Decision | None:
@@ -346,7 +348,7 @@ RULES: list[Rule] = [
     Rule("too few healthy flights", _few_and_within, "GATE"),
     Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
     Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
-    Rule(BESIDE_IT, _another, "NAMED, PARTNER, LIKE, LARGEST"),
+    Rule(BESIDE_IT, _another, "NAMED, LIKE, MOST"),
     Rule("one is sure", _one, "NAMED"),
     Rule("both are sure", _both, "EARNED, NAMED"),
     Rule("two at work", _two, "EARNED, IN_SET, SURE"),
