@@ -44,17 +44,9 @@ from bemt.flight.change import FlightChange
 from bemt.flight.next_flight import next_flight
 
 __all__ = [
-    "BUILD",
-    "FALSE_ALARM",
-    "IN_FLIGHT",
-    "RULES",
-    "BesideBalance",
-    "FlightEvidence",
-    "FlightQuery",
-    "FlightVerdict",
-    "judge",
-    "weighed",
-]
+    "BUILD", "FALSE_ALARM", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery", "FlightVerdict",
+    "judge", "weighed",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 

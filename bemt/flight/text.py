@@ -139,7 +139,8 @@ def headline(j: FlightVerdict) -> str:
     said = j.said
     found = j.found.get(said.leading)
     size = ""
-    if found is not None and found.size and said.rule != IN_FLIGHT:
+    sized = said.rule != IN_FLIGHT and any(i in said.leading for i in said.effects)
+    if found is not None and found.size and sized:
         size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
     if said.rule == BESIDE_IT:
         return f"Cause found: {said.effects[0]}{size}. Possibly also: {' or '.join(said.effects[1:])}"
