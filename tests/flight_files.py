@@ -141,7 +141,8 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
 def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0) -> bytes:
     """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery.
 
-    With the number of an airframe it is one of before the allocation: pulse widths, and no speeds.
+    With the number of an airframe it is one of before the allocation: pulse widths, and no speeds; below zero, of the
+    allocation, with motor 1 at the last output.
     """
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
 
@@ -170,8 +171,11 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
     for i, (angle, turn, _) in enumerate(placed):
         params += [(f"CA_ROTOR{i}_PX", 0.2 * np.cos(angle)), (f"CA_ROTOR{i}_PY", -0.2 * np.sin(angle)),
                    (f"CA_ROTOR{i}_KM", 0.05 * turn)]  # fmt: skip
-    if airframe:
-        params = [("SYS_AUTOSTART", airframe), ("PWM_MIN", 1075), ("PWM_MAX", 1950)]
+    if airframe > 0:
+        params = [("SYS_AUTOSTART", airframe)]
+    elif airframe:
+        params += [(f"PWM_MAIN_FUNC{B - i}", 101 + i) for i in range(B)]
+    params += [("PWM_MIN", 1075), ("PWM_MAX", 1950)]
     for name, value in params:
         key = f"float {name}".encode()
         message("P", bytes([len(key)]) + key + struct.pack("<f", value))
@@ -190,7 +194,8 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
         us = round(1e6 * s) + 1_000_000
         there = command[k] if height[k] > 0.0 else 0.0 * command[k]
         if airframe:
-            put("actuator_outputs", "QI16f", us, 16, *(1075.0 + 875.0 * there), *[900.0] * (16 - B))
+            pulses = 1075.0 + 875.0 * there[:: np.sign(airframe)]
+            put("actuator_outputs", "QI16f", us, 16, *pulses, *[900.0] * (16 - B))
         else:
             put("actuator_motors", "Q12f", us, *there, *gap)
         put("vehicle_attitude", "Q4f", us, 1.0, 0.0, 0.0, 0.0)

@@ -240,6 +240,32 @@ def test_betaflight_tables_keep_each_rotor(rotors: int, tmp_path: Path) -> None:
     assert log.t[1] == pytest.approx(0.004) and log.command[0, 0] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize("quote", ['"', "", " "], ids=["explorer", "plain", "decode"])
+def test_betaflight_headings_of_each_tool(quote: str, tmp_path: Path) -> None:
+    """Quoted names with rows of settings before them, as the explorer exports; or blanks, as blackbox_decode does."""
+    around = ("", " ") if quote == " " else (quote, quote)
+
+    def row(*cells: object) -> str:
+        return ",".join(f"{around[0]}{c}{around[1]}" for c in cells)
+
+    time = "time (us)" if quote == " " else "time"
+    names = [f"{stem}[{i}]" for stem in ("motor", "eRPM") for i in range(4)]
+    lines = (
+        [row("motor_poles", 14), row("motorOutput", "158,2047"), row("yaw_motors_reversed", 1)] if quote == '"' else []
+    )
+    lines.append(row("loopIteration", time, *names, "vbatLatest"))
+    lines += [f"{k},{k * 2000},{','.join(str(900 + i + k % 3) for i in range(4))},2000,2000,2000,2000,15.9"
+              for k in range(400)]  # fmt: skip
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    log = read_log(tmp_path / "log.csv")
+    assert log.command is not None and log.t[1] == pytest.approx(0.002)
+    if quote == '"':
+        assert log.layout == "betaflight-x-rev" and log.rpm is not None
+        assert log.rpm[0, 0] == pytest.approx(200000 / 7) and log.command[0, 0] == pytest.approx((900 - 158) / 1889)
+    else:
+        assert log.layout == "betaflight-x" and log.rpm is None, "no poles, no speed"
+
+
 def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Text, JSON, picture, exit codes."""
     before = [str(p) for p in sorted(flights.glob("before_*"))]

@@ -61,9 +61,9 @@ def test_damage_is_found_at_its_motor(kind: str, layout: str, tmp_path: Path) ->
     assert got.judged.accused <= 1 and got.found.constants["thrust constant"].unit == "N/rpm^2"
 
 
-@pytest.mark.parametrize(("airframe", "layout"), [(4001, "quad-x"), (6001, "hexa-x"), (8001, "octo-x"), (12001, "x8")])
+@pytest.mark.parametrize(("airframe", "layout"), [(4001, "quad-x"), (6001, "hexa-x"), (12001, "x8"), (-1, "octo-x")])
 def test_pulse_widths_of_an_airframe(airframe: int, layout: str, tmp_path: Path) -> None:
-    """A PX4 log of before the control allocation: the layout is that of the airframe, no speeds are made up."""
+    """PX4 logs without actuator_motors: layout by airframe or allocation, outputs by function, no speeds made up."""
     flights = [Hover(layout, seconds=12.0, seed=k) for k in range(4)]
     cut = Hover(layout, seconds=12.0, seed=9, loss=((flights[0].rotors - 1, 0.25),))
     logs = [read(tmp_path, "px4", flight, airframe=airframe) for flight in (*flights, cut)]

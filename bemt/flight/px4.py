@@ -108,7 +108,8 @@ def _made(name: str, found: Any) -> FlightLog:
     params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
     if command is None:
-        command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
+        there = _numbered(tables, "actuator_outputs", "output")
+        command, unit = _active(take("actuator_outputs", _assigned(params, there) or there)), "us"
         low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
         if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
             command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
@@ -147,6 +148,16 @@ def _made(name: str, found: Any) -> FlightLog:
     main = "command" if command else "rpm" if speeds else "acceleration"
     raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
     return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends)
+
+
+def _assigned(params: dict[str, float], there: list[str]) -> list[str]:
+    """Outputs in the order of the motors, by the functions of the port that has most of them (101 is motor 1)."""
+    ports = []
+    for port in ("MAIN", "AUX"):
+        motors = {int(v): n for n in range(16) if 101.0 <= (v := params.get(f"PWM_{port}_FUNC{n + 1}", 0.0)) <= 112.0}
+        ports.append([f"output[{n}]" for _, n in sorted(motors.items())])
+    found = max(ports, key=len)
+    return found if set(found) <= set(there) else []
 
 
 def _escs(data: dict[str, Array], B: int) -> list[int]:

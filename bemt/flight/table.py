@@ -84,7 +84,7 @@ def read(path: Path) -> FlightLog:
 
 def _label(heading: str) -> str:
     """Heading without its unit."""
-    return re.sub(r"\s*\(.*\)$", "", heading).strip()
+    return re.sub(r"\s*\(.*\)\s*$", "", heading).strip()
 
 
 def _frame(rows: BinaryIO) -> pd.DataFrame:
