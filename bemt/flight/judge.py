@@ -240,7 +240,7 @@ def _another(a: FlightQuery) -> Decision | None:
     if len(lead) != 1 or a.share((lead,)) < NAMED or a.same or not a.partners:
         return None
     (name,) = lead
-    why = f"{name} is present; whether another effect is also present is left open"
+    why = "the first is present; whether another is also present is left open"
     return a.says("class", why, (lead,), a.partners, sets=((name,), a.partners))
 
 
@@ -279,8 +279,10 @@ def _alike(a: FlightQuery) -> Decision | None:
     members = a.as_good[:LARGEST]
     if a.leading.pair or a.share(members) < SURE:
         return None
-    well = a.same or all(a.P[e] > RARE * a.P[a.leading] for e in members)
+    well = all(a.P[e] > RARE * a.P[a.leading] for e in members)
     why = "these explain the balance nearly as well" if well else "the first is likely, but not sure enough for a name"
+    if a.same:
+        why = "a weight between two rotors and damage to both of them load the body alike"
     more = tuple(i for i in a.partners if all(i not in e for e in members))
     return a.says("class", why, members, more)
 

@@ -33,13 +33,14 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) 
     """
     motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
     others = [i for i in said.effects if not i.startswith(BLADE)]
-    looked = f"look at the propeller of motor {' and '.join(map(str, motors))}"
+    several = "s" if len(motors) > 1 else ""
+    looked = f"look at the propeller{several} of motor{several} {' and '.join(map(str, motors))}"
     text, kind = "no further flight is needed", ""
     if said.verdict == "none":
         text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
     elif said.effects[:1] == (WIND,):
         text, kind = _HOVER, "run"
-    elif given < 3:
+    elif given < 3 and said.verdict != "named":
         text, kind = "three or more healthy flights of this vehicle, in still air, with --healthy", "reference"
         if motors:
             text = f"{looked}, and give {text}"
@@ -54,7 +55,7 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) 
         text, kind = f"{looked}; if it looks right, exchange it {swap} and fly again: damage moves with it, a weight " \
                      "stays", "run"  # fmt: skip
     elif motors:
-        text, kind = f"{looked} and replace it; the next flight should be within the healthy ones", "look"
+        text, kind = f"{looked} and replace what is damaged; the next flight should be within the healthy ones", "look"
     elif any(i.startswith(WEIGHT) for i in others):
         text, kind = "look where battery and payload sit", "look"
     elif others:

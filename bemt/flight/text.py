@@ -143,7 +143,7 @@ def headline(j: FlightVerdict) -> str:
     if found is not None and found.size and sized:
         size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
     if said.rule == BESIDE_IT:
-        return f"Cause found: {said.effects[0]}{size}. Possibly also: {' or '.join(said.effects[1:])}"
+        return f"Cause found: {said.effects[0]}{size}; possibly also {' or '.join(said.effects[1:])}"
     words = {
         "none": "No cause found",
         "named": f"Cause found: {' and '.join(said.effects)}{size}",
@@ -157,5 +157,5 @@ def headline(j: FlightVerdict) -> str:
 def _open(said: Decision) -> str:
     """Members of a class; of two at work, each with its look-alikes."""
     if len(said.sets) > 1:
-        return " with ".join(" or ".join(s) for s in said.sets)
-    return ", ".join(said.effects)
+        return "; with one of: ".join(" or ".join(s) for s in said.sets)
+    return " or ".join(said.effects)
