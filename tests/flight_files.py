@@ -34,6 +34,7 @@ class Hover:
     loss: tuple[tuple[int, float], ...] = ()  # motor (0 is the first), share of k that is lost
     loss_from_s: float = 0.0
     unbalanced: tuple[int, float] | None = None  # motor, amplitude [m/s2]
+    battery: float = 1.0  # command at equal thrust
 
     @property
     def rotors(self) -> int:
@@ -58,10 +59,10 @@ class Hover:
             here = np.all(strength == row, axis=1)
             back = np.linalg.pinv(A)
             command[here] = (back @ np.linalg.solve(A * np.array(row) @ back, A @ thrust[0])).T
-        command = command / (k * self.full_rpm**2)
+        command = self.battery * command / (k * self.full_rpm**2)
         slow = np.sin(2.0 * np.pi * t[:, None] * rng.uniform(0.2, 1.0, 4) + rng.uniform(0.0, 6.0, 4))
         command = command * (1.0 + 0.01 * slow @ A / 2.0 + 0.004 * rng.normal(size=command.shape))
-        return command, self.full_rpm * np.sqrt(command)
+        return command, self.full_rpm * np.sqrt(command / self.battery)
 
     def acceleration(self, t: Array) -> Array:
         """Specific force, z up, (N, 3): noise, and the rotor that shakes."""
@@ -137,8 +138,12 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
     return bytes(out)
 
 
-def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False) -> bytes:
-    """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery."""
+def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0) -> bytes:
+    """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery.
+
+    With the number of an airframe it is one of before the allocation: pulse widths, and no speeds; below zero, of the
+    allocation, with motor 1 at the last output.
+    """
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
 
     def message(kind: str, body: bytes) -> None:
@@ -148,6 +153,7 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False) -> bytes:
     B = flight.rotors
     shapes = {
         "actuator_motors": "uint64_t timestamp;float[12] control;",
+        "actuator_outputs": "uint64_t timestamp;uint32_t noutputs;float[16] output;",
         "esc_status": "uint64_t timestamp;esc_report[8] esc;",
         "esc_report": "int32_t esc_rpm;float esc_current;uint8_t actuator_function;",
         "sensor_combined": "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;",
@@ -165,6 +171,11 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False) -> bytes:
     for i, (angle, turn, _) in enumerate(placed):
         params += [(f"CA_ROTOR{i}_PX", 0.2 * np.cos(angle)), (f"CA_ROTOR{i}_PY", -0.2 * np.sin(angle)),
                    (f"CA_ROTOR{i}_KM", 0.05 * turn)]  # fmt: skip
+    if airframe > 0:
+        params = [("SYS_AUTOSTART", airframe)]
+    elif airframe:
+        params += [(f"PWM_MAIN_FUNC{B - i}", 101 + i) for i in range(B)]
+    params += [("PWM_MIN", 1075), ("PWM_MAX", 1950)]
     for name, value in params:
         key = f"float {name}".encode()
         message("P", bytes([len(key)]) + key + struct.pack("<f", value))
@@ -181,10 +192,15 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False) -> bytes:
     gap = [float("nan")] * (12 - B)
     for k, s in enumerate(t):
         us = round(1e6 * s) + 1_000_000
-        put("actuator_motors", "Q12f", us, *(command[k] if height[k] > 0.0 else 0.0 * command[k]), *gap)
+        there = command[k] if height[k] > 0.0 else 0.0 * command[k]
+        if airframe:
+            pulses = 1075.0 + 875.0 * there[:: np.sign(airframe)]
+            put("actuator_outputs", "QI16f", us, 16, *pulses, *[900.0] * (16 - B))
+        else:
+            put("actuator_motors", "Q12f", us, *there, *gap)
         put("vehicle_attitude", "Q4f", us, 1.0, 0.0, 0.0, 0.0)
         put("vehicle_local_position", "Q6f", us, 0.0, 0.0, -height[k], 0.0, 0.0, 0.0)
-        if k % 5 == 0:
+        if k % 5 == 0 and not airframe:
             order = list(reversed(range(B)))  # the controllers are wired the other way round
             escs = [v for i in order for v in (int(rpm[k, i]), 5.0, 101 + i)] + [0, 0.0, 0] * (8 - B)
             put("esc_status", "Q" + "ifB" * 8, us, *escs)

@@ -114,10 +114,18 @@ def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, 
     case = rotor_of(args.case).case
     found = learn_from_flights(case, args.logs, [a.found for a in answers])
     written = write(case, found, args.logs, args.out_case, NAME, "--out-case")
-    folder = Path(args.out_case).as_posix()
-    lines = [text(document(case, found, args.logs)), f"{folder}: {', '.join(written)}"]
+    folder = shlex.quote(Path(args.out_case).as_posix())
+    said = document(case, found, args.logs) | {"recommended_airspeed_m_s": None}  # a stand's advice
     code = EXIT_OK if found.found.converged else EXIT_UNCONVERGED
-    return "\n".join([*lines, f"next: bemt sweep {shlex.quote(folder)}"]), code
+    again = f"bemt fly {shlex.quote(args.logs[0])} --mass {args.mass:g} --case {folder}"
+    lines = [
+        text(said),
+        "These flights show the rotor at hover alone; for torque and fast flight add a stand or tunnel run.",
+        f"{folder}: {', '.join(written)}",
+        f"next: bemt sweep {folder}",
+        f"      {again}",
+    ]
+    return "\n".join(lines), code
 
 
 def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:

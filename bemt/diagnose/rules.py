@@ -5,7 +5,7 @@ Nothing alters a verdict after the list. The docstring of a rule says where it c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -77,7 +77,7 @@ class Rule:
     """
 
     name: str
-    ask: Callable[[VerdictQuery], Decision | None]
+    ask: Callable[[Any], Decision | None]
     threshold: str = ""
     revises: bool = False
 
@@ -103,13 +103,14 @@ def _rule(name: str, threshold: str = "", revises: bool = False) -> Callable[[_A
     return append
 
 
-def decide(query: VerdictQuery) -> Decision:
-    """Go through the list."""
-    for rule in RULES:
+def decide(query: Any, rules: Sequence[Rule] = RULES) -> Decision:
+    """Go through a list, of this judge or of one that asks of other readings; `query` has `said` and `steps`."""
+    for rule in rules:
         if rule.revises == (query.said is not None) and (answer := rule.ask(query)) is not None:
             query.steps.append(replace(answer, rule=rule.name))
-    assert query.said is not None, "the last rule that does not revise always holds"
-    return query.said
+    said: Decision | None = query.said
+    assert said is not None, "the last rule that does not revise always holds"
+    return said
 
 
 def _leaves_its_range(a: VerdictQuery) -> bool:

@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
+from bemt.diagnose.explanation import NONE
+from bemt.diagnose.suggest import Suggestion
+from bemt.diagnose.verdict import Decision
+from bemt.flight.balance import axes_of, features
 from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
 from bemt.flight.inflow import Inflow, inflow
-from bemt.flight.judge import FALSE_ALARM, FlightVerdict, axes_of, features, judge
+from bemt.flight.judge import FALSE_ALARM, BesideBalance, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.motor_speed import speed_changes
@@ -122,8 +126,13 @@ class FlightAnswer:
             "mass_kg": None if self.mass is None else asdict(self.mass),
             "baseline": None if said is None else
                 {"thrust_constant": said.constant, "u": said.u, "unit": "N/rpm^2"},
-            "decision": {"verdict": j.verdict, "effects": list(j.effects), "why": j.why, "rule": j.rule},
-            "explanations": [asdict(e) for e in j.explanations],
+            "decision": {"verdict": j.said.verdict, "effects": list(j.said.effects),
+                         "probability": j.said.probability, "sets": [list(s) for s in j.said.sets],
+                         "p_value": j.p_value, "left_over": j.said.left_over, "why": j.said.why,
+                         "rule": j.said.rule},
+            "ranking": [{"effect": str(e), "probability": p, **(asdict(j.found[e]) if e in j.found else {})}
+                        for e, p in sorted(j.probability.items(), key=lambda kv: -kv[1])[:12]],
+            "next_measurement": j.next.document(),
             "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95)},
             "visible": j.visible,
             "share_change": j.readings.tolist(),
@@ -196,21 +205,29 @@ def answer_on(
         log = replace(log, layout=layout)
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
     found, air = identify(log, mass_kg), wind(log, healthy)
-    mine = features(log)
+    shake, calm = vibration(log), [vibration(h) for h in healthy]
+    moved, turned = shaken(shake, calm), speed_changes(log, healthy)
+    mine, changed = features(log), change_in(log, placed)
     if mine is None:
-        judged = FlightVerdict("insufficient", (), "the log shows no flight with all motors running", (), np.zeros(0))
+        why = "the log shows no flight with all motors running"
+        said = Decision("insufficient", (), NONE, 1.0, float("nan"), (), why, "no flight")
+        step = "log a flight of 10 s or more with the commands of the motors"
+        judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
     else:
-        calm_ones = [x for h in healthy if (x := features(h)) is not None]
-        judged = judge(mine, calm_ones, placed, false_alarm, _windy(log, healthy, air))
+        kept = [(x, k) for k, h in enumerate(healthy) if (x := features(h)) is not None]
+        upset = [bool(shaken(calm[k], [*calm[:k], *calm[k + 1 :]])) or change_in(healthy[k], placed) is not None
+                 for _, k in kept]  # fmt: skip
+        beside = BesideBalance(
+            tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
+            tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
+        )  # fmt: skip
+        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), beside)
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
         same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
         known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
         if known:
             mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
-    shake, calm = vibration(log), [vibration(h) for h in healthy]
-    moved = shaken(shake, calm)
-    judged = _with_vibration(judged, moved, calm)
     balance: tuple[float, ...] = ()
     limited: tuple[float, ...] = ()
     if mine is not None and placed is not None:
@@ -218,8 +235,8 @@ def answer_on(
     if log.command is not None and log.command_unit == "1" and log.flying.any():
         limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
-        log, found, judged, air, balance, limited, change_in(log, placed), shake, moved,
-        speed_changes(log, healthy), inflow(log), mass, simulator=simulator_constants(log, found),
+        log, found, judged, air, balance, limited, changed, shake, moved,
+        turned, inflow(log), mass, simulator=simulator_constants(log, found),
     )  # fmt: skip
 
 
@@ -234,26 +251,6 @@ def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
     if air.speed > max(air.half, _BREEZE):
         return True
     return speed(log) > _BREEZE + max([speed(h) for h in healthy], default=0.0)
-
-
-def _with_vibration(
-    judged: FlightVerdict, moved: tuple[tuple[int, float, bool], ...], calm: Sequence[Vibration]
-) -> FlightVerdict:
-    """The verdict where the balance shows nothing and one rotor shakes more than in healthy flights."""
-    known = [(k, ratio) for k, ratio, by_healthy in moved if by_healthy]
-    if judged.verdict != "none" or len(known) != 1:
-        return judged
-    from scipy import stats
-
-    k, ratio = known[0]
-    accused = sum(bool(shaken(c, [*calm[:i], *calm[i + 1 :]])) for i, c in enumerate(calm))
-    accused = min(accused + judged.accused, judged.healthy)
-    interval = stats.binomtest(accused, judged.healthy).proportion_ci(method="exact")
-    why = f"it shakes {ratio:.1f} times as much as in healthy flights at its shaft frequency; the balance did not move"
-    which = f"motor {k + 1}" if k >= 0 else "a rotor"
-    effects = f"imbalance or tape, {which}", f"damaged blade, {which}"
-    return replace(judged, verdict="class", effects=effects, why=why, rule="vibration", accused=accused,
-                   rate95=(float(interval.low), float(interval.high)))  # fmt: skip
 
 
 def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Constant]], healthy_mass: float) -> Constant:

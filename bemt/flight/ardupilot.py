@@ -22,6 +22,7 @@ from numpy.lib.recfunctions import repack_fields
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
+from bemt.flight.layout import LAYOUTS
 from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 Array = NDArray[np.float64]
@@ -44,9 +45,11 @@ _FIRST = {"IMU": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("
 _FLIP = np.array([1.0, -1.0, -1.0])
 _FUNCTIONS = {**{33 + i: i for i in range(8)}, **{82 + i: 8 + i for i in range(4)}}
 _FRAMES = {
-    (1, 0): "quad-plus", (1, 1): "quad-x", (1, 3): "quad-h", (1, 12): "betaflight-x", (2, 0): "hexa-plus",
-    (2, 1): "hexa-x", (3, 0): "octo-plus", (3, 1): "octo-x", (4, 0): "x8-plus", (4, 1): "x8", (4, 14): "x8-cw",
-    (5, 0): "y6", (5, 1): "y6",
+    (1, 0): "quad-plus", (1, 1): "quad-x", (1, 2): "quad-x", (1, 3): "quad-h", (1, 12): "betaflight-x",
+    (1, 13): "quad-x-dji", (1, 14): "quad-x-cw", (1, 18): "betaflight-x-rev", (2, 0): "hexa-plus", (2, 1): "hexa-x",
+    (2, 13): "hexa-x-dji", (2, 14): "hexa-x-cw", (3, 0): "octo-plus", (3, 1): "octo-x", (3, 13): "octo-x-dji",
+    (3, 14): "octo-x-cw", (4, 0): "x8-plus", (4, 1): "x8", (4, 2): "x8", (4, 3): "x8-h", (4, 14): "x8-cw",
+    (5, 0): "y6", (5, 1): "y6", (5, 10): "y6b", (5, 11): "y6f", (12, 0): "dodeca-hexa-plus", (12, 1): "dodeca-hexa",
 }  # fmt: skip
 
 
@@ -218,7 +221,8 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     }
     B = len(channels)
     frame = (int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0)))
-    layout = _FRAMES.get(frame, "") if B == {1: 4, 2: 6, 3: 8, 4: 8, 5: 6}.get(frame[0], 0) else ""
+    layout = _FRAMES.get(frame, "")
+    layout = layout if layout and len(LAYOUTS[layout].split()) == B else ""
     main = "command" if command else "rpm" if speeds else "acceleration"
     raw = _bursts(found) or acceleration
     return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends)

@@ -13,14 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.thresholds import GATE
-from bemt.flight.judge import ALIKE, axes_of, directions
+from bemt.diagnose.thresholds import GATE, NAMED
+from bemt.flight.balance import axes_of, directions
 from bemt.flight.log import FlightLog
 
 __all__ = ["FlightChange", "change_in"]
 
 Array = NDArray[np.float64]
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
+_ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))  # chi squares that differ by less leave a name open
 _SMALL = 0.05  # a change below this is not worth a word [1]
 
 
@@ -96,7 +97,7 @@ def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
     if T[i] < bar or size < _SMALL or misfit[i] > 0.25 * float(z @ z):
         return None
     order = np.argsort(misfit)
-    alike = tuple(list(ways)[j] for j in order if T[j] > 0.0 and misfit[j] - misfit[i] < ALIKE)
+    alike = tuple(list(ways)[j] for j in order if T[j] > 0.0 and misfit[j] - misfit[i] < _ALIKE)
     return FlightChange(kind, at, alike, size, half)
 
 

@@ -60,8 +60,11 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     motors = "1234"
     command = many(*(f"motor.m{i}" for i in motors), factor=1 / 65535.0)
     command = command or many(*(f"pwm.m{i}_pwm" for i in motors), factor=1 / 65535.0)
+    command = command or many(*(f"motor.m{i}req" for i in motors), factor=1 / 65535.0)
     q = many(*(f"stateEstimate.q{a}" for a in "wxyz"))
     roll = many("stateEstimate.roll", "stateEstimate.pitch", factor=np.pi / 180.0)
+    roll = roll or many("stabilizer.roll", "stabilizer.pitch", factor=np.pi / 180.0)
+    packed = "stateEstimateZ"  # in millimetres
     axis = (q[0], thrust_axis(q[1])) if q else None
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
     sources = {
@@ -71,8 +74,10 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
         "upright": upright,
         "axis": axis,
-        "velocity": many(*(f"stateEstimate.v{a}" for a in "xyz")),
-        "position": many(*(f"stateEstimate.{a}" for a in "xyz")),
+        "velocity": many(*(f"stateEstimate.v{a}" for a in "xyz"))
+        or many(*(f"{packed}.v{a}" for a in "xyz"), factor=1e-3),
+        "position": many(*(f"stateEstimate.{a}" for a in "xyz"))
+        or many(*(f"{packed}.{a}" for a in "xyz"), factor=1e-3),
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
     }
     return joined(name, kind, sources, "command", raw=sources["acceleration"], layout="crazyflie", ends=ends)

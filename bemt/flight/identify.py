@@ -2,7 +2,7 @@
 
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
-Bands are from ten blocks of the flight (batch means, e.g. Law, Simulation Modeling and Analysis, ch. 9).
+Bands are from ten pieces of the flight (:mod:`bemt.flight.batches`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.units import G0
+from bemt.flight.batches import BATCHES, half_width, jackknifed
 from bemt.flight.log import FlightLog
 
 __all__ = ["Constant", "Identified", "identify"]
 
 Array = NDArray[np.float64]
-_BLOCKS, _APART = 10, 0.1  # a rotor's own constant is given when its half width is below this share [1]
+_APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
 
 @dataclass(frozen=True)
@@ -114,36 +115,27 @@ def _balance(log: FlightLog, on: NDArray[np.bool_], lift: Array) -> Constant | N
     """Momentum balance for unit mass."""
     if not np.all(np.isfinite(lift)) or lift.mean() <= 0.0:
         return None
-    t, gain = log.t[on], np.zeros(_BLOCKS)
-    parts = np.array_split(np.arange(t.size), _BLOCKS)
+    t, gain = log.t[on], np.zeros(BATCHES)
+    parts = np.array_split(np.arange(t.size), BATCHES)
     if log.velocity is not None:
         vz = log.velocity[on, 2]
         gain = np.array([(vz[p[-1]] - vz[p[0]]) / max(t[p[-1]] - t[p[0]], 1e-3) for p in parts])
     values = np.array([(G0 + a) / lift[p].mean() for p, a in zip(parts, gain, strict=True)])
     span = float(t[-1] - t[0])
     whole = 0.0 if log.velocity is None else float(log.velocity[on, 2][-1] - log.velocity[on, 2][0]) / max(span, 1e-3)
-    return Constant((G0 + whole) / float(lift.mean()), _half(values), "1")
-
-
-def _half(values: Array) -> float:
-    from scipy import stats
-
-    return float(stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))
+    return Constant((G0 + whole) / float(lift.mean()), half_width(values), "1")
 
 
 def _blocks(y: Array, of: Callable[[Array], np.floating], unit: str) -> Constant:
-    return Constant(float(of(y)), _half(np.array([of(b) for b in np.array_split(y, _BLOCKS)])), unit)
+    return Constant(float(of(y)), half_width([of(b) for b in np.array_split(y, BATCHES)]), unit)
 
 
 def _regress(X: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares, with half widths of 95 % from the blocks."""
+    """Least squares, with half widths of 95 %."""
     from scipy import stats
 
-    whole: Array = np.linalg.lstsq(X, y, rcond=None)[0].astype(float)
-    parts = [np.linalg.lstsq(X[p], y[p], rcond=None)[0] for p in np.array_split(np.arange(y.size), _BLOCKS)]
-    spread = np.std(parts, axis=0, ddof=1)
-    half: Array = float(stats.t.ppf(0.975, _BLOCKS - 1)) * spread / np.sqrt(_BLOCKS)
-    return whole, half
+    whole, u = jackknifed(X, y)
+    return whole, float(stats.t.ppf(0.975, BATCHES - 1)) * u
 
 
 def _per_rotor(

@@ -3,8 +3,7 @@
 The specific force along the thrust axis over the sum of squared speeds is regressed, as a logarithm, on V_axial / n and
 (V_inplane / n)^2, n in turns a second: linear and even in the flow, as blade elements in oblique flow are to first
 order (:mod:`bemt.bem.oblique`). The velocity is that over the ground: calm air. Lift and drag of the body along the
-axis count as the rotors' own. Bands: delete-a-group jackknife of ten pieces (Kott, J. Official Statistics 17, 2001; not
-checked there).
+axis count as the rotors' own. Bands are from ten pieces of the flight (:mod:`bemt.flight.batches`).
 """
 
 from __future__ import annotations
@@ -14,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.flight.batches import BATCHES, jackknifed
 from bemt.flight.log import FlightLog
 
 __all__ = ["Inflow", "inflow"]
 
 Array = NDArray[np.float64]
-_BLOCKS, _BINS, _LEAST_M_S = 10, 7, 0.5  # pieces; bins of the picture; least span of a velocity [m/s]
+_BINS, _LEAST_M_S = 7, 0.5  # bins of the picture; least span of a velocity [m/s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +82,8 @@ def inflow(log: FlightLog) -> Inflow | None:
     X = X * moves
     size = np.maximum(np.abs(X).max(axis=0), 1e-12)
     X = X / size
-
-    def fitted(keep: NDArray[np.bool_]) -> Array:
-        out: Array = np.linalg.lstsq(X[keep], y[keep], rcond=None)[0]
-        return out
-
-    every = np.ones(n.size, dtype=bool)
-    whole, parts = fitted(every), []
-    for p in np.array_split(np.arange(n.size), _BLOCKS):
-        keep = every.copy()
-        keep[p] = False
-        parts.append(fitted(keep))
-    sd = np.sqrt((_BLOCKS - 1) * np.mean((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
-    half = float(stats.t.ppf(0.975, _BLOCKS - 1)) * sd
+    whole, sd = jackknifed(X, y)
+    half = float(stats.t.ppf(0.975, BATCHES - 1)) * sd
     rest = y - X @ whole
     return Inflow(
         (float(whole[0]), float(half[0])) if moves[0] else None,
@@ -110,6 +99,6 @@ def _binned(x: Array, y: Array) -> Array:
     """Means of bins of equal width, with the standard deviation of a mean of as many independent pieces."""
     edges = np.linspace(x.min(), x.max() + 1e-9, _BINS + 1)
     which = np.digitize(x, edges) - 1
-    out = [(x[which == k].mean(), y[which == k].mean(), y[which == k].std() / np.sqrt(_BLOCKS))
+    out = [(x[which == k].mean(), y[which == k].mean(), y[which == k].std() / np.sqrt(BATCHES))
            for k in range(_BINS) if np.sum(which == k) > 10]  # fmt: skip
     return np.array(out).reshape(-1, 3).T

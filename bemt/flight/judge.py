@@ -1,17 +1,13 @@
-"""What is wrong with a flight, beside healthy ones: a rigid body that flies steadily balances its loads.
+"""What is wrong with a flight: the judge of :mod:`bemt.diagnose` on the balance of a body in the air.
 
-A rotor that lost thrust at equal drive is driven harder until the loads balance again; of all commands that the mixer
-can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor e_k itself: one rotor, and so roll,
-pitch, yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw:
-A+ diag(1, 1, 0, 1) A e_k.
+Its decision, prior, thresholds, words and way of asking (one ordered list, the first that holds answers, the last ones
+may revise it) are those of the diagnosis; the signatures are those of :mod:`bemt.flight.balance`.
 
-Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share
-the trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 of a reading is the healthy flights' own, pooled with
-that of all readings and of other vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed.,
-section 2.6); w is that of :mod:`bemt.flight.population` and hardly matters once there is a healthy flight. How much the
-readings share was chosen by the log score of left-out healthy flights of three vehicles (docs/flight_logs.md).
+The evidence of a cause is Student's density of what it leaves, at the size that fits best, times the share of the
+sizes that fit as well (Laplace's approximation; MacKay, Information Theory, Inference and Learning Algorithms, ch. 28;
+not checked there). That of something unlisted has sizes of its own in roll, pitch and yaw.
 
-The bar is the quantile of the largest statistic over all causes when a healthy flight is drawn from that prediction, so
+The gate is the p-value of the largest statistic over all causes when a healthy flight is drawn from its prediction, so
 many causes are paid for once, by what they have in common (max-T; Westfall and Young, Resampling-Based Multiple
 Testing, 1993).
 """
@@ -19,71 +15,365 @@ Testing, 1993).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.thresholds import EARNED, GATE, NAMED
-from bemt.flight.layout import effect_matrix
-from bemt.flight.log import FlightLog
-from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
+from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.prior import LEFT_OUT, log_priors
+from bemt.diagnose.rules import Rule, decide
+from bemt.diagnose.suggest import Suggestion
+from bemt.diagnose.thresholds import (
+    EARNED,
+    GATE,
+    LARGEST,
+    LEFT_OVER,
+    LIKE,
+    MOST,
+    NAMED,
+    NEAR,
+    RARE,
+    SMALL,
+    SURE,
+)
+from bemt.diagnose.verdict import BESIDE_IT, CLAIMS, Decision, credible_sets
+from bemt.flight.balance import BLADE, WEIGHT, WIND, axes_of, blade, directions, healthy_flight
+from bemt.flight.change import FlightChange
+from bemt.flight.next_flight import next_flight
 
 __all__ = [
-    "ALIKE",
-    "WIND",
-    "FALSE_ALARM",
-    "FlightEvidence",
-    "FlightVerdict",
-    "axes_of",
-    "directions",
-    "features",
-    "judge",
-]
+    "BUILD", "FALSE_ALARM", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery", "FlightVerdict",
+    "judge", "weighed",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
 FALSE_ALARM = GATE
 """Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
-ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
-"""Explanations whose chi squares differ by less cannot be told apart: the odds at which the diagnosis gives a name."""
+BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
+IN_FLIGHT = "a change within the flight"
+"""Rule whose size is that of the change, not of the whole flight."""
 _LEAST = 3  # healthy flights from which a cause is named
-_COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
-WIND = "wind or forward flight"
-_DRAWS = 10_000
 _ALONG = 100.0  # condition number from which two rotors load the body along one line
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
-_BUILD, _WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
+_POSITIVE = 1.0  # log odds from which evidence is positive (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995) [1]
+_LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforehand: beyond, a motor has no more [1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class FlightEvidence:
-    """One explanation: its direction in the readings, its size and misfit."""
+    """One explanation: how the readings have it.
 
-    cause: str
-    size: float  # change of that rotor's drive [1]
-    half: float  # half width of its 95 % interval [1]
-    t: float  # size over its standard deviation [1]
-    chi2: float  # misfit that remains [1]
+    Attributes
+    ----------
+    size, half : float
+        Change of that rotor's drive (of two, of the smaller one), and half the width of its 95 % interval [1].
+    t, chi2 : float
+        Size over its standard deviation; misfit that remains [1].
+    log_bayes : float
+        Natural logarithm of the odds over nothing, before the prior [1].
+    """
+
+    size: float
+    half: float
+    t: float
+    chi2: float
+    log_bayes: float
+
+
+@dataclass(frozen=True)
+class BesideBalance:
+    """What else the log shows of the rotors.
+
+    Attributes
+    ----------
+    faster, slower, shaken : tuple of int
+        Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor.
+    change : FlightChange or None
+        A change of the balance within the flight.
+    healthy : tuple of bool
+        Of each healthy flight, whether a rotor shakes or the balance changes within it.
+    """
+
+    faster: tuple[int, ...] = ()
+    slower: tuple[int, ...] = ()
+    shaken: tuple[int, ...] = ()
+    change: FlightChange | None = None
+    healthy: tuple[bool, ...] = ()
+
+
+@dataclass(eq=False)
+class FlightQuery:
+    """What the rules ask of a flight.
+
+    Attributes
+    ----------
+    found : dict of Explanation to FlightEvidence
+        All that is listed.
+    P : dict of Explanation to float
+        Their probabilities, with those of nothing and of something unlisted [1].
+    log_bayes : dict of Explanation to float
+        Log odds over nothing, of these [1].
+    p_value, alarm : float
+        Share of healthy flights that look as bad, and the one that is accepted [1].
+    given : int
+        Healthy flights to compare with.
+    beside : BesideBalance
+        What else the log shows.
+    steps : list of Decision
+        Answers of the rules so far, the last one in force.
+    """
+
+    found: dict[Explanation, FlightEvidence]
+    P: dict[Explanation, float]
+    log_bayes: dict[Explanation, float]
+    p_value: float
+    alarm: float
+    given: int
+    beside: BesideBalance = field(default_factory=BesideBalance)
+    steps: list[Decision] = field(default_factory=list)
+
+    @property
+    def said(self) -> Decision | None:
+        """Answer so far."""
+        return self.steps[-1] if self.steps else None
+
+    @property
+    def few(self) -> bool:
+        """Whether there are too few healthy flights for a name."""
+        return self.given < _LEAST
+
+    @property
+    def leading(self) -> Explanation:
+        """Likeliest listed explanation; a pair only where it earned its second member."""
+        first = max(self.found, key=lambda e: self.P[e])
+        single = max((e for e in self.found if not e.pair), key=lambda e: self.P[e])
+        earned = first.pair and self.log_bayes[first] - self.log_bayes[single] >= EARNED
+        return first if earned else single
+
+    @property
+    def same(self) -> tuple[Explanation, ...]:
+        """Pairs of damaged rotors that the balance cannot tell from a leading weight: two that turn against each other.
+
+        The law makes them alike, so their prior does not decide.
+        """
+        lead = self.leading
+        if not any(name.startswith(WEIGHT) for name in lead):
+            return ()
+        alike = [e for e, v in self.found.items() if e.pair and v.chi2 <= self.found[lead].chi2 and v.t > 2.0]
+        return tuple(sorted(alike, key=lambda e: -self.P[e])[:MOST])
+
+    @property
+    def partners(self) -> tuple[str, ...]:
+        """Rotors one of which may be damaged beside the leading one, likeliest first."""
+        lead = self.leading
+        least = self.log_bayes[lead] + _POSITIVE
+        both = {e: self.P[e] for e in self.found if e.pair and lead.ids < e.ids and self.log_bayes[e] >= least}
+        ranked = sorted(both, key=lambda e: -both[e])
+        kept = [e for e in ranked if both[e] >= LIKE * both[ranked[0]]][:MOST]
+        return tuple(name for e in kept for name in e.ids - lead.ids)
+
+    @property
+    def as_good(self) -> tuple[Explanation, ...]:
+        """The leading explanation and those that are as good, or the next one where none is, likeliest first."""
+        lead = self.leading
+        least, low = RARE * self.P[lead], self.log_bayes[lead] - NEAR
+        rest = sorted((e for e in self.found if e != lead and e.pair == lead.pair), key=lambda e: -self.P[e])
+        near = (*(e for e in rest if self.P[e] > least and self.log_bayes[e] > low), *self.same)
+        return (lead, *(near or rest[:1]))
+
+    def says(
+        self, verdict: str, why: str, of: Sequence[Explanation] = (), more: tuple[str, ...] = (),
+        sets: tuple[tuple[str, ...], ...] = (),
+    ) -> Decision:  # fmt: skip
+        """Decision that gives the effects of some explanations, and more."""
+        lead = of[0] if of else self.leading if verdict != "none" else NONE
+        names = tuple(dict.fromkeys(i for e in of for i in e)) + more
+        chance = self.share(of) if of else self.P[NONE] if verdict == "none" else self.P[lead]
+        rest = self.log_bayes[UNKNOWN] - self.log_bayes[lead]
+        return Decision(verdict, names, lead, chance, rest, (), why, sets=sets)
+
+    def share(self, of: Sequence[Explanation]) -> float:
+        """Probability of some explanations among those of their kind, once something moved."""
+        lead = self.leading
+        kind = [e for e in self.found if lead.pair or not e.pair or e in of]
+        return sum(self.P[e] for e in of) / sum(self.P[e] for e in kind)
+
+
+def _within(a: FlightQuery) -> Decision | None:
+    """DIAGNOSIS 2.3: the p-value of the gate."""
+    if a.p_value <= a.alarm or a.few:
+        return None
+    return a.says("none", "no more than healthy flights differ")
+
+
+def _few_and_within(a: FlightQuery) -> Decision | None:
+    """Declared: without healthy flights of one vehicle nobody knows its trim."""
+    if a.p_value <= a.alarm:
+        return None
+    why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
+    return a.says("insufficient", why)
+
+
+def _few(a: FlightQuery) -> Decision | None:
+    """The same."""
+    if not a.few:
+        return None
+    why = "more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
+    left = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading] > LEFT_OVER
+    return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
+
+
+def _rest(a: FlightQuery) -> Decision | None:
+    """As of a smooth rest in the diagnosis: a small share of what is explained is a detail of it."""
+    rest = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading]
+    if rest <= max(LEFT_OVER, SMALL * a.log_bayes[a.leading]):
+        return None
+    return a.says("unknown", "the balance moved, but not as one or two rotors or one weight move it")
+
+
+def _another(a: FlightQuery) -> Decision | None:
+    """As in the diagnosis: one is sure, another may be there."""
+    lead = a.leading
+    if len(lead) != 1 or a.share((lead,)) < NAMED or a.same or not a.partners:
+        return None
+    (name,) = lead
+    why = "the first is present; whether another is also present is left open"
+    return a.says("class", why, (lead,), a.partners, sets=((name,), a.partners))
+
+
+def _one(a: FlightQuery) -> Decision | None:
+    """As of a name in the diagnosis."""
+    lead = a.leading
+    if len(lead) != 1 or a.share((lead,)) < NAMED or a.same:
+        return None
+    return a.says("named", "one cause explains the balance, the others do not", (lead,), sets=(tuple(lead),))
+
+
+def _both(a: FlightQuery) -> Decision | None:
+    """The same, of two: they are tried as one explanation, so their probability is that of both."""
+    lead = a.leading
+    if not lead.pair or a.share((lead,)) < NAMED:
+        return None
+    why = "no single cause explains the balance; two damaged rotors do"
+    return a.says("named", why, (lead,), sets=tuple((i,) for i in lead))
+
+
+def _two(a: FlightQuery) -> Decision | None:
+    """As of two at work in the diagnosis: a set for each."""
+    lead = a.leading
+    if not lead.pair:
+        return None
+    sets = credible_sets(a.P, lead)
+    inside = [e for e in a.found if e.pair and any(e == Explanation.of(i, j) for i in sets[0] for j in sets[1])]
+    if a.share(inside) < SURE:
+        return None
+    of = sorted(inside, key=lambda e: -a.P[e])
+    return a.says("class", "two damaged rotors, each with look-alikes", of, sets=sets)
+
+
+def _alike(a: FlightQuery) -> Decision | None:
+    """As of look-alikes in the diagnosis."""
+    members = a.as_good[:LARGEST]
+    if a.leading.pair or a.share(members) < SURE:
+        return None
+    well = all(a.P[e] > RARE * a.P[a.leading] for e in members)
+    why = "these explain the balance nearly as well" if well else "the first is likely, but not sure enough for a name"
+    if a.same:
+        why = "a weight between two rotors and damage to both of them load the body alike"
+    more = tuple(i for i in a.partners if all(i not in e for e in members))
+    return a.says("class", why, members, more)
+
+
+def _many(a: FlightQuery) -> Decision | None:
+    """The rest."""
+    return a.says("insufficient", "several different explanations are possible")
+
+
+def _speed(a: FlightQuery) -> Decision | None:
+    """By definition: of the causes that look alike in the balance a damaged blade alone unloads its motor."""
+    said = a.steps[-1]
+    turned = [blade(k) for k in a.beside.faster if blade(k) in said.effects]
+    if said.verdict != "class" or len(turned) != 1 or len(a.beside.faster) != 1 or said.leading.pair:
+        return None
+    why = f"{said.why}; that motor alone turns faster at its drive, as with less blade"
+    return replace(said, verdict="named", effects=(turned[0],), leading=Explanation.of(turned[0]), why=why,
+                   sets=((turned[0],),))  # fmt: skip
+
+
+def _slow(a: FlightQuery) -> Decision | None:
+    """By definition: a blade that lost area does not load its motor more."""
+    said = a.steps[-1]
+    weak = [k for k in a.beside.slower if blade(k) in said.effects]
+    if said.verdict not in ("class", "named") or not weak:
+        return None
+    gone = {blade(k) for k in weak}
+    names = tuple(f"weak motor, bearing or controller, motor {i.removeprefix(BLADE)}" if i in gone else i
+                  for i in said.effects)  # fmt: skip
+    return replace(said, effects=names, why=f"{said.why}; motor {weak[0]} turns slower at its drive")
+
+
+def _changed(a: FlightQuery) -> Decision | None:
+    """By definition: the flight before the change is the healthy one."""
+    said, change = a.steps[-1], a.beside.change
+    if said.verdict not in ("none", "insufficient") or change is None:
+        return None
+    names = change.causes[:LARGEST]
+    when = f" at {change.at_s:.1f} s" if change.kind == "step" else ", steadily"
+    why = f"the balance changed in flight{when}, by {100 * change.size:.0f} ± {100 * change.half:.0f} % drive"
+    return replace(said, verdict="named" if len(names) == 1 else "class", effects=names, sets=(names,), why=why,
+                   leading=Explanation.of(names[0]), probability=1.0 - GATE)  # fmt: skip
+
+
+def _shake(a: FlightQuery) -> Decision | None:
+    """Declared: what shakes and does not move the balance is an imbalance or a small damage."""
+    said = a.steps[-1]
+    if said.verdict != "none" or len(a.beside.shaken) != 1:
+        return None
+    which = f"motor {a.beside.shaken[0]}" if a.beside.shaken[0] else "a rotor"
+    why = "the balance did not move, but it shakes more at its shaft frequency than in healthy flights"
+    return replace(said, verdict="class", effects=(f"imbalance or tape, {which}", f"damaged blade, {which}"), why=why)
+
+
+RULES: list[Rule] = [
+    Rule("healthy flights look like it", _within, "GATE"),
+    Rule("too few healthy flights", _few_and_within, "GATE"),
+    Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
+    Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
+    Rule(BESIDE_IT, _another, "NAMED, LIKE, MOST"),
+    Rule("one is sure", _one, "NAMED"),
+    Rule("both are sure", _both, "EARNED, NAMED"),
+    Rule("two at work", _two, "EARNED, IN_SET, SURE"),
+    Rule("look-alikes", _alike, "NEAR, RARE, LARGEST, SURE"),
+    Rule("many are left", _many),
+    Rule(IN_FLIGHT, _changed, "GATE", revises=True),
+    Rule("speed at equal drive tells a blade", _speed, "GATE", revises=True),
+    Rule("speed at equal drive tells a motor", _slow, "GATE", revises=True),
+    Rule("one rotor shakes", _shake, "GATE", revises=True),
+]
+"""In order: the first that holds answers, those that revise see the answer."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlightVerdict:
-    """Verdict in the words of the diagnosis: none, named, class, unknown or insufficient.
+    """The answer of the judge on a flight.
 
     Attributes
     ----------
-    verdict : str
-        As above.
-    effects : tuple of str
-        Causes; of a class all members.
-    why : str
-        The rule that answered.
-    explanations : tuple of FlightEvidence
-        All, best first.
+    said : Decision
+        As of a diagnosis.
     readings : (B,) float
         Change of the log of each rotor's share of the drive [1].
+    next : Suggestion
+        What would decide, or confirm.
+    found : dict of Explanation to FlightEvidence
+        All that is listed.
+    probability : dict of Explanation to float
+        Of these, of nothing and of something unlisted [1].
+    p_value : float
+        Share of healthy flights that look as bad [1].
     scatter : float
         Standard deviation of a share between healthy flights, or between vehicles where none is given [1].
     visible : float
@@ -92,21 +382,18 @@ class FlightVerdict:
         Healthy flights accused when each is judged by the others, of how many.
     rate95 : (float, float)
         95 % interval of that rate (Clopper and Pearson) [1].
-    total : float
-        Change of the total drive against the healthy mean [1].
-    total_half : float
-        Its 95 % half width from the healthy scatter [1].
-    rule : str
-        Name of the rule that answered.
+    total, total_half : float
+        Change of the total drive against the healthy mean, and its 95 % half width from the healthy scatter [1].
     given : int
         Healthy flights to compare with.
     """
 
-    verdict: str
-    effects: tuple[str, ...]
-    why: str
-    explanations: tuple[FlightEvidence, ...]
+    said: Decision
     readings: Array
+    next: Suggestion
+    found: dict[Explanation, FlightEvidence] = field(default_factory=dict)
+    probability: dict[Explanation, float] = field(default_factory=dict)
+    p_value: float = float("nan")
     scatter: float = float("nan")
     visible: float = float("nan")
     accused: int = 0
@@ -114,56 +401,7 @@ class FlightVerdict:
     rate95: tuple[float, float] = (0.0, 1.0)
     total: float = float("nan")
     total_half: float = float("nan")
-    rule: str = ""
     given: int = 0
-
-
-def features(log: FlightLog) -> Array | None:
-    """Log of the mean drive of each rotor in flight.
-
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-
-    Returns
-    -------
-    (B,) float or None
-        Of commands (the same in every log), or of squared speeds where there is no command; None without a flight [1].
-    """
-    on = log.flying
-    if on.sum() < 50:
-        return None
-    drive = log.command if log.command is not None else None if log.rpm is None else log.rpm**2
-    if drive is None:
-        return None
-    mean = drive[on].mean(axis=0)
-    return np.log(mean) if np.all(mean > 0.0) else None
-
-
-def axes_of(layout: Array | None, rotors: int) -> Array:
-    """Rows that take roll, pitch and yaw from the logs of the drives.
-
-    Parameters
-    ----------
-    layout : (B, 3) float or None
-        As :func:`bemt.flight.layout.layout_of` gives it; None: any rows without the total.
-    rotors : int
-        Number of rotors.
-
-    Returns
-    -------
-    (k, B) float
-        Orthogonal to the total; the root mean square of a row is 1/B [1].
-    """
-    inner = np.eye(rotors) - 1.0 / rotors
-    if layout is None:
-        free: Array = np.linalg.svd(inner)[2][: rotors - 1] / np.sqrt(rotors)
-        return free
-    rows = effect_matrix(layout)[:3] @ inner
-    q, r = np.linalg.qr(rows.T)
-    found: Array = (q * np.sign(np.diag(r))).T[np.abs(np.diag(r)) > 1e-9] / np.sqrt(rotors)
-    return found
 
 
 def judge(
@@ -172,6 +410,7 @@ def judge(
     layout: Array | None,
     false_alarm: float = FALSE_ALARM,
     windy: bool = False,
+    beside: BesideBalance | None = None,
 ) -> FlightVerdict:
     """Judge a flight by healthy ones.
 
@@ -188,225 +427,104 @@ def judge(
     windy : bool
         Whether the rotors met wind that they do not meet in the healthy flights: it tilts the body, so roll and pitch
         may change in any way, and yaw does not.
+    beside : BesideBalance or None
+        What else the log shows.
 
     Returns
     -------
     FlightVerdict
-        With the error rate of the same rule on the healthy flights.
+        With the error rate of the same rules on the healthy flights.
     """
     from scipy import stats
 
     calm = np.array(healthy).reshape(-1, flight.size)
-    said = _decide(flight, calm, layout, false_alarm, windy)
-    if len(healthy) < _LEAST:
-        return said
-    rest = [_decide(h, np.delete(calm, k, axis=0), layout, false_alarm) for k, h in enumerate(calm)]
-    accused = sum(r.verdict in ("named", "class", "unknown") for r in rest)
-    interval = stats.binomtest(accused, len(rest)).proportion_ci(method="exact")
-    return replace(said, accused=accused, healthy=len(rest), rate95=(float(interval.low), float(interval.high)))
+    query, out = weighed(flight, calm, layout, false_alarm, windy)
+    query.beside = beside or BesideBalance()
+    said = decide(query, RULES)
+    out = replace(out, said=said, next=next_flight(said, layout, query.given))
+    if query.few:
+        return out
+    bad = []
+    for k, h in enumerate(calm):
+        other, _ = weighed(h, np.delete(calm, k, axis=0), layout, false_alarm)
+        moved = any(query.beside.healthy[k : k + 1])
+        bad.append(moved or decide(other, RULES).verdict in (*CLAIMS, "unknown"))
+    interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
+    return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Prediction:
-    """A healthy flight as the others predict it: mean and standard deviation of the readings, and draws, whitened."""
-
-    mean: Array  # (k,)
-    sd: Array  # (k,)
-    draws: Array  # (draws, k), over sd
-
-
-def _predicted(calm: Array, axes: Array, known: bool) -> _Prediction:
-    n, k = len(calm), len(axes)
-    x = calm @ axes.T
-    own = np.sum((x - x.mean(axis=0)) ** 2, axis=0) if n else np.zeros(k)
-    common = (float(own.sum()) + SCATTER_FREE * SCATTER**2) / (k * max(n - 1, 0) + SCATTER_FREE)
-    free = max(n - 1, 0) + _COMMON
-    s2 = (own + _COMMON * common) / free
-    trim = np.array(TRIM)[:k] if known and k == 3 else np.full(k, max(TRIM))
-    rng = np.random.default_rng(20)
-    drawn = s2 * free / rng.chisquare(free, (_DRAWS, k))
-    width = trim**2 * TRIM_FREE / rng.chisquare(TRIM_FREE, (_DRAWS, 1))
-
-    def variance(s: Array, w: Array) -> Array:
-        return s + 1.0 / (n / s + 1.0 / w)
-
-    sd = np.sqrt(variance(s2, trim**2))
-    mean = x.sum(axis=0) / s2 / (n / s2 + 1.0 / trim**2) if n else np.zeros(k)
-    return _Prediction(mean, sd, rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd)
-
-
-@dataclass(frozen=True, eq=False)
-class _Query:
-    """What the rules ask of a flight."""
-
-    said: FlightVerdict  # the answer without a verdict
-    best: FlightEvidence
-    alike: tuple[str, ...]  # causes that explain it as well as the best
-    pairs: list[FlightEvidence]
-    blown: float  # misfit of wind; infinite where none is known of
-    square: float  # of the whitened readings
-    bar: float  # of the best cause's statistic
-    gate: float  # of the square
-    most: float  # misfit that a cause may leave
-    few: bool
-
-    @property
-    def accused(self) -> bool:
-        """Whether a single cause stands out."""
-        return self.best.t >= self.bar
-
-    @property
-    def fits(self) -> bool:
-        """Whether the best single cause leaves little."""
-        return self.best.chi2 < self.most or self.best.chi2 < 0.25 * self.best.t**2
-
-    @property
-    def two(self) -> tuple[str, ...]:
-        """Pairs of rotors that explain what no single cause does."""
-        good = [e for e in self.pairs if e.chi2 < self.most and e.chi2 < self.best.chi2 - 2.0 * EARNED]
-        return tuple(e.cause for e in good if e.chi2 - good[0].chi2 < ALIKE)
-
-    def answer(self, verdict: str, effects: tuple[str, ...], why: str, rule: str) -> FlightVerdict:
-        """The answer with a verdict."""
-        return replace(self.said, verdict=verdict, effects=effects, why=why, rule=rule)
-
-
-def _within(q: _Query) -> FlightVerdict | None:
-    if q.accused or (q.square >= q.gate and q.best.chi2 >= q.most):
-        return None
-    if not q.few:
-        return q.answer("none", (), "no more than healthy flights differ", "within the healthy scatter")
-    why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
-    return q.answer("insufficient", (), why, "too few healthy flights")
-
-
-def _few(q: _Query) -> FlightVerdict | None:
-    if not q.few:
-        return None
-    causes = (*(q.alike if q.accused else ()), *(() if q.fits else q.two))
-    why = "more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
-    rest = _WIDE if q.said.given else _BUILD
-    return q.answer("class", (*causes, rest), why, "beyond other healthy vehicles")
-
-
-def _single(q: _Query) -> FlightVerdict | None:
-    if not (q.accused and q.fits):
-        return None
-    causes = q.alike
-    # Two damaged rotors side by side that turn against each other load the body as a weight between them.
-    if q.best.cause.startswith("weight"):
-        causes += tuple(e.cause for e in q.pairs if e.chi2 <= q.best.chi2 and e.t > 2.0)
-    if len(causes) == 1:
-        return q.answer("named", causes, "one cause explains the balance, the others do not", "one cause")
-    return q.answer("class", causes, "these explain the balance equally well", "causes that look alike")
-
-
-def _wind(q: _Query) -> FlightVerdict | None:
-    return (
-        q.answer("named", (WIND,), "roll and pitch changed as wind changes them", "wind") if q.blown < q.most else None
-    )
-
-
-def _two(q: _Query) -> FlightVerdict | None:
-    if not q.two:
-        return None
-    why = "no single cause explains the balance; two damaged rotors do"
-    said = q.answer("named" if len(q.two) == 1 else "class", q.two, why, "two rotors")
-    return replace(said, explanations=(*(e for e in q.pairs if e.cause in q.two), *said.explanations))
-
-
-def _unlisted(q: _Query) -> FlightVerdict | None:
-    why = "the balance moved, but not as one or two rotors or one weight move it"
-    return q.answer("unknown", (), why, "no listed cause")
-
-
-_RULES = (_within, _few, _single, _wind, _two, _unlisted)
-"""In order: the first that holds answers."""
-
-
-def _decide(flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False) -> FlightVerdict:
-    query = _weighed(flight, calm, layout, alarm, windy)
-    return next(said for rule in _RULES if (said := rule(query)) is not None)
-
-
-def _weighed(flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool) -> _Query:
+def weighed(
+    flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False
+) -> tuple[FlightQuery, FlightVerdict]:
+    """Weigh all explanations; gives what the rules ask, and the answer that has no decision yet."""
     from scipy import stats
 
     B, n = flight.size, len(calm)
     change = flight - (calm.mean(axis=0) if n else flight.mean())
     axes, ways = axes_of(layout, B), directions(B, layout)
-    p = _predicted(calm, axes, layout is not None)
+    p = healthy_flight(calm, axes, layout is not None)
     z = (flight @ axes.T - p.mean) / p.sd
     D = np.stack([axes @ way for way in ways.values()]) / p.sd
     length = np.linalg.norm(D, axis=1)
     T, null = D / length[:, None] @ z, p.draws @ (D / length[:, None]).T
-    bar = float(np.quantile(null.max(axis=1), 1.0 - (1.0 - _OTHER) * alarm))
-    half = np.quantile(np.abs(null), 0.95, axis=0) / length
-    found = [
-        FlightEvidence(cause, float(t / w), float(h), float(t), float(z @ z - t * t))
-        for cause, t, w, h in zip(ways, T, length, half, strict=True)
-    ]
-    found.sort(key=lambda e: (e.t <= 0.0, e.chi2))
-    square = np.sum(p.draws**2, axis=1)
-    rest = square - np.max(null, axis=1).clip(0.0) ** 2
-    totals = calm.mean(axis=1)
-    spread = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)) if n > 1 else float("nan")
-    weakest = min(w for cause, w in zip(ways, length, strict=True) if cause.startswith("damaged"))
-    said = FlightVerdict("none", (), "", tuple(found), change - change.mean(), float(np.sqrt(np.sum(p.sd**2))),
-                         bar / float(weakest), total=float(change.mean()) if n else float("nan"), total_half=spread,
-                         given=n)  # fmt: skip
-    alike = tuple(e.cause for e in found if e.t > 0.0 and e.chi2 - found[0].chi2 < ALIKE)
-    # What wind leaves: yaw, where the layout says which reading that is.
-    blown = (float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0) if windy else float("inf")
-    if blown - found[0].chi2 < ALIKE:
-        alike = (WIND, *alike)  # it is known to be there
-    return _Query(said, found[0], alike, _pairs(D, z, list(ways), half * length), blown, float(z @ z), bar,
-                  float(np.quantile(square, 1.0 - _OTHER * alarm)), float(np.quantile(rest, 1.0 - GATE)),
-                  n < _LEAST)  # fmt: skip
+    most, square = null.max(axis=1), np.sum(p.draws**2, axis=1)
+    # Both tests share the false alarms; a cause pays for the larger part.
+    best = float(np.mean(most >= T.max())) / (1.0 - _OTHER)
+    any_way = float(np.mean(square >= float(z @ z))) / _OTHER
+    wide = np.quantile(np.abs(null), 0.95, axis=0) / stats.norm.ppf(0.975)  # a sd as the draws have it
 
+    def density(chi2: float) -> float:
+        return -0.5 * (p.free + z.size) * float(np.log1p(chi2 / p.free))
 
-def _pairs(D: Array, z: Array, names: list[str], half: Array) -> list[FlightEvidence]:
-    """Two damaged rotors, both with a loss, best first; the size is that of the smaller one."""
-    out = []
-    blades = [i for i, name in enumerate(names) if name.startswith("damaged")]
+    def over_nothing(chi2: float, share: float) -> float:
+        return density(chi2) - density(float(z @ z)) + float(np.log(min(share, 1.0)))
+
+    found = {}
+    names = list(ways)
+    for name, t, size, w in zip(names, T, length, wide, strict=True):
+        left = float(z @ z) - max(float(t), 0.0) ** 2
+        fits = float(np.sqrt(2.0 * np.pi) * w / size / _LARGEST)
+        found[Explanation.of(name)] = FlightEvidence(
+            float(t / size), float(1.96 * w / size), float(t), left, over_nothing(left, fits)
+        )
+    blades = [i for i, name in enumerate(names) if name.startswith(BLADE)]
     for i, j in combinations(blades, 2):
         pair = D[[i, j]].T
-        if np.linalg.cond(pair) > _ALONG:
+        sizes, *_ = np.linalg.lstsq(pair, z, rcond=None)
+        if np.linalg.cond(pair) > _ALONG or sizes.min() <= 0.0:
             continue
-        size, *_ = np.linalg.lstsq(pair, z, rcond=None)
-        if size.min() <= 0.0:
-            continue
-        u = np.sqrt(np.diag(np.linalg.inv(pair.T @ pair)))
-        k = int(np.argmin(size))
-        a, b = (name.rsplit(" ", 1)[1] for name in (names[i], names[j]))
-        misfit = float(np.sum((z - pair @ size) ** 2))
-        out.append(FlightEvidence(f"damaged blades, motors {a} and {b}", float(size[k]), float(half[i] * u[k]),
-                                  float(size[k] / u[k]), misfit))  # fmt: skip
-    return sorted(out, key=lambda e: e.chi2)
+        inverse = np.linalg.inv(pair.T @ pair)
+        u, w = np.sqrt(np.diag(inverse)), float(np.sqrt(wide[i] * wide[j]))
+        k, left = int(np.argmin(sizes)), float(np.sum((z - pair @ sizes) ** 2))
+        fits = float(2.0 * np.pi * w**2 * np.sqrt(np.linalg.det(inverse)) / _LARGEST**2)
+        found[Explanation.of(names[i], names[j])] = FlightEvidence(
+            float(sizes[k]), float(1.96 * w * u[k]), float(sizes[k] / u[k]), left, over_nothing(left, fits)
+        )
+    # Readings as wide as those of damaged blades of any size.
+    scale = np.sqrt(np.mean(D[blades] ** 2, axis=0) * _LARGEST**2 / 3.0)
+    free = np.log1p(scale**2)
+    if windy:
+        still = float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0
+        tilt = float(np.exp(-0.5 * np.sum(free[:2])))
+        found[Explanation.of(WIND)] = FlightEvidence(0.0, float("nan"), 0.0, still, over_nothing(still, tilt))
+    unlisted = float(np.sum(z**2 / (1.0 + scale**2)))
+    log_bayes = {e: v.log_bayes for e, v in found.items()}
+    log_bayes |= {NONE: 0.0, UNKNOWN: over_nothing(unlisted, float(np.exp(-0.5 * np.sum(free))))}
+    # Wind is only listed where the log shows it, so it is as likely as physics that every rotor has.
+    prior = log_priors({i: LEFT_OUT if i == WIND else 1.0 for e in found if not e.pair for i in e})
+    weight = {e: v + prior[e] for e, v in log_bayes.items()}
+    top = max(weight.values())
+    total = sum(float(np.exp(v - top)) for v in weight.values())
+    P = {e: float(np.exp(v - top)) / total for e, v in weight.items()}
+    query = FlightQuery(found, P, log_bayes, min(best, any_way, 1.0), alarm, n)
 
-
-def _neighbours(motors: list[int], angle: Array) -> list[tuple[int, int]]:
-    """Motors side by side with more than 50 degrees between them."""
-    order = sorted(motors, key=lambda k: float(angle[k]) % (2.0 * np.pi))
-    pairs = list(zip(order, [*order[1:], order[0]], strict=True))
-    return [(i, j) for i, j in pairs if np.radians(50.0) < (angle[j] - angle[i]) % (2.0 * np.pi) < np.radians(170.0)]
-
-
-def directions(B: int, layout: Array | None) -> dict[str, Array]:
-    """Change of the log shares of each cause, (B,), for unit change of that rotor's drive."""
-    out = {f"damaged blade, motor {k + 1}": np.eye(B)[k] for k in range(B)}
-    if layout is not None:
-        A = effect_matrix(layout)
-        back = np.linalg.pinv(A)
-        out = {name: back @ A @ d for name, d in out.items()}
-        places: dict[tuple[float, ...], list[int]] = {}
-        for k in range(B):
-            places.setdefault(tuple(np.round(A[:2, k], 6)), []).append(k + 1)
-        level = back @ np.diag([1.0, 1.0, 0.0, 1.0])
-        for motors in places.values():
-            where = f"motor {motors[0]}" if len(motors) == 1 else f"motors {' and '.join(map(str, motors))}"
-            out[f"weight near {where}"] = level @ A[:, motors[0] - 1]
-        for i, j in _neighbours([motors[0] - 1 for motors in places.values()], layout[:, 0]):
-            a, b = sorted((i + 1, j + 1))
-            out[f"weight between motors {a} and {b}"] = level @ (A[:, i] + A[:, j]) / 2.0
-    return {cause: d - d.mean() for cause, d in out.items()}
+    totals = calm.mean(axis=1)
+    spread = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)) if n > 1 else float("nan")
+    bar = float(np.quantile(most, 1.0 - (1.0 - _OTHER) * alarm))
+    nothing = Suggestion("", (), (), 0.0, 0.0, "")
+    answer = FlightVerdict(
+        query.says("none", ""), change - change.mean(), nothing, found, P, query.p_value,
+        float(np.sqrt(np.sum(p.sd**2))), bar / float(length[blades].min()),
+        total=float(change.mean()) if n else float("nan"), total_half=spread, given=n,
+    )  # fmt: skip
+    return query, answer

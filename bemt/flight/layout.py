@@ -21,21 +21,33 @@ LAYOUTS = {
     "quad-x": "-45+ 135+ 45- -135-",
     "quad-plus": "-90+ 90+ 0- 180-",
     "quad-h": "-45- 135- 45+ -135+",
+    "quad-x-dji": "-45+ 45- 135+ -135-",
+    "quad-x-cw": "-45+ -135- 135+ 45-",
+    "betaflight-x-rev": "-135+ -45- 135- 45+",
     "hexa-x": "-90- 90+ 30- -150+ -30+ 150-",
     "hexa-plus": "0- 180+ 120- -60+ 60+ -120-",
+    "hexa-x-dji": "-30+ 30- 90+ 150- -150+ -90-",
+    "hexa-x-cw": "-30+ -90- -150+ 150- 90+ 30-",
     "y6": "-60+ 60- 60+ 180- -60- 180+",
+    "y6b": "-60- -60+ 180- 180+ 60- 60+",
+    "y6f": "180+ -60+ 60+ 180- -60- 60-",
     "octo-x": "-22.5- 157.5- -67.5+ -157.5+ 22.5+ 112.5+ 67.5- -112.5-",
     "octo-plus": "0- 180- -45+ -135+ 45+ 135+ 90- -90-",
+    "octo-x-dji": "-22.5+ 22.5- 67.5+ 112.5- 157.5+ -157.5- -112.5+ -67.5-",
+    "octo-x-cw": "-22.5+ -67.5- -112.5+ -157.5- 157.5+ 112.5- 67.5+ 22.5-",
     "x8": "-45+ 45- 135+ -135- 45+ -45- -135+ 135-",
+    "x8-h": "-45- 45+ 135- -135+ 45- -45+ -135- 135+",
     "x8-plus": "0+ 90- 180+ -90- 90+ 0- -90+ 180-",
     "x8-cw": "-45+ -45- -135+ -135- 135+ 135- 45+ 45-",
+    "dodeca-hexa-plus": "0+ 0- -60- -60+ -120+ -120- 180- 180+ 120+ 120- 60- 60+",
     "dodeca-hexa": "-30+ -30- -90- -90+ -150+ -150- 150- 150+ 90+ 90- 30- 30+",
 }
 """Angle of each motor in its numbering [deg, from ahead to the left], and its turning seen from above: + to the left.
 
 Sources: Bitcraze, Crazyflie 2.x motor numbering; PX4 airframes reference; Betaflight default motor order (the same as
 ArduPilot's BF_X); all others ArduPilot, libraries/SITL/SIM_Frame.cpp and AP_MotorsMatrix.cpp, whose angles count to the
-right. px4-x and quad-x are one.
+right; the orders of DJI and clockwise (cw) by memory, not checked. Without CA_ parameters PX4's hexa-, octo- and x8 are
+the same (src/lib/mixer/MultirotorMixer/geometries). px4-x and quad-x are one.
 """
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 from typing import Any
 
 import numpy as np
 
 from bemt.base.units import G0
 from bemt.flight.answer import FlightAnswer
+from bemt.flight.text import headline
 
 __all__ = ["flight_picture"]
 
@@ -36,7 +38,7 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.5, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
+    with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.0, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
         figure = Figure(figsize=(7.6, 6.6), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(2, 2)
@@ -48,9 +50,8 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
         _flow(axes[0, 1], answer)
         _drives(axes[1, 0], answer)
         _balance(axes[1, 1], answer)
-        title = f"{answer.log.format}, {answer.log.rotors} rotors: {answer.judged.verdict}"
-        effects = ", ".join(answer.judged.effects)
-        figure.suptitle(title + (f"\n{effects}" if effects else ""), fontsize=11.0)
+        title = f"{answer.log.format}, {answer.log.rotors} rotors\n{textwrap.fill(headline(answer.judged), 88)}"
+        figure.suptitle(title, fontsize=11.0)
         out = io.BytesIO()
         figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
     return out.getvalue()
@@ -64,7 +65,11 @@ def _empty(ax: Any, text: str) -> None:
 def _flow(ax: Any, answer: FlightAnswer) -> None:
     flow, said = answer.inflow, answer.predicted
     if flow is None or (flow.axial is None and flow.inplane is None):
-        _empty(ax, "Thrust in moving air:\nthis flight does not show it")
+        _empty(
+            ax,
+            "Thrust in moving air: this flight does not show it.\nFly climbs, descents and fast passes; log "
+            "speeds,\naccelerometer, velocity and attitude",
+        )
         return
     parts = ((flow.axial, flow.bins[0], said.axial if said else None, _BLUE, "along the axis"),
              (flow.inplane, flow.bins[1], said.inplane if said else None, _GREEN, "in the plane"))  # fmt: skip
@@ -77,7 +82,7 @@ def _flow(ax: Any, answer: FlightAnswer) -> None:
             ax.plot(model[0], 100 * model[1], color=colour, lw=1.5, label=f"model, {name}")
     ax.axhline(0.0, color="0.3", lw=0.8)
     ax.set_xlabel("velocity [m/s], climb above zero")
-    ax.set_ylabel("change of thrust at equal speed [%]")
+    ax.set_ylabel("thrust at equal speed [%]")
     ax.legend(frameon=False)
 
 
@@ -92,15 +97,16 @@ def _drives(ax: Any, answer: FlightAnswer) -> None:
     when, mean = np.array([t[p].mean() for p in parts]), np.array([x[p].mean(axis=0) for p in parts])
     share = 100 * (mean / mean.mean(axis=1, keepdims=True) - 1.0)
     for i in range(share.shape[1]):
-        ax.plot(when, share[:, i], lw=1.2, label=f"{i + 1}", color=_LINES[i % len(_LINES)],
-                ls="-" if i < len(_LINES) else "--")  # fmt: skip
+        name = f"{i + 1}" if i else "motor 1"
+        style = "-" if i < len(_LINES) else "--"
+        ax.plot(when, share[:, i], style, lw=1.2, label=name, color=_LINES[i % len(_LINES)])
     if answer.change is not None and np.isfinite(answer.change.at_s):
         ax.axvline(answer.change.at_s, color="0.2", ls=":", lw=1.5)
     ax.margins(y=0.2)
     ax.set_xlabel("time [s]")
     ax.set_ylabel("drive, against the mean [%]")
-    ax.legend(frameon=False, ncols=min(share.shape[1], 6), title="motor", title_fontsize=9, handlelength=1.2,
-              columnspacing=0.8)  # fmt: skip
+    ax.legend(frameon=False, ncols=min(share.shape[1], 8), loc="lower center", bbox_to_anchor=(0.5, 1.0),
+              handlelength=0.9, handletextpad=0.4, columnspacing=0.8)  # fmt: skip
 
 
 def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
@@ -146,9 +152,10 @@ def _balance(ax: Any, answer: FlightAnswer) -> None:
     if not j.readings.size:
         _empty(ax, "no balance")
         return
-    accused = {int(n) - 1 for e in j.effects for n in re.findall(r"\d+", e)}
-    colours = [_ORANGE if i in accused else _BLUE for i in range(j.readings.size)]
-    ax.bar(np.arange(1, j.readings.size + 1), 100 * j.readings, color=colours)
+    accused = {int(n) - 1 for e in j.said.effects for n in re.findall(r"\d+", e)}
+    colours = [_LINES[i % len(_LINES)] for i in range(j.readings.size)]
+    edges = [1.8 if i in accused else 0.0 for i in range(j.readings.size)]
+    ax.bar(np.arange(1, j.readings.size + 1), 100 * j.readings, color=colours, edgecolor="k", linewidth=edges)
     if np.isfinite(j.scatter):
         ax.axhspan(-200 * j.scatter, 200 * j.scatter, color="0.5", alpha=0.2, lw=0,
                    label="healthy flights (2 sd)" if j.given else "healthy vehicles (2 sd)")  # fmt: skip

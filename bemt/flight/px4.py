@@ -1,8 +1,9 @@
 """PX4: ULog (``.ulg``), read by pyulog; topics and units as in PX4's msg/*.msg; NED and FRD axes.
 
 Only the topics that are used are kept, so memory does not follow the size of the file. The layout is that of the
-parameters CA_ROTORn_PX, PY (ahead, to the right) and KM (above zero: turns to the left, seen from above). Pulse widths
-are shares of PWM_MIN to PWM_MAX. Raw bursts of the accelerometer are sensor_accel_fifo.
+parameters CA_ROTORn_PX, PY (ahead, to the right) and KM (above zero: turns to the left, seen from above); before
+version 1.13 that of the airframe, whose number is SYS_AUTOSTART (airframes reference). Pulse widths are shares of
+PWM_MIN to PWM_MAX. Raw bursts of the accelerometer are sensor_accel_fifo.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.layout import layout_text
+from bemt.flight.layout import LAYOUTS, layout_text
 from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
 _LONG, _STRETCH = 1 << 26, 16_384  # size from which a log is reduced first [bytes]; samples of a stretch
+_AIRFRAMES = {5: "quad-plus", 6: "hexa-x", 7: "hexa-plus", 8: "octo-x", 9: "octo-plus", 12: "x8"}  # by thousands
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
@@ -106,7 +108,8 @@ def _made(name: str, found: Any) -> FlightLog:
     params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
     if command is None:
-        command, unit = _active(take("actuator_outputs", _numbered(tables, "actuator_outputs", "output"))), "us"
+        there = _numbered(tables, "actuator_outputs", "output")
+        command, unit = _active(take("actuator_outputs", _assigned(params, there) or there)), "us"
         low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
         if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
             command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
@@ -141,10 +144,20 @@ def _made(name: str, found: Any) -> FlightLog:
     }
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
-    layout = _layout(params, B) or ("px4-x" if (B or 4) == 4 else "")
+    layout = _layout(params, B)
     main = "command" if command else "rpm" if speeds else "acceleration"
     raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
     return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends)
+
+
+def _assigned(params: dict[str, float], there: list[str]) -> list[str]:
+    """Outputs in the order of the motors, by the functions of the port that has most of them (101 is motor 1)."""
+    ports = []
+    for port in ("MAIN", "AUX"):
+        motors = {int(v): n for n in range(16) if 101.0 <= (v := params.get(f"PWM_{port}_FUNC{n + 1}", 0.0)) <= 112.0}
+        ports.append([f"output[{n}]" for _, n in sorted(motors.items())])
+    found = max(ports, key=len)
+    return found if set(found) <= set(there) else []
 
 
 def _escs(data: dict[str, Array], B: int) -> list[int]:
@@ -159,12 +172,15 @@ def _escs(data: dict[str, Array], B: int) -> list[int]:
 
 
 def _layout(params: dict[str, float], B: int) -> str:
-    """Layout by the parameters of the control allocation; empty where they are not set."""
+    """Layout by the parameters of the control allocation, or that of the airframe; empty where neither says it."""
+    frame = params.get("SYS_AUTOSTART", 0.0)
+    usual = _AIRFRAMES.get(int(frame // 1000), "px4-x") if np.isfinite(frame) else "px4-x"
+    usual = usual if len(LAYOUTS[usual].split()) == (B or 4) else ""
     if B < 2 or params.get("CA_ROTOR_COUNT") != B:
-        return ""
+        return usual
     x, y, turn = ([params.get(f"CA_ROTOR{i}_{k}", 0.0) for i in range(B)] for k in ("PX", "PY", "KM"))
     if not (np.all(np.isfinite([x, y, turn])) and np.all(turn) and np.all(np.hypot(x, y) > 1e-3)):
-        return ""
+        return usual
     return layout_text(x, -np.array(y), turn)
 
 

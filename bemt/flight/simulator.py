@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.flight.batches import BATCHES, half_width
 from bemt.flight.identify import Constant, Identified
 from bemt.flight.log import FlightLog
 from bemt.flight.repeat import flight_scatter
@@ -15,7 +16,7 @@ __all__ = ["motor_lag", "simulator_constants"]
 
 Array = NDArray[np.float64]
 _RAD_S = np.pi / 30.0  # rad/s of one rev/min
-_BLOCKS, _SLOWEST_S, _LEAST_SEEN = 10, 0.5, 0.5  # longest lag tried [s]; share of the variance that it must explain
+_SLOWEST_S, _LEAST_SEEN = 0.5, 0.5  # longest lag tried [s]; share of the variance that it must explain
 
 
 def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant]:
@@ -48,8 +49,8 @@ def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant
         out["thrust per command"] = replace(command, half=float(np.hypot(command.half, factor * sd * command.value)))
     if log.rpm is not None and "mean rpm" in found.rotors:
         speed = np.sqrt(np.mean(log.rpm[log.flying] ** 2, axis=1))
-        blocks = np.array([b.mean() for b in np.array_split(speed, _BLOCKS)])
-        out["hover speed"] = Constant(_RAD_S * float(speed.mean()), _RAD_S * _half(blocks), "rad/s")
+        blocks = np.array([b.mean() for b in np.array_split(speed, BATCHES)])
+        out["hover speed"] = Constant(_RAD_S * float(speed.mean()), _RAD_S * half_width(blocks), "rad/s")
     if "hover command" in found.constants:
         out["hover command"] = found.constants["hover command"]
     yaw = found.constants.get("torque constant over yaw inertia")
@@ -85,7 +86,7 @@ def motor_lag(log: FlightLog) -> Constant | None:
     if log.rpm is None or log.command is None:
         return None
     on = np.flatnonzero(log.flying)
-    if on.size < 50 * _BLOCKS:
+    if on.size < 50 * BATCHES:
         return None
     # From the first sample in flight to the last: a lag needs unbroken time.
     whole = slice(on[0], on[-1] + 1)
@@ -109,7 +110,7 @@ def motor_lag(log: FlightLog) -> Constant | None:
     moved = sum(_misfit(t, None, rpm[:, i], tau, step, every) for i in range(rpm.shape[1]))
     if not late < tau < 0.9 * _SLOWEST_S or left(tau, every) > (1.0 - _LEAST_SEEN) * moved:
         return None
-    half = _half(np.array([best(p) for p in np.array_split(every, _BLOCKS)]))
+    half = half_width(np.array([best(p) for p in np.array_split(every, BATCHES)]))
     return Constant(tau, half, "s") if half < 0.5 * tau else None
 
 
@@ -126,9 +127,3 @@ def _misfit(t: Array, drive: Array | None, rpm: Array, tau: float, step: float, 
     scale = np.maximum(np.abs(X).max(axis=0), 1e-12)
     fit = (X / scale) @ np.linalg.lstsq(X / scale, rpm[part], rcond=None)[0]
     return float(np.sum((rpm[part] - fit) ** 2))
-
-
-def _half(values: Array) -> float:
-    from scipy import stats
-
-    return float(stats.t.ppf(0.975, values.size - 1) * values.std(ddof=1) / np.sqrt(values.size))

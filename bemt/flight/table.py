@@ -84,7 +84,7 @@ def read(path: Path) -> FlightLog:
 
 def _label(heading: str) -> str:
     """Heading without its unit."""
-    return re.sub(r"\s*\(.*\)$", "", heading).strip()
+    return re.sub(r"\s*\(.*\)\s*$", "", heading).strip()
 
 
 def _frame(rows: BinaryIO) -> pd.DataFrame:
@@ -178,7 +178,8 @@ def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: st
         "battery_current": (t, numbers[amp].to_numpy(float)) if amp else None,
     }
     B = command[1].shape[1] if command else 0
-    layout = "betaflight-x" if B == 4 else ""
+    turned = "-rev" if _number(said.get("yaw_motors_reversed")) else ""
+    layout = f"betaflight-x{turned}" if B == 4 else ""
     raw = unfiltered or gyro
     raw = raw if raw is not None and raw[1].shape[1] == 3 else None
     return joined(name, "Betaflight CSV", sources, "command", raw=raw, raw_unit="rad/s", layout=layout, ends=ends)

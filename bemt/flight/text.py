@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from bemt.diagnose.verdict import BESIDE_IT, Decision
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
-from bemt.flight.judge import FlightVerdict
+from bemt.flight.judge import IN_FLIGHT, FlightVerdict
 
-__all__ = ["text"]
+__all__ = ["headline", "text"]
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 
@@ -20,7 +21,7 @@ def text(a: FlightAnswer) -> str:
     lines = [f"{log.file}: {log.format}, {log.rotors} rotors, {seconds:.1f} s in the air"]
     if log.ends:
         lines.append(f"  {log.ends}")
-    lines += ["", _verdict(j)]
+    lines += ["", f"{headline(j)}: {j.said.why}."]
     if j.healthy:
         low, high = j.rate95
         lines.append(
@@ -30,11 +31,13 @@ def text(a: FlightAnswer) -> str:
     if np.isfinite(j.visible):
         against = "against these healthy flights" if j.given else "without healthy flights of this vehicle"
         lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
-    if j.verdict == "none" and j.healthy:
+    if j.said.verdict == "none" and j.healthy:
         lines.append("  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data.")
-    if j.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
+    if j.said.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
         lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
-                     f"±{100 * j.total_half:.1f} %): weight at the centre, battery or air.")  # fmt: skip
+                     f"±{100 * j.total_half:.1f} %): weight at the centre, battery, air, or damaged "
+                     "rotors that balance each other.")  # fmt: skip
+    lines += [f"  Next: {j.next.text}."] if j.next.text else []
     lines += _seen(a)
     lines += ["", "Identified (± 95 %)"] if a.found.constants else []
     lines += [f"  {name:<34} {_number(c)}" for name, c in a.found.constants.items()]
@@ -70,7 +73,7 @@ def _seen(answer: FlightAnswer) -> list[str]:
     if full:
         lines.append(f"  At full command: {', '.join(full)} of the time.")
     c, shake = answer.change, answer.vibration
-    if c is not None:
+    if c is not None and answer.judged.said.rule != IN_FLIGHT:
         when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
         lines.append(f"  {when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
                      f"{', '.join(c.causes)}.")  # fmt: skip
@@ -131,14 +134,28 @@ def _figures(value: float, count: int) -> str:
     return np.format_float_positional(rounded, trim="-") if plain else f"{value:.{count}g}"
 
 
-def _verdict(j: FlightVerdict) -> str:
-    leading = next((e for e in j.explanations if e.cause == j.effects[0]), None) if j.effects else None
-    size = "" if leading is None else f" ({100 * leading.size:+.0f} ± {100 * leading.half:.0f} % drive)"
+def headline(j: FlightVerdict) -> str:
+    """What is wrong, without the reason."""
+    said = j.said
+    found = j.found.get(said.leading)
+    size = ""
+    sized = said.rule != IN_FLIGHT and any(i in said.leading for i in said.effects)
+    if found is not None and found.size and sized:
+        size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
+    if said.rule == BESIDE_IT:
+        return f"Cause found: {said.effects[0]}{size}; possibly also {' or '.join(said.effects[1:])}"
     words = {
-        "none": "No cause found: ",
-        "named": f"Cause found: {', '.join(j.effects)}{size}: ",
-        "class": f"One of these: {', '.join(j.effects)}{size}:\n  ",
-        "unknown": "Something unlisted: ",
-        "insufficient": "Cannot tell: ",
+        "none": "No cause found",
+        "named": f"Cause found: {' and '.join(said.effects)}{size}",
+        "class": f"One of these: {_open(said)}{size}",
+        "unknown": "Something unlisted",
+        "insufficient": "Cannot tell",
     }
-    return f"{words[j.verdict]}{j.why}."
+    return words[said.verdict]
+
+
+def _open(said: Decision) -> str:
+    """Members of a class; of two at work, each with its look-alikes."""
+    if len(said.sets) > 1:
+        return "; with one of: ".join(" or ".join(s) for s in said.sets)
+    return " or ".join(said.effects)

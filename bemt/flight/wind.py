@@ -4,10 +4,18 @@ It is what the tilt holds against: thrust carries the weight, so its horizontal 
 Where that is not logged it is the residual force that a controller estimated, which holds the error of its thrust curve
 times the tilt.
 
-Along the wind the force on the body is F = c w + b w |w|, w the wind less the body's velocity: the rotors' in-plane
+Along the wind the force on the body is F = c w (1 + r |w|), w the wind less the body's velocity: the rotors' in-plane
 force (c, linear: rotor drag as in Faessler, Franchi and Scaramuzza, IEEE RA-L 3, 2018; not checked here) and the drag
-of the body (b). The slope over the body's own velocity is -(c + 2 b |w|), so the mean force and the slopes with and
-without wind give it: w = 2 F / (c + slope). The unit of the force cancels.
+of the body, a share r |w| of it. Readings are the mean force, its slope over the body's own velocity, which is
+c (1 + 2 r |w|), and c, the slope of the calm flights. The unit of the force cancels.
+
+r is known beforehand, too: PX4's estimator of the wind has the same law, and its usual constants (EKF2_MCOEF 0.15 1/s,
+EKF2_BCOEF 100 kg/m2) make r 0.041 s/m; that it is within a factor of e (one standard deviation) is an assumption. So a
+hovering flight has a wind, too, if a wide one.
+
+Gusts that beat with the motion look like drag. Their phase is not known, so they are as large in the slope as they are
+a quarter of a period away from it: what the force shows there (over the Hilbert transform of the velocity) counts as
+an uncertainty of the slope.
 
 The zero of the force is the mean of the calm flights. Whether it stays, one calm flight cannot show: half of it is
 taken as its standard uncertainty (an assumption); of several, their scatter.
@@ -22,12 +30,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.units import G0
+from bemt.flight.batches import BATCHES, jackknifed, u_of_mean
 from bemt.flight.log import FlightLog
 
 __all__ = ["Wind", "wind"]
 
 Array = NDArray[np.float64]
-_BLOCKS, _SMOOTH_S = 10, 0.2
+_SMOOTH_S = 0.2
+_SHARE, _FACTOR = 0.041, 1.0  # r [s/m] and the standard deviation of its logarithm
+_GRID, _LOG_C = (401, 31, 41), 1.1  # points over wind, r and c; half the range of log c
 
 
 @dataclass(frozen=True)
@@ -53,10 +64,8 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     Returns
     -------
     Wind
-        NaN with the reason where the log does not show it [m/s].
+        Median and interval of the posterior; NaN with the reason where the log does not show it [m/s].
     """
-    from scipy import stats
-
     by_force = any(one.axis is None for one in (log, *calm))
     mine = _horizontal(log, by_force)
     still = [found for one in calm if (found := _horizontal(one, by_force)) is not None]
@@ -68,22 +77,39 @@ def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
     mean = force.mean(axis=0) - np.mean([f.mean(axis=0) for f, _ in still], axis=0)
     size = float(np.hypot(*mean))
     axis = mean / size if size > 0.0 else np.array([1.0, 0.0])
-    slope, u_slope = _slope(force @ axis, velocity @ axis)
-    own = [_slope(f @ axis, v @ axis) for f, v in still]
-    c = float(np.mean([s for s, _ in own]))
-    u_c = float(np.sqrt(np.mean([u**2 for _, u in own]) / len(own)))
     heading = float(np.degrees(np.arctan2(axis[1], axis[0])))
-    total = c + slope
-    if not total > 2.0 * np.hypot(u_slope, u_c):
-        return Wind(np.nan, np.nan, heading, "the force does not depend on the velocity: fly to and fro along the wind")
-    u_force = _u_of_mean(force @ axis)
-    u_still = float(np.mean([_u_of_mean(f @ axis) for f, _ in still]))
+    own = [_slope(f @ axis, v @ axis) for f, v in still]
+    weight = np.array([u**-2.0 for _, u in own])
+    total = max(float(weight.sum()), 1e-300)
+    c, u_c = float(weight @ [s for s, _ in own]) / total, total**-0.5
+    if not c > 2.0 * u_c:
+        why = "the force does not depend on the velocity in the calm flights: fly one to and fro along the wind"
+        return Wind(np.nan, np.nan, heading, why)
     zeros = np.array([f.mean(axis=0) @ axis for f, _ in still])
     u_zero = 0.5 * abs(float(zeros[0])) if zeros.size == 1 else float(zeros.std(ddof=1) / np.sqrt(zeros.size))
-    speed = 2.0 * size / total
-    u_size = np.sqrt(u_force**2 + u_still**2 + u_zero**2)
-    relative = np.hypot(u_size / max(size, 1e-9), np.hypot(u_slope, u_c) / total)
-    return Wind(speed, float(stats.t.ppf(0.975, _BLOCKS - 1)) * speed * float(relative), heading)
+    u_still = float(np.mean([u_of_mean(f @ axis) for f, _ in still]))
+    u_size = float(np.sqrt(u_of_mean(force @ axis) ** 2 + u_still**2 + u_zero**2))
+    return Wind(*_posterior((size, u_size), _slope(force @ axis, velocity @ axis), (c, u_c)), heading)
+
+
+def _posterior(
+    force: tuple[float, float], slope: tuple[float, float], calm: tuple[float, float]
+) -> tuple[float, float]:
+    """Median of the wind and half width of its 95 % interval, from readings with their standard uncertainties."""
+    from scipy import stats
+
+    wider = float(stats.t.ppf(0.975, BATCHES - 1) / stats.norm.ppf(0.975))
+    top = (force[0] + 4.0 * wider * force[1]) / (calm[0] * np.exp(-0.5 * _LOG_C))
+    w, x, log_c = np.meshgrid(np.linspace(-top, top, _GRID[0]), np.linspace(-3.0, 3.0, _GRID[1]),
+                              np.linspace(-_LOG_C, _LOG_C, _GRID[2]), indexing="ij", sparse=True)  # fmt: skip
+    drag = _SHARE * np.exp(_FACTOR * x) * np.abs(w)
+    c = calm[0] * np.exp(log_c)
+    told = ((force, c * w * (1.0 + drag)), (slope, c * (1.0 + 2.0 * drag)), (calm, c))
+    misfit = x**2 + sum(((y - f) / (wider * u)) ** 2 for (y, u), f in told)
+    density = np.exp(-0.5 * (misfit - misfit.min())).sum(axis=(1, 2))
+    share = np.cumsum(density) / density.sum()
+    low, middle, high = np.interp([0.025, 0.5, 0.975], share, w[:, 0, 0])
+    return float(max(middle, 0.0)), float(0.5 * (high - low))
 
 
 def _horizontal(log: FlightLog, by_force: bool) -> tuple[Array, Array] | None:
@@ -91,32 +117,29 @@ def _horizontal(log: FlightLog, by_force: bool) -> tuple[Array, Array] | None:
 
     By the tilt it is dv/dt - (g + dv_z/dt) axis / axis_z per unit mass [m/s2].
     """
+    from scipy.ndimage import uniform_filter1d
+
     on = log.flying if log.rotors else np.ones(log.t.size, dtype=bool)
-    if log.velocity is None or on.sum() < 10 * _BLOCKS:
+    if log.velocity is None or on.sum() < 10 * BATCHES:
         return None
     if by_force:
         return None if log.force is None else (log.force[on, :2], log.velocity[on, :2])
     if log.axis is None or np.any(log.axis[on, 2] < 0.2):
         return None
     width = max(int(_SMOOTH_S / float(np.median(np.diff(log.t)))), 1)
-    smooth = np.stack([np.convolve(v, np.ones(width) / width, "same") for v in log.velocity.T], axis=1)
-    gain = np.gradient(smooth, log.t, axis=0)
+    gain = np.gradient(uniform_filter1d(log.velocity, width, axis=0, mode="nearest"), log.t, axis=0)
     tilt = log.axis[:, :2] / np.maximum(log.axis[:, [2]], 0.2)
     force = gain[:, :2] - (G0 + gain[:, [2]]) * tilt
     return force[on], log.velocity[on, :2]
 
 
-def _u_of_mean(force: Array) -> float:
-    """Standard deviation of the mean, from blocks."""
-    return float(np.std([b.mean() for b in np.array_split(force, _BLOCKS)], ddof=1)) / float(np.sqrt(_BLOCKS))
-
-
 def _slope(force: Array, velocity: Array) -> tuple[float, float]:
-    """Less the slope of the force over the velocity, and its standard deviation from blocks."""
+    """Less the slope of the force over the velocity, and its standard uncertainty; infinite for a hovering flight."""
+    from scipy.signal import hilbert
 
-    def one(p: NDArray[np.intp]) -> float:
-        v = velocity[p] - velocity[p].mean()
-        return -float(v @ force[p] / max(float(v @ v), 1e-12))
-
-    parts = [one(p) for p in np.array_split(np.arange(force.size), _BLOCKS)]
-    return one(np.arange(force.size)), float(np.std(parts, ddof=1)) / np.sqrt(_BLOCKS)
+    v = velocity - velocity.mean()
+    if not np.any(v):
+        return 0.0, float("inf")
+    beside = np.imag(hilbert(v))
+    found, u = jackknifed(np.column_stack([v, beside, np.ones(v.size)]), force)
+    return -float(found[0]), float(max(np.hypot(u[0], found[1]), 1e-9))

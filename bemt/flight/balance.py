@@ -1,0 +1,169 @@
+"""The signature of a rigid body: a body that flies steadily balances its loads, and the drives show how.
+
+A rotor that lost thrust at equal drive is driven harder until the loads balance again; of all commands that the mixer
+can give these are P e_k, P = A+ A, A the matrix of the layout (for a quadrotor e_k itself: one rotor, and so roll,
+pitch, yaw and total at once). A weight under an arm needs roll, pitch and total but no yaw:
+A+ diag(1, 1, 0, 1) A e_k.
+
+Readings: roll, pitch and yaw parts of the logs of the motors' mean drives. A flight x and the healthy ones x_i share
+the trim m of their vehicle: x_i ~ N(m, s^2), m ~ N(0, w^2). s^2 of a reading is the healthy flights' own, pooled with
+that of all readings and of other vehicles (scaled inverse chi-squared; Gelman et al., Bayesian Data Analysis, 3rd ed.,
+section 2.6); w is that of :mod:`bemt.flight.population` and hardly matters once there is a healthy flight. How much the
+readings share was chosen by the log score of left-out healthy flights of three vehicles (docs/flight_logs.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.flight.layout import effect_matrix
+from bemt.flight.log import FlightLog
+from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
+
+__all__ = ["BLADE", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
+
+Array = NDArray[np.float64]
+
+BLADE, WEIGHT, WIND = "damaged blade, motor ", "weight ", "wind or forward flight"
+_COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
+_DRAWS = 10_000
+
+
+def blade(motor: int) -> str:
+    """Cause by the number of the motor, from one."""
+    return f"{BLADE}{motor}"
+
+
+def features(log: FlightLog) -> Array | None:
+    """Log of the mean drive of each rotor in flight.
+
+    Parameters
+    ----------
+    log : FlightLog
+        The flight.
+
+    Returns
+    -------
+    (B,) float or None
+        Of commands (the same in every log), or of squared speeds where there is no command; None without a flight [1].
+    """
+    on = log.flying
+    if on.sum() < 50:
+        return None
+    drive = log.command if log.command is not None else None if log.rpm is None else log.rpm**2
+    if drive is None:
+        return None
+    mean = drive[on].mean(axis=0)
+    return np.log(mean) if np.all(mean > 0.0) else None
+
+
+def axes_of(layout: Array | None, rotors: int) -> Array:
+    """Rows that take roll, pitch and yaw from the logs of the drives.
+
+    Parameters
+    ----------
+    layout : (B, 3) float or None
+        As :func:`bemt.flight.layout.layout_of` gives it; None: any rows without the total.
+    rotors : int
+        Number of rotors.
+
+    Returns
+    -------
+    (k, B) float
+        Orthogonal to the total; the root mean square of a row is 1/B [1].
+    """
+    inner = np.eye(rotors) - 1.0 / rotors
+    if layout is None:
+        free: Array = np.linalg.svd(inner)[2][: rotors - 1] / np.sqrt(rotors)
+        return free
+    rows = effect_matrix(layout)[:3] @ inner
+    q, r = np.linalg.qr(rows.T)
+    found: Array = (q * np.sign(np.diag(r))).T[np.abs(np.diag(r)) > 1e-9] / np.sqrt(rotors)
+    return found
+
+
+def directions(B: int, layout: Array | None) -> dict[str, Array]:
+    """Change of the log shares of each cause, (B,), for unit change of that rotor's drive."""
+    out = {blade(k + 1): np.eye(B)[k] for k in range(B)}
+    if layout is not None:
+        A = effect_matrix(layout)
+        back = np.linalg.pinv(A)
+        out = {name: back @ A @ d for name, d in out.items()}
+        places: dict[tuple[float, ...], list[int]] = {}
+        for k in range(B):
+            places.setdefault(tuple(np.round(A[:2, k], 6)), []).append(k + 1)
+        level = back @ np.diag([1.0, 1.0, 0.0, 1.0])
+        for motors in places.values():
+            where = f"motor {motors[0]}" if len(motors) == 1 else f"motors {' and '.join(map(str, motors))}"
+            out[f"{WEIGHT}near {where}"] = level @ A[:, motors[0] - 1]
+        for i, j in _neighbours([motors[0] - 1 for motors in places.values()], layout[:, 0]):
+            a, b = sorted((i + 1, j + 1))
+            out[f"{WEIGHT}between motors {a} and {b}"] = level @ (A[:, i] + A[:, j]) / 2.0
+    return {cause: d - d.mean() for cause, d in out.items()}
+
+
+def _neighbours(motors: list[int], angle: Array) -> list[tuple[int, int]]:
+    """Motors side by side with more than 50 degrees between them."""
+    order = sorted(motors, key=lambda k: float(angle[k]) % (2.0 * np.pi))
+    pairs = list(zip(order, [*order[1:], order[0]], strict=True))
+    return [(i, j) for i, j in pairs if np.radians(50.0) < (angle[j] - angle[i]) % (2.0 * np.pi) < np.radians(170.0)]
+
+
+@dataclass(frozen=True, eq=False)
+class HealthyFlight:
+    """The readings of a healthy flight as the others predict them.
+
+    Attributes
+    ----------
+    mean, sd : (k,) float
+        Of the readings [1].
+    draws : (D, k) float
+        From the prediction, less the mean, over sd [1].
+    free : float
+        Degrees of freedom behind sd.
+    """
+
+    mean: Array
+    sd: Array
+    draws: Array
+    free: float
+
+
+def healthy_flight(calm: Array, axes: Array, known: bool) -> HealthyFlight:
+    """Predict the next healthy flight.
+
+    Parameters
+    ----------
+    calm : (n, B) float
+        Features of the healthy flights; none, one or more.
+    axes : (k, B) float
+        Of :func:`axes_of`.
+    known : bool
+        Whether the layout is known, so that the readings are roll, pitch and yaw.
+
+    Returns
+    -------
+    HealthyFlight
+        Its distribution.
+    """
+    n, k = len(calm), len(axes)
+    x = calm @ axes.T
+    own = np.sum((x - x.mean(axis=0)) ** 2, axis=0) if n else np.zeros(k)
+    common = (float(own.sum()) + SCATTER_FREE * SCATTER**2) / (k * max(n - 1, 0) + SCATTER_FREE)
+    free = max(n - 1, 0) + _COMMON
+    s2 = (own + _COMMON * common) / free
+    trim = np.array(TRIM)[:k] if known and k == 3 else np.full(k, max(TRIM))
+    rng = np.random.default_rng(20)
+    drawn = s2 * free / rng.chisquare(free, (_DRAWS, k))
+    width = trim**2 * TRIM_FREE / rng.chisquare(TRIM_FREE, (_DRAWS, 1))
+
+    def variance(s: Array, w: Array) -> Array:
+        return s + 1.0 / (n / s + 1.0 / w)
+
+    sd = np.sqrt(variance(s2, trim**2))
+    mean = x.sum(axis=0) / s2 / (n / s2 + 1.0 / trim**2) if n else np.zeros(k)
+    draws = rng.normal(size=(_DRAWS, k)) * np.sqrt(variance(drawn, width)) / sd
+    return HealthyFlight(mean, sd, draws, free if n else TRIM_FREE)
