@@ -15,6 +15,7 @@ from bemt.case import Case, case_of, fresh
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import propagate
 from bemt.drive.rotor_table import SPEEDS
+from geometry.common import pchip
 
 Array = NDArray[np.float64]
 FINE = 481
@@ -64,7 +65,7 @@ class LoadScatter:
 @lru_cache(maxsize=512)
 def case_of_label(label: str) -> Case:
     """Case of a label with its declared unknowns."""
-    return case_of(fresh.label_text(label))
+    return case_of(fresh.label_text(label), ends=False)
 
 
 def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None) -> RotorLoads | None:
@@ -76,17 +77,16 @@ def loads_of_case(
     label: str, case: Case, rpm_max: float, airspeed_m_s: float, air: Air | None = None
 ) -> RotorLoads | None:
     """Solve a case over speed, in its own air unless told; None where too few speeds converge."""
-    from scipy.interpolate import PchipInterpolator
-
     air = case.air() if air is None else air
-    points = prepare_case(case).solve(SPEEDS * rpm_max, airspeed_m_s, air)
+    rpm = SPEEDS * rpm_max
+    points = prepare_case(case).at_speeds(rpm, airspeed_m_s, air).solve(rpm, airspeed_m_s, air)
     T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
     good = np.isfinite(T) & np.isfinite(Q)
     if np.count_nonzero(good) < 4:
         return None
     n = points.rpm[good]
     fine = np.linspace(n[0], n[-1], FINE)
-    thrust, torque = (np.asarray(PchipInterpolator(n, v[good] / n**2)(fine)) * fine**2 for v in (T, Q))
+    thrust, torque = (pchip(n, v[good] / n**2, fine) * fine**2 for v in (T, Q))
     pitch = case.stated_pitch_m
     return RotorLoads(label, case.diameter_m, pitch, int(case.file.rotor.blades), fine, thrust, torque,
                       float(air.a_sound))  # fmt: skip

@@ -11,8 +11,9 @@ is known is as large as the rotor needs: winding, idle current and battery take 
     Omega_full = (1 - drop) (1 - sag) V_oc / k,   I_full = Q_full / (k (1 - idle)),   R = drop (1 - sag) V_oc / I_full.
 
 Rotor, motor and battery vary together: thrust and torque of the rotor with the bands and the correlation of
-`bemt.case.propagate`, log-normal; the shares uniform over their ranges. The same 256 draws (Sobol) serve every pair, so
-that the ranking is not noise.
+`bemt.case.propagate`, log-normal; the shares uniform over their ranges. The same 256 draws serve every pair, so that
+the ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol's points without the half-second import of
+`scipy.stats`.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
 LOADING = (15.0, 1200.0)
 """Disk loading of the labels that are tried [N/m2]."""
 DRAWS = 256
+LATTICE = 235
+"""Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4."""
 SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 
@@ -265,10 +268,11 @@ def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
 @cache
 def _draws() -> tuple[Array, Array]:
     """Standard normal (2, DRAWS + 1) for the rotor and uniform (4, DRAWS + 1) for the shares; the first is nominal."""
-    from scipy.stats import norm, qmc
+    from scipy.special import ndtri
 
-    u = qmc.Sobol(6, seed=0).random(DRAWS).T
-    z = norm.ppf(np.clip(u[:2], 1e-9, 1.0 - 1e-9))
+    steps = np.array([pow(LATTICE, j, DRAWS) for j in range(6)])
+    u = (np.outer(steps, np.arange(DRAWS)) + 0.5) / DRAWS % 1.0
+    z = ndtri(u[:2])
     return np.c_[np.zeros(2), z], np.c_[np.full(4, math.nan), u[2:]]
 
 
