@@ -16,7 +16,7 @@ from bemt.case.prepare import prepare_case
 from bemt.design import optimise as search
 from bemt.design.materials import MATERIALS, SectionStrength, stress
 from bemt.design.minimum_loss import actuator_disk, minimum_loss, sheet_speed, without_drag
-from bemt.design.problem import _CL, _W, Problem
+from bemt.design.problem import _CL, _W, BladeProblem
 from bemt.design.requirement import DesignPoint, required
 from bemt.design.shape import CONTROLS
 from bemt.effects import from_text
@@ -129,7 +129,7 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     assert sheet_speed(gamma, s.r, B, phi, F)[some] == pytest.approx(ideal.displacement, rel=0.02)
 
 
-def _open_problem() -> tuple[Problem, np.ndarray]:
+def _open_problem() -> tuple[BladeProblem, np.ndarray]:
     R = 0.127
     blade = from_laws(2 * R, pitch={"pitch": 0.17}, anchors=naca("4412"))
     from bemt.sections.neuralfoil import neuralfoil_polar
@@ -140,7 +140,7 @@ def _open_problem() -> tuple[Problem, np.ndarray]:
     return search.problem_of(model, need, blade)
 
 
-def _ducted_problem(project) -> tuple[Problem, np.ndarray]:
+def _ducted_problem(project) -> tuple[BladeProblem, np.ndarray]:
     case = load_case(project / "cases/ds30/case.toml")
     model = prepare_case(case)
     need = required([DesignPoint(15.0, 10.0, 45_000.0)], case.diameter_m, 0.368, 11, case.air(), material="pa12")

@@ -39,8 +39,8 @@ def text(table: pd.DataFrame) -> str:
     ]
     if not good:
         reach = table.loc[table.full_thrust_N.idxmax()]
-        lines[2:] = [f"none meets it. The most thrust has {reach.label} at {reach.kv:.0f} rev/min/V: "
-                     f"{reach.full_thrust_N:.3g} N", ""]  # fmt: skip
+        most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
+        lines[2:] = [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}", ""]
     timed = "min" if t.capacity_Ah is not None else "min/Ah"
     head = ["propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "why not the first"]
     rows = [

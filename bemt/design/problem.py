@@ -90,7 +90,7 @@ class Values:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class BladeProblem:
     """A requirement, a model with its sections and duct, and blades around a start.
 
     ``variants`` are the effects of the rotors that count alike: one rotor as drawn, or several as built. Variables are
@@ -161,16 +161,22 @@ class Problem:
         return materials.strength(anchors, blend_weights(self.shape.r / self.shape.R, x))
 
     @cached_property
-    def chord_range(self) -> tuple[Array, Array]:
-        """Least and largest ln(chord / R) at hub, elements and tip, (N + 2,)."""
+    def chord_limits(self) -> tuple[Array, Array, Array]:
+        """Chords [m] at hub, elements and tip, (N + 2,), that are asked for, that the least thickness asks for, and most."""
         limits, s = self.need.limits, self.shape
         r = np.r_[s.Rhub, s.r, s.R]
         anchors = self.model.rotor.blade.anchors
         thickness = np.interp(r / s.R, [a[0] for a in anchors], [a[1].thickness for a in anchors])
-        least = np.maximum(limits.min_chord_m, limits.min_thickness_m / thickness) / s.R
         wide, gaps = (1.0, FAN_GAPS) if self.model.ducted else (WIDEST, GAPS)
-        most = np.minimum(wide, gaps * 2.0 * np.pi * r / s.R / self.need.blades)
-        return np.log(least), np.log(np.maximum(most, least))
+        most = np.minimum(wide * s.R, gaps * 2.0 * np.pi * r / self.need.blades)
+        return np.full(r.size, limits.min_chord_m), limits.min_thickness_m / thickness, most
+
+    @cached_property
+    def chord_range(self) -> tuple[Array, Array]:
+        """Least and largest ln(chord / R) at hub, elements and tip, (N + 2,)."""
+        asked, thick, most = self.chord_limits
+        least = np.maximum(asked, thick)
+        return np.log(least / self.shape.R), np.log(np.maximum(most, least) / self.shape.R)
 
     def speeds(self, x: Array) -> Array:
         """Speeds of the points, (P,) [rev/min]."""

@@ -19,6 +19,7 @@ from geometry.common import pchip
 
 Array = NDArray[np.float64]
 FINE = 481
+SPEED_STEP = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,15 @@ def loads_of_case(
 
 
 def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
-    """Bands of a label at one speed, by `bemt.case.propagate`: declared unknowns, model and numerics."""
+    """Bands of a label near a speed, by `bemt.case.propagate`: declared unknowns, model and numerics.
+
+    Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.
+    """
+    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s)
+
+
+@lru_cache(maxsize=512)
+def _scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
     case = case_of_label(label)
     found = propagate(case, rpm, airspeed_m_s)
     T, Q = (float(found.nominal[key][0]) for key in ("thrust_N", "torque_Nm"))
