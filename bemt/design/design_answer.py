@@ -129,8 +129,8 @@ def _bought(d: Design) -> list[str]:
     lines.append(f"{_ratio(d.mean_W / ideal)} the {name}")
     least = min(d.values.thrust_N / [p.thrust_N for p in d.need.points])
     if least > MUCH:
-        lines.append(f"{least:.3g} times the thrust asked for: at this speed less of it takes no less power. Try a smaller "
-                     "diameter or less rpm")  # fmt: skip
+        lines.append(f"{least:.3g} times the thrust asked for: at this speed less of it takes no less power. "
+                     "Try a smaller diameter or less rpm")  # fmt: skip
     return lines
 
 

@@ -180,8 +180,9 @@ def required(
         for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
             mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
             if mach > max_tip_mach and rpm is None:
-                faults.append(Fault("--airspeed", "", f"{V:g} m/s, Mach {mach:.2f}", f"a Mach number up to {max_tip_mach:g}",
-                                    "The tip is faster still: raise --max-tip-mach"))  # fmt: skip
+                hint = "The tip is faster still: raise --max-tip-mach"
+                expected = f"a Mach number up to {max_tip_mach:g}"
+                faults.append(Fault("--airspeed", "", f"{V:g} m/s, Mach {mach:.2f}", expected, hint))
             elif mach > max_tip_mach:
                 top = (
                     60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)

@@ -162,12 +162,12 @@ def choose(
     import pandas as pd
 
     target = _target(thrust_N, cells, mass_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah, minutes)
-    kv, blades = ((v,) if isinstance(v, (Real, str)) else tuple(v) for v in (kv, blades))
-    _check(kv, max_diameter_in, sure, blades)
-    kvs = np.geomspace(min(kv), max(kv), 60) if min(kv) < max(kv) else np.array([kv[0]])
+    ends, counts = _several(kv), _several(blades)
+    _check(ends, max_diameter_in, sure, counts)
+    kvs = np.geomspace(min(ends), max(ends), 60) if min(ends) < max(ends) else np.array(ends[:1])
     known = read_motors(motors) if isinstance(motors, (str, os.PathLike)) else tuple(motors)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
-    names = ((labels,) if isinstance(labels, str) else tuple(labels)) or _standard(target, max_diameter_in, blades)
+    names = _several(labels) or _standard(target, max_diameter_in, counts)
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
         raise InputError(Fault("", "labels", "none that can be solved", "a propeller that can reach the speed"))
@@ -177,6 +177,15 @@ def choose(
     table["why"] = _reasons(table, target, sure)
     table.attrs |= {"target": target, "sure": sure}
     return table
+
+
+def _several(value: Any) -> tuple[Any, ...]:
+    """One value, or several."""
+    return (value,) if isinstance(value, str) or _is_number(value) else tuple(value)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _target(
@@ -192,11 +201,11 @@ def _target(
         faults.append(Fault("", "capacity", "nothing", "the battery's capacity [A h], for the time"))
     named = {"thrust": thrust_N, "mass": mass_kg, "cells": cells, "rotors": rotors, "airspeed": airspeed_m_s,
              "max-tip-mach": max_tip_mach, "capacity": capacity_Ah, "hover-time": minutes}  # fmt: skip
-    faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if v is not None and not isinstance(v, Real)]
-    faults += [Fault("", k, f"{v}", "a whole number") for k, v in named.items()
-               if k in ("cells", "rotors") and isinstance(v, Real) and math.isfinite(v) and v != int(v)]  # fmt: skip
+    faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
     if faults:
         raise InputError(faults)
+    faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("cells", cells), ("rotors", rotors))
+               if v is not None and v % 1 != 0]  # fmt: skip
     mAh = "In mAh? Divide by 1000" if capacity_Ah is not None and capacity_Ah > 200.0 else ""
     grams = "In grams? Divide by 1000" if mass_kg is not None and mass_kg > 1000.0 else ""
     fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
@@ -220,7 +229,7 @@ def _target(
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
     faults = []
-    if not 1 <= len(kv) <= 2 or not all(isinstance(v, Real) and 20.0 <= v <= 50_000.0 for v in kv):
+    if not 1 <= len(kv) <= 2 or not all(_is_number(v) and 20.0 <= v <= 50_000.0 for v in kv):
         faults.append(Fault("", "kv", ":".join(f"{v}" for v in kv), "LOW:HIGH from 20 to 50000 rev/min/V"))
     if max_diameter_in is not None and not 1.0 <= max_diameter_in <= 120.0:
         hint = "Is that in mm? Divide by 25.4" if max_diameter_in > 120.0 else ""
@@ -244,7 +253,9 @@ def _standard(target: Target, max_in: float | None, blades: Sequence[int]) -> tu
         out += [f"{D}x{P:g}" + (f"x{B}" if B != 2 else "") for P in pitches for B in blades]
     if not out:
         sizes = [D for D in DIAMETERS if max_in is None or max_in >= D] or list(DIAMETERS[:1])
-        least, most = (x * 0.25 * math.pi * (D * INCH) ** 2 for x, D in zip(LOADING, (sizes[0], sizes[-1]), strict=True))
+        least, most = (
+            x * 0.25 * math.pi * (D * INCH) ** 2 for x, D in zip(LOADING, (sizes[0], sizes[-1]), strict=True)
+        )
         got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:g} in")
         expected = f"{least:.2g} to {most:.3g} N, the load of standard sizes from {sizes[0]} to {sizes[-1]} in"
         raise InputError(Fault("", "thrust", got, expected, "Other sizes: name them with --labels"))

@@ -86,8 +86,8 @@ def design(
     from bemt.design.blade_design import design_blade
     from bemt.design.requirement import DesignPoint
 
-    given = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm, "blades": blades,
-             "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,
+    given = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
+             "blades": blades, "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,
              "min_chord_mm": min_chord_mm, "min_thickness_mm": min_thickness_mm, "max_tip_mach": max_tip_mach,
              "stall_margin": stall_margin, "safety": safety, "density_kg_m3": density_kg_m3}  # fmt: skip
     words = [k for k, v in given.items() if not isinstance(v, (Real, type(None)))]
