@@ -15,7 +15,7 @@ from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.design import optimise as search
 from bemt.design.materials import MATERIALS, SectionStrength, stress
-from bemt.design.minimum_loss import actuator_disk, minimum_loss, sheet_speed, without_drag
+from bemt.design.minimum_loss import actuator_disk, minimum_loss, without_drag
 from bemt.design.problem import _CL, _W, BladeProblem
 from bemt.design.requirement import DesignPoint, required
 from bemt.design.shape import CONTROLS
@@ -192,7 +192,8 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     assert found.before.power_W[0] > 1.01 * ideal.power_W
     phi = np.interp(s.r, ideal.r, ideal.phi)
     F = 2 / np.pi * np.arccos(np.exp(-0.5 * B * (1 - s.r / R) / np.sin(np.arctan(np.tan(phi) * s.r / R))))
-    assert sheet_speed(gamma, s.r, B, phi, F)[some] == pytest.approx(ideal.displacement, rel=0.02)
+    sheet_speed = gamma * B / (2.0 * np.pi * s.r * F * np.sin(phi) * np.cos(phi))  # the same along a blade of least loss
+    assert sheet_speed[some] == pytest.approx(ideal.displacement, rel=0.02)
 
 
 def _open_problem() -> tuple[BladeProblem, np.ndarray]:
@@ -219,7 +220,7 @@ def test_gradients_are_those_of_whole_evaluations(which: str, project) -> None:
     x = x + 0.01 * np.random.default_rng(0).normal(size=x.size)
     v = problem.values(x, derivatives=True)
     slopes = np.vstack([v.gradient, v.jacobian])
-    scale = np.abs(slopes).max(axis=1) + 1e-9
+    scale = np.abs(slopes).max(axis=1) + 1e-3  # the pull in the outermost element hangs on nothing
     for j in range(x.size):
         ends = [problem.values(x + sign * 1e-6 * (np.arange(x.size) == j)) for sign in (1.0, -1.0)]
         high, low = (np.r_[one.objective, one.margins] for one in ends)
