@@ -192,7 +192,8 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     assert found.before.power_W[0] > 1.01 * ideal.power_W
     phi = np.interp(s.r, ideal.r, ideal.phi)
     F = 2 / np.pi * np.arccos(np.exp(-0.5 * B * (1 - s.r / R) / np.sin(np.arctan(np.tan(phi) * s.r / R))))
-    sheet_speed = gamma * B / (2.0 * np.pi * s.r * F * np.sin(phi) * np.cos(phi))  # the same along a blade of least loss
+    # one speed of the sheets along a blade of least loss
+    sheet_speed = gamma * B / (2.0 * np.pi * s.r * F * np.sin(phi) * np.cos(phi))
     assert sheet_speed[some] == pytest.approx(ideal.displacement, rel=0.02)
 
 

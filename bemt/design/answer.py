@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bemt.base.canvas import png
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.design.rotor_loads import size_in
 from bemt.design.search import Target
@@ -98,12 +98,9 @@ def picture(table: pd.DataFrame) -> bytes:
         ax.legend(frameon=False, fontsize=8)
     ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
     ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
+    ax.margins(x=0.12)  # room for the labels to the left
     ax.grid(True, alpha=0.3)
-    for side in ("top", "right"):
-        ax.spines[side].set_visible(False)
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    return png(figure)
 
 
 def _banded(value: float, u: float) -> str:

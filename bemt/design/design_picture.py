@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.canvas import BLUE, GREY, ORANGE
+from bemt.base.canvas import BLUE, GREY, ORANGE, png
 from bemt.design.blade_design import Design
 
 Array = NDArray[np.float64]
@@ -62,11 +61,7 @@ def picture(d: Design) -> bytes:
     axes["lift"].legend(frameon=False, fontsize=8)
     for ax in axes.values():
         ax.grid(True, alpha=0.3)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    return png(figure)
 
 
 def _outline(ax: Any, r: Array, chord: Array, look: dict[str, Any]) -> None:
