@@ -20,6 +20,7 @@ from geometry.common import pchip
 Array = NDArray[np.float64]
 FINE = 481
 SPEED_STEP = 1.2
+"""Ratio of neighbouring speeds at which bands are computed [1]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,9 @@ is known is as large as the rotor needs: winding, idle current and battery take 
     Omega_full = (1 - drop) (1 - sag) V_oc / k,   I_full = Q_full / (k (1 - idle)),   R = drop (1 - sag) V_oc / I_full.
 
 Rotor, motor and battery vary together: thrust and torque of the rotor with the bands and the correlation of
-`bemt.case.propagate`, log-normal; each share uniform on either side of its value, which is its median: the ranges are
-not even, and drawn evenly they would cost thrust. The same 256 draws serve every pair, so that
-the ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol's points without the half-second import of
-`scipy.stats`.
+`bemt.case.propagate`, log-normal; each share uniform on either side of its value, which is its median (the ranges reach
+further up: drawn evenly, the losses would be larger than typical). The same 256 draws serve every pair, so that the
+ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol's points without the import of `scipy.stats`.
 """
 
 from __future__ import annotations
