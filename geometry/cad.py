@@ -90,9 +90,8 @@ def planar_sections(
     bottom, top = float(x[0].max()), float(x[-1].min())
     root = _inner_plane(curves[0], rotor.Rhub)
     if root < bottom or top < rotor.R:
-        raise GeometryError(
-            [("chord", "a blade too wide for its hub", "a root that ends inside the hub", "Less chord or a larger hub")]
-        )
+        hint = "Less chord, a larger hub, or a mesh (STL, 3MF, OBJ) instead of STEP"
+        raise GeometryError([("chord", "a blade too wide for its hub", "a root that ends inside the hub", hint)])
     planes = np.unique(np.concatenate([[root], rho[(rho > 1.01 * root) & (rho < rotor.R)], [rotor.R + 0.4 * step]]))
     if printed is None:
         planes = planes[np.concatenate([[True], np.diff(planes) > apart * rotor.R])]

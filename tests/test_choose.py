@@ -115,7 +115,17 @@ def test_an_unreachable_target_names_the_nearest(capsys: pytest.CaptureFixture[s
         ({"thrust_N": 4000.0, "cells": 6, "max_diameter_in": 10.0}, "thrust"),
         ({"thrust_N": 5.0, "cells": 3, "airspeed_m_s": 200.0}, "airspeed"),
         ({"thrust_N": 5.0, "cells": 3, "sure": 1.5}, "sure"),
-        ({"thrust_N": 5.0, "cells": 3, "labels": ["10y5"]}, ""),
+        ({"thrust_N": 5.0, "cells": 3, "labels": ["10y5"]}, ""), ({"thrust_N": 5.0, "cells": 3, "labels": ""}, ""),
+        ({"thrust_N": "5", "cells": 3}, "thrust"), ({"thrust_N": math.inf, "cells": 3}, "thrust"),
+        ({"thrust_N": 5.0, "cells": 3.5}, "cells"), ({"thrust_N": 5.0, "cells": -3}, "cells"),
+        ({"thrust_N": 5.0, "cells": 3, "kv": "900"}, "kv"), ({"thrust_N": 5.0, "cells": 3, "kv": (9, 99, 999)}, "kv"),
+        ({"thrust_N": 5.0, "cells": 3, "kv": math.nan}, "kv"), ({"thrust_N": 5.0, "cells": 3, "blades": 0}, "blades"),
+        ({"thrust_N": 5.0, "cells": 3, "max_diameter_in": -3.0}, "max-diameter-in"),
+        ({"thrust_N": 5.0, "cells": 3, "airspeed_m_s": -1.0}, "airspeed"), ({"mass_kg": 1500.0, "cells": 3}, "mass"),
+        ({"mass_kg": 1.5, "cells": 3, "rotors": 0}, "rotors"), ({"thrust_N": 0.02, "cells": 3}, "thrust"),
+        ({"thrust_N": 5.0, "cells": 3, "capacity_Ah": -1.0}, "capacity"),
+        ({"thrust_N": 5.0, "cells": 3, "sure": 90.0}, "sure"),
+        ({"thrust_N": 5.0, "cells": 3, "motors": "none.csv"}, ""),
     ],
 )  # fmt: skip
 def test_odd_requests_are_refused(request_, where: str) -> None:
@@ -125,16 +135,52 @@ def test_odd_requests_are_refused(request_, where: str) -> None:
         assert {f.where for f in error.value.faults} <= set(where.split("|"))
 
 
-def test_a_file_of_motors_is_read_or_refused_with_all_its_faults(tmp_path) -> None:
+def test_a_thrust_outside_the_standard_sizes_names_the_range_that_they_carry() -> None:
+    with pytest.raises(InputError) as error:
+        choose(3000.0, 6, max_diameter_in=18.0)
+    least, most = (float(v) for v in error.value.faults[0].expected.split(" N")[0].split(" to "))
+    assert len(choose(0.95 * most, 20, max_diameter_in=18.0, kv=300.0)) and least < most < 3000.0
+
+
+HEAD = "name,kv,resistance_mohm,no_load_A\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        HEAD + "A,900,90,0.8\nB,400,,\n", "Name,KV,Resistance_mOhm,No_Load_A,price\nA,900,90,0.8,12\n\nB,400,,,\n",
+        "\ufeff" + HEAD.replace(",", ";") + "A;900;90;0,8\nB;400;;\n",
+        "kv\tno_load_A\tresistance_mohm\tname\n900\t0,8\t90,0\tA\n400\t\t\tB\n",
+    ],
+)  # fmt: skip
+def test_a_file_of_motors_is_read(text: str, tmp_path) -> None:
     file = tmp_path / "motors.csv"
-    file.write_text("name,kv,resistance_mohm,no_load_A\nA,900,90,0.8\nB,400,,\n")
+    file.write_text(text, encoding="utf-8")
     a, b = read_motors(file)
-    assert (a.kv, a.resistance_ohm, a.no_load_A) == (900.0, pytest.approx(0.09), 0.8)
-    assert math.isnan(b.resistance_ohm) and math.isnan(b.no_load_A)
-    file.write_text("name,kv,resistance_mohm,no_load_A\nA,9,0.01,nan\nB,x,5,-1\n")
+    assert (a.name, a.kv, a.resistance_ohm, a.no_load_A) == ("A", 900.0, pytest.approx(0.09), 0.8)
+    assert b.kv == 400.0 and math.isnan(b.resistance_ohm) and math.isnan(b.no_load_A)
+
+
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        ("", 1), ("\n \n", 1), (HEAD, 1), ("name,kv\nA,900\n", 2), (HEAD + "A,9,0.01,nan\nB,x,5,-1\n", 5),
+        (HEAD + "A,900,0.09,0.8\n", 1), (HEAD + "A,900,90,800\n", 1), (HEAD + "A,0.9,90,0.8\n", 1),
+        (HEAD + "A,900,90,0,8\n", 1), (HEAD + "A,-900,inf,0.8\nB,,90,0.8\n", 3), (b"\xff\xfe\x00", 1),
+    ],
+)  # fmt: skip
+def test_a_doubtful_file_of_motors_is_refused_with_all_its_faults(text: str | bytes, faults: int, tmp_path) -> None:
+    file = tmp_path / "motors.csv"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError) as error:
         read_motors(file)
-    assert len(error.value.faults) == 5
+    assert len(error.value.faults) == faults
+
+
+@pytest.mark.parametrize("motor", [KnownMotor("M", 900.0), KnownMotor("M", 900.0, 0.1)])
+def test_the_nominal_thrust_is_met_as_often_as_not(motor: KnownMotor) -> None:
+    nominal = choose(3.0, 3, labels="10x4.5", motors=[motor]).full_thrust_N.iloc[0]
+    assert choose(nominal, 3, labels="10x4.5", motors=[motor]).probability.iloc[0] == pytest.approx(0.5, abs=0.08)
 
 
 def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,8 +15,8 @@ from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.design import optimise as search
 from bemt.design.materials import MATERIALS, SectionStrength, stress
-from bemt.design.minimum_loss import actuator_disk, minimum_loss, sheet_speed, without_drag
-from bemt.design.problem import _CL, _W, Problem
+from bemt.design.minimum_loss import actuator_disk, minimum_loss, without_drag
+from bemt.design.problem import _CL, _W, BladeProblem
 from bemt.design.requirement import DesignPoint, required
 from bemt.design.shape import CONTROLS
 from bemt.effects import from_text
@@ -53,6 +53,72 @@ def test_the_example_of_adkins_and_liebeck() -> None:
     assert 1.0 < off.mean() < 3.5
     assert found.thrust_N == pytest.approx(THRUST_LBF * LBF, rel=0.005)
     assert found.thrust_N * V / P == pytest.approx(THRUST_LBF * LBF * V / P, abs=0.004)  # efficiency, 0.869
+
+
+# XROTOR's own designs of least induced loss with its discrete vortex wake, independent of Prandtl's factor and of this
+# method's induced velocities: github.com/alpaan/propeller_design_tools, prop_database/MyPropeller (1ff0b91) and
+# MyPropeller2 (7638ac9), files .meta. Rows: r/R, chord/R, blade angle [rad], circulation/(V R), drag coefficient.
+XROTOR_LIGHT = np.array([
+    (0.121993, 0.0698377, 0.896709, 0.00791291, 0.0370097),
+    (0.162473, 0.189962, 0.756795, 0.0244102, 0.0242845),
+    (0.261051, 0.232041, 0.525386, 0.04009, 0.0202543),
+    (0.37086, 0.212349, 0.376809, 0.0484378, 0.0189071),
+    (0.479754, 0.184006, 0.286591, 0.0525779, 0.0183431),
+    (0.583264, 0.158902, 0.228972, 0.0543138, 0.0181123),
+    (0.678762, 0.13767, 0.190289, 0.0542655, 0.0180978),
+    (0.764299, 0.118653, 0.1634, 0.0523743, 0.018309),
+    (0.8383, 0.100079, 0.144368, 0.0482838, 0.0188335),
+    (0.899469, 0.080736, 0.130912, 0.0416988, 0.0198433),
+    (0.946769, 0.0601736, 0.12166, 0.0326649, 0.0216796),
+    (0.972655, 0.0440566, 0.116966, 0.0245522, 0.0240777),
+    (0.990048, 0.0276264, 0.113943, 0.015664, 0.0284637),
+    (0.999757, 0.00648386, 0.112294, 0.00371147, 0.0492488),
+])  # fmt: skip
+XROTOR_HEAVY = np.array([
+    (0.181316, 0.130842, 0.418682, 0.0816693, 0.0281066),
+    (0.210291, 0.301054, 0.368339, 0.218567, 0.0189583),
+    (0.291897, 0.265352, 0.277468, 0.268679, 0.0174557),
+    (0.391549, 0.203677, 0.215845, 0.277365, 0.017235),
+    (0.494203, 0.163207, 0.177415, 0.28089, 0.0171482),
+    (0.59351, 0.136698, 0.152344, 0.282739, 0.0171032),
+    (0.685982, 0.118667, 0.135124, 0.2838, 0.0170776),
+    (0.769253, 0.106013, 0.122839, 0.284386, 0.0170635),
+    (0.841532, 0.0967743, 0.113893, 0.28404, 0.0170718),
+    (0.901407, 0.0886815, 0.10738, 0.278835, 0.0171986),
+    (0.947768, 0.0771384, 0.102778, 0.255033, 0.0178235),
+    (0.973162, 0.0625869, 0.100394, 0.212474, 0.0191739),
+    (0.99023, 0.0421306, 0.0988354, 0.145539, 0.0223069),
+    (0.999761, 0.0102472, 0.0979567, 0.0357399, 0.0391175),
+])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("table", "B", "R", "Rhub", "V", "rpm", "power_W", "cl", "rho", "thrust_N"),
+    [
+        (XROTOR_LIGHT, 3, 0.5, 0.06, 15.0, 1800.0, 400.0, 0.18, 0.7364, 16.88),
+        (XROTOR_HEAVY, 5, 0.1, 0.018, 6.0, 20_000.0, 250.0, 0.2, 1.1117, 8.894),  # slipstream four times the airspeed
+    ],
+)
+def test_designs_of_xrotor(table, B, R, Rhub, V, rpm, power_W, cl, rho, thrust_N) -> None:
+    """Chord, circulation, thrust within 2 %, twist within 0.05 deg; inboard XROTOR lets the hub take the lift off."""
+    x, chord, beta, G, cd = table.T
+
+    def section(Re):
+        edges = Rhub + (R - Rhub) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, Re.size + 1)))
+        r = 0.5 * (edges[1:] + edges[:-1])
+        return np.full_like(Re, cl), np.zeros_like(Re), np.interp(r / R, x, cd) / cl
+
+    found = minimum_loss(power_W, V, rpm, B, R, Rhub, section, rho, 1.7e-5, power=True)
+    assert found.thrust_N == pytest.approx(thrust_N, rel=0.005)
+    some = (x > 0.36) & (x < 0.975)
+    at = x[some] * R
+    assert np.interp(at, found.r, found.chord) / R == pytest.approx(chord[some], rel=0.02)
+    assert np.interp(at, found.r, found.circulation) / (V * R) == pytest.approx(G[some], rel=0.01)
+    # angle of attack: cl over the slope 2 pi / sqrt(1 - M^2), and the section's own zero-lift angle
+    mach = np.hypot(V, rpm * math.pi / 30.0 * at) / 338.0
+    alpha = cl / (2.0 * math.pi) * np.sqrt(1.0 - mach**2)
+    zero = np.degrees(beta[some] - np.interp(at, found.r, found.phi) - alpha)
+    assert zero == pytest.approx(zero.mean(), abs=0.05)
 
 
 def _helices(B: int, lam: float, rv: np.ndarray, rc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -126,10 +192,12 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
     assert found.before.power_W[0] > 1.01 * ideal.power_W
     phi = np.interp(s.r, ideal.r, ideal.phi)
     F = 2 / np.pi * np.arccos(np.exp(-0.5 * B * (1 - s.r / R) / np.sin(np.arctan(np.tan(phi) * s.r / R))))
-    assert sheet_speed(gamma, s.r, B, phi, F)[some] == pytest.approx(ideal.displacement, rel=0.02)
+    # one speed of the sheets along a blade of least loss
+    sheet_speed = gamma * B / (2.0 * np.pi * s.r * F * np.sin(phi) * np.cos(phi))
+    assert sheet_speed[some] == pytest.approx(ideal.displacement, rel=0.02)
 
 
-def _open_problem() -> tuple[Problem, np.ndarray]:
+def _open_problem() -> tuple[BladeProblem, np.ndarray]:
     R = 0.127
     blade = from_laws(2 * R, pitch={"pitch": 0.17}, anchors=naca("4412"))
     from bemt.sections.neuralfoil import neuralfoil_polar
@@ -140,7 +208,7 @@ def _open_problem() -> tuple[Problem, np.ndarray]:
     return search.problem_of(model, need, blade)
 
 
-def _ducted_problem(project) -> tuple[Problem, np.ndarray]:
+def _ducted_problem(project) -> tuple[BladeProblem, np.ndarray]:
     case = load_case(project / "cases/ds30/case.toml")
     model = prepare_case(case)
     need = required([DesignPoint(15.0, 10.0, 45_000.0)], case.diameter_m, 0.368, 11, case.air(), material="pa12")
@@ -153,7 +221,7 @@ def test_gradients_are_those_of_whole_evaluations(which: str, project) -> None:
     x = x + 0.01 * np.random.default_rng(0).normal(size=x.size)
     v = problem.values(x, derivatives=True)
     slopes = np.vstack([v.gradient, v.jacobian])
-    scale = np.abs(slopes).max(axis=1) + 1e-9
+    scale = np.abs(slopes).max(axis=1) + 1e-3  # the pull in the outermost element hangs on nothing
     for j in range(x.size):
         ends = [problem.values(x + sign * 1e-6 * (np.arange(x.size) == j)) for sign in (1.0, -1.0)]
         high, low = (np.r_[one.objective, one.margins] for one in ends)

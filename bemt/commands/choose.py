@@ -56,10 +56,9 @@ def run(args: argparse.Namespace) -> int:
     """Rank; 1 if nothing meets the target with the probability asked for."""
     from bemt.base.tables import json_text
     from bemt.design import answer, choose
-    from bemt.design.motors_file import read_motors
 
     table = choose(
-        args.thrust, args.cells, kv=args.kv, motors=read_motors(args.motors) if args.motors else (),
+        args.thrust, args.cells, kv=args.kv, motors=args.motors or (),
         labels=args.labels or (), blades=args.blades or (2,), mass_kg=args.mass, rotors=args.rotors,
         airspeed_m_s=args.airspeed, max_diameter_in=args.max_diameter_in, max_tip_mach=args.max_tip_mach,
         capacity_Ah=args.capacity, minutes=args.hover_time, sure=args.sure,

@@ -39,8 +39,8 @@ def text(table: pd.DataFrame) -> str:
     ]
     if not good:
         reach = table.loc[table.full_thrust_N.idxmax()]
-        lines[2:] = [f"none meets it. The most thrust has {reach.label} at {reach.kv:.0f} rev/min/V: "
-                     f"{reach.full_thrust_N:.3g} N", ""]  # fmt: skip
+        most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
+        lines[2:] = [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}", ""]
     timed = "min" if t.capacity_Ah is not None else "min/Ah"
     head = ["propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "why not the first"]
     rows = [
@@ -94,6 +94,7 @@ def picture(table: pd.DataFrame) -> bytes:
         ax.legend(frameon=False, fontsize=8)
     ax.set(xlabel="diameter [in]", ylabel=f"power at {t.at_N:.3g} N [W]")
     ax.set_title(f"{t.thrust_N:.3g} N on {t.cells}S: best motor of each propeller (label, rev/min/V)", fontsize=10)
+    ax.margins(x=0.12)  # room for the labels to the left
     canvas.frame(ax)
     return canvas.png(figure)
 

@@ -23,7 +23,7 @@ from bemt.case.unknowns import AIR, SECTION, SURFACE
 from bemt.design import optimise as search
 from bemt.design.best_label import Label, best_labels
 from bemt.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
-from bemt.design.problem import Values
+from bemt.design.problem import BladeProblem, Values
 from bemt.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ KEYS_KEPT = ("rotor", "duct", "air", "model", "polars")
 
 
 @dataclass(frozen=True)
-class Band:
+class BandedLoads:
     """Thrust [N] and power [W] at a point with their standard uncertainties."""
 
     thrust_N: float
@@ -68,7 +68,7 @@ class Design:
     ----------
     need : Requirement
         What was asked for.
-    found : Found
+    found : Optimum
         Start and result of the optimisation, for rotors as built if robust.
     files : dict of str to bytes
         Case folder: ``case.toml`` and ``stations.csv``, and what else the sections need.
@@ -82,14 +82,14 @@ class Design:
         Limits that it does not keep.
     disk_W, betz_W : float
         Mean power of the ideal disk and of the best blade without drag (NaN in a duct) [W].
-    bands, label_bands : tuple of Band
+    bands, label_bands : tuple of BandedLoads
         At each point.
     robust : tuple of OverRotors, or None
         This blade, and the one for the drawing alone, over rotors as built.
     """
 
     need: Requirement
-    found: search.Found
+    found: search.Optimum
     files: dict[str, bytes]
     start: MinimumLoss | None
     label: Label | None
@@ -97,8 +97,8 @@ class Design:
     label_breaks: tuple[str, ...]
     disk_W: float
     betz_W: float
-    bands: tuple[Band, ...]
-    label_bands: tuple[Band, ...]
+    bands: tuple[BandedLoads, ...]
+    label_bands: tuple[BandedLoads, ...]
     robust: tuple[OverRotors, OverRotors] | None
     ducted: bool
 
@@ -174,6 +174,7 @@ def design_blade(
         blade, start = search.start_blade(model, need)
     else:
         blade, start = model.rotor.blade, None
+    _check_chords(search.problem_of(model, need, blade)[0])
     say("propellers on sale")
     label, same = best_labels(need, duct)
     free = next((i for i, p in enumerate(need.points) if p.rpm is None), None)
@@ -199,7 +200,7 @@ def design_blade(
         after = plain.values(better.best)
         assert after is not None
         over = _over_rotors(better, variants), drawn
-        found = search.Found(plain, found.start, better.best, found.before, after, found.steps + better.steps,
+        found = search.Optimum(plain, found.start, better.best, found.before, after, found.steps + better.steps,
                              better.converged)  # fmt: skip
         files = case_files(base, found, points)
     say("bands")
@@ -209,6 +210,21 @@ def design_blade(
     breaks = () if label is None else _breaks(label, need)
     return Design(need, found, files, start, label, same, breaks, *_ideal(need, model, found), bands, label_bands, over,
                   duct is not None)  # fmt: skip
+
+
+def _check_chords(problem: BladeProblem) -> None:
+    """Refuse a least chord or thickness that the largest chord does not allow on the outer half of the blade."""
+    outer = np.r_[0.0, problem.shape.r, problem.shape.R] > 0.5 * problem.shape.R
+    asked, thick, most = (v[outer] for v in problem.chord_limits)
+    limits, faults = problem.need.limits, []
+    for name, value, least in (("--min-chord-mm", limits.min_chord_m, asked),
+                               ("--min-thickness-mm", limits.min_thickness_m, thick)):  # fmt: skip
+        if np.any(least > most):
+            room = 1e3 * value * float((most / least).min())
+            widest = f"The largest chord is {1e3 * most.max():.3g} mm"
+            faults.append(Fault(name, "", f"{1e3 * value:g}", f"up to {room:.3g} mm", widest))
+    if faults:
+        raise InputError(faults)
 
 
 def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
@@ -225,24 +241,24 @@ def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
     )
 
 
-def _over_rotors(found: search.Found, variants: Sequence[Any]) -> OverRotors:
+def _over_rotors(found: search.Optimum, variants: Sequence[Any]) -> OverRotors:
     """Means and standard deviations over rotors as built at the first point, each at the same speed."""
     each = [replace(found.problem, variants=(tuple(v),)).values(found.best) for v in variants]
     T, P = np.array([(v.thrust_N[0], v.power_W[0]) for v in each if v is not None]).T
     return OverRotors(float(T.mean()), float(T.std()), float(P.mean()), float(P.std()))
 
 
-def _bands(case: Case, need: Requirement, rpm: Array) -> tuple[Band, ...]:
+def _bands(case: Case, need: Requirement, rpm: Array) -> tuple[BandedLoads, ...]:
     """Thrust and power of a case at the points with their uncertainties, in the air of the design."""
     rho = float(need.air.rho)
     density = None if math.isclose(rho, float(case.air().rho), rel_tol=1e-9) else np.full(rpm.size, rho)
     V = np.array([p.airspeed_m_s for p in need.points])
     got = propagate(case, rpm, V, density).points
-    return tuple(Band(*(float(v[i]) for v in (got.thrust_N, got.u["thrust_N"], got.power_W, got.u["power_W"])))
+    return tuple(BandedLoads(*(float(v[i]) for v in (got.thrust_N, got.u["thrust_N"], got.power_W, got.u["power_W"])))
                  for i in range(rpm.size))  # fmt: skip
 
 
-def _ideal(need: Requirement, model: Model, found: search.Found) -> tuple[float, float]:
+def _ideal(need: Requirement, model: Model, found: search.Optimum) -> tuple[float, float]:
     """Mean power of the ideal disk and of the best blade without drag. [W]"""
     rho, mu = float(need.air.rho), float(need.air.mu)
     disk, betz = [], []
@@ -364,7 +380,7 @@ def _settled(key: str, changes: Mapping[str, Any]) -> bool:
     return any(key == done or key.startswith(f"{done}.") for done in changes)
 
 
-def case_files(base: Case, found: search.Found, points: Sequence[DesignPoint]) -> dict[str, bytes]:
+def case_files(base: Case, found: search.Optimum, points: Sequence[DesignPoint]) -> dict[str, bytes]:
     """Folder of the blade that was found."""
     import tomlkit
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.base.units import G0, INCH
-from bemt.design.blade_design import Band, Design
+from bemt.design.blade_design import BandedLoads, Design
 from bemt.design.minimum_loss import actuator_disk
 
 SCHEMA = "bemt.design/1"
 RESULTS = ("design.json", "design.png")
+MUCH = 1.05  # Thrust over that asked for from which on the text says why
 
 
 def _at(V: float) -> str:
@@ -36,7 +37,7 @@ def _banded(value: float, u: float) -> str:
     return f"{number_text(value, digits)} ± {number_text(u, 2)}" if math.isfinite(u) else number_text(value, digits)
 
 
-def _loads(b: Band) -> tuple[str, str]:
+def _loads(b: BandedLoads) -> tuple[str, str]:
     return _banded(b.thrust_N, b.u_thrust_N), _banded(b.power_W, b.u_power_W)
 
 
@@ -96,6 +97,17 @@ def text(d: Design) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _ratio(times: float) -> str:
+    """A power over another one, in words.
+
+    >>> _ratio(0.99), _ratio(1.107), _ratio(50.0)
+    ('1.0% less power than', '10.7% more power than', '50 times the power of')
+    """
+    if times > 10.0:
+        return f"{times:.3g} times the power of"
+    return f"{abs(times - 1.0):.1%} {'less' if times <= 1.0 else 'more'} power than"
+
+
 def _bought(d: Design) -> list[str]:
     """What the design buys over the best label, and how far the ideal is."""
     kind = (
@@ -110,12 +122,15 @@ def _bought(d: Design) -> list[str]:
         gain = d.mean_W / d.label.mean_W - 1.0
         words = [f"stress (in {d.need.limits.material.name})" if w == "stress" else w for w in d.label_breaks]
         breaks = f"; it does not keep: {', '.join(words)}" if words else ""
-        lines.append(f"{abs(gain):.1%} {'less' if gain <= 0.0 else 'more'} power than {d.label.name}, the best {kind}, "
-                     f"at the speed that suits it{breaks}")  # fmt: skip
+        lines.append(f"{_ratio(1.0 + gain)} {d.label.name}, the best {kind}, at the speed that suits it{breaks}")
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
             lines.append("leave the rpm out, and the speed is found too")
     ideal, name = (d.disk_W, "ideal disk") if math.isnan(d.betz_W) else (d.betz_W, "best blade without drag")
-    lines.append(f"{d.mean_W / ideal - 1.0:.1%} more power than the {name}")
+    lines.append(f"{_ratio(d.mean_W / ideal)} the {name}")
+    least = min(d.values.thrust_N / [p.thrust_N for p in d.need.points])
+    if least > MUCH:
+        lines.append(f"{least:.3g} times the thrust asked for: at this speed less of it takes no less power. "
+                     "Try a smaller diameter or less rpm")  # fmt: skip
     return lines
 
 

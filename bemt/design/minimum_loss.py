@@ -24,7 +24,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from bemt.bem.duct import DuctFlow
 
@@ -150,9 +150,3 @@ def ducted_disk(thrust_N: float, airspeed_m_s: float, flow: DuctFlow, rho: float
     fast = idle + math.sqrt(k * thrust_N / (rho * flow.area)) + 1e-6
     w = float(brentq(lambda w: rho * flow.area * w * (jet(w) - V) - thrust_N, idle, 2.0 * fast))
     return 0.5 * rho * flow.area * w * (jet(w) ** 2 - V**2)
-
-
-def sheet_speed(circulation: ArrayLike, r: ArrayLike, blades: int, phi: ArrayLike, F: ArrayLike) -> Array:
-    """Displacement speed that a circulation means at each radius; one value along a blade of least loss. [m/s]"""
-    gamma, radius, angle, loss = (np.asarray(v, dtype=float) for v in (circulation, r, phi, F))
-    return np.asarray(gamma * blades / (2.0 * np.pi * radius * loss * np.sin(angle) * np.cos(angle)))

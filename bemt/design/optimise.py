@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.design.minimum_loss import MinimumLoss, minimum_loss
-from bemt.design.problem import Problem, Values, top_lift
+from bemt.design.problem import BladeProblem, Values, top_lift
 from bemt.design.requirement import Requirement
 from bemt.design.shape import CONTROLS, Shape
 from bemt.effects import Effect
@@ -35,12 +35,12 @@ _USUAL_TIP = 0.35  # Mach number of a first guess where the speed is free
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Optimum:
     """A blade found.
 
     Attributes
     ----------
-    problem : Problem
+    problem : BladeProblem
         What was solved.
     start, best : (V,) float
         Variables of start and result.
@@ -52,7 +52,7 @@ class Found:
         Whether the optimum was reached within the tolerance.
     """
 
-    problem: Problem
+    problem: BladeProblem
     start: Array
     best: Array
     before: Values
@@ -108,7 +108,7 @@ def first_speed(need: Requirement) -> float:
 
 def problem_of(
     model: Model, need: Requirement, blade: Blade, rpm0: float | None = None, variants: Sequence[Sequence[Effect]] = ()
-) -> tuple[Problem, Array]:
+) -> tuple[BladeProblem, Array]:
     """Problem around a blade, and the variables of that blade."""
     shape, x = Shape.around(blade, model.n_stations)
     guess = rpm0 or first_speed(need)
@@ -117,7 +117,7 @@ def problem_of(
     free = any(p.rpm is None for p in need.points)
     mach = need.limits.max_tip_mach if free else float(fast / need.air.a_sound)
     limited = replace(model, mach_max=min(1.2 * mach, model.mach_max))
-    problem = Problem(need, limited, shape, rpm, tuple(variants) or (model.effects,), 1.0)
+    problem = BladeProblem(need, limited, shape, rpm, tuple(variants) or (model.effects,), 1.0)
     low, high = problem.chord_range
     nodes = [int(np.argmin(np.abs(np.r_[shape.Rhub, shape.r, shape.R] / shape.R - n))) for n in shape.nodes]
     x[:CONTROLS] = np.clip(x[:CONTROLS], low[nodes] + 1e-3, high[nodes])
@@ -128,7 +128,7 @@ def problem_of(
     return replace(problem, scale_W=scale), np.r_[x, np.zeros(problem.size - 2 * CONTROLS)]
 
 
-def turned(problem: Problem, x: Array) -> Array:
+def turned(problem: BladeProblem, x: Array) -> Array:
     """Turn the whole blade until the hardest point has its thrust, as far as that helps."""
 
     def lacking(angle: float) -> float:
@@ -154,7 +154,7 @@ def turned(problem: Problem, x: Array) -> Array:
     return out
 
 
-def optimise(problem: Problem, x0: Array, progress: Progress | None = None, steps: int = _STEPS) -> Found:
+def optimise(problem: BladeProblem, x0: Array, progress: Progress | None = None, steps: int = _STEPS) -> Optimum:
     """Least mean power within the limits; InputError with the nearest thrust that can be reached, if it cannot."""
     start = turned(problem, x0)
     before = problem.values(start)
@@ -172,10 +172,10 @@ def optimise(problem: Problem, x0: Array, progress: Progress | None = None, step
     if after is None or after.margins.min() < -ENOUGH:  # what was found before is within the limits
         best, after, done = inside, problem.values(inside), False
     assert after is not None
-    return Found(problem, start, best, before, after, n + more, done)
+    return Optimum(problem, start, best, before, after, n + more, done)
 
 
-def most_thrust(problem: Problem, x0: Array, progress: Progress | None = None) -> tuple[float, Array, int]:
+def most_thrust(problem: BladeProblem, x0: Array, progress: Progress | None = None) -> tuple[float, Array, int]:
     """Largest share of all thrusts that can be had at once within the limits (up to `_ROOM`), its variables, and steps.
 
     Linear programs in a box around the last blade, with one slack for all limits (Fletcher and Sainz de la Maza 1989,
@@ -225,7 +225,7 @@ def _merit(v: Values, P: int) -> float:
     return -min(_share(v), _ROOM) + _PENALTY * max(0.0, -float(v.margins[P:].min()))
 
 
-def _least_power(problem: Problem, x0: Array, progress: Progress | None, steps: int) -> tuple[Array, int, bool]:
+def _least_power(problem: BladeProblem, x0: Array, progress: Progress | None, steps: int) -> tuple[Array, int, bool]:
     """Run SLSQP (Kraft 1988, DFVLR-FB 88-28): variables at the end, steps, and whether it converged."""
     from scipy.optimize import minimize
 
@@ -256,7 +256,7 @@ def _least_power(problem: Problem, x0: Array, progress: Progress | None, steps: 
     return np.asarray(found.x), n, bool(found.success)
 
 
-def _unreachable(problem: Problem, x: Array, share: float) -> list[Fault]:
+def _unreachable(problem: BladeProblem, x: Array, share: float) -> list[Fault]:
     """The thrust nearest to the one asked for, and what stands in the way."""
     v = problem.values(x)
     words = [] if v is None else problem.active(v)
@@ -284,7 +284,7 @@ def as_built_variants(model: Model, prior: Prior) -> list[tuple[Effect, ...]]:
     return [(*model.effects, as_built(prior.mean + sign * root[:, k])) for k in range(K) for sign in (1.0, -1.0)]
 
 
-def improve(found: Found, variants: Sequence[Sequence[Effect]], progress: Progress | None = None) -> Found:
+def improve(found: Optimum, variants: Sequence[Sequence[Effect]], progress: Progress | None = None) -> Optimum:
     """The same for the mean of several rotors, from the blade that was found."""
     problem = replace(found.problem, variants=tuple(tuple(v) for v in variants))
     return optimise(problem, found.best, progress)

@@ -3,7 +3,7 @@
     minimise   sum_k w_k P_k                            mean power over the points
     subject to T_k >= T_k required                      also at points of weight 0
                alpha <= that of (1 - margin) cl_max     every element, every point of weight
-               stress <= strength / safety              every other element, every point
+               stress <= strength / safety              every element, every point
                chord >= what chord and thickness ask    every element, hub and tip
                chord <= 0.3 R and 0.9 of the gap between blades (in a duct R and twice the gap)
 
@@ -90,7 +90,7 @@ class Values:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class BladeProblem:
     """A requirement, a model with its sections and duct, and blades around a start.
 
     ``variants`` are the effects of the rotors that count alike: one rotor as drawn, or several as built. Variables are
@@ -161,16 +161,22 @@ class Problem:
         return materials.strength(anchors, blend_weights(self.shape.r / self.shape.R, x))
 
     @cached_property
-    def chord_range(self) -> tuple[Array, Array]:
-        """Least and largest ln(chord / R) at hub, elements and tip, (N + 2,)."""
+    def chord_limits(self) -> tuple[Array, Array, Array]:
+        """Chords at hub, elements and tip, (N + 2,): asked for, that of the least thickness, and the most [m]."""
         limits, s = self.need.limits, self.shape
         r = np.r_[s.Rhub, s.r, s.R]
         anchors = self.model.rotor.blade.anchors
         thickness = np.interp(r / s.R, [a[0] for a in anchors], [a[1].thickness for a in anchors])
-        least = np.maximum(limits.min_chord_m, limits.min_thickness_m / thickness) / s.R
         wide, gaps = (1.0, FAN_GAPS) if self.model.ducted else (WIDEST, GAPS)
-        most = np.minimum(wide, gaps * 2.0 * np.pi * r / s.R / self.need.blades)
-        return np.log(least), np.log(np.maximum(most, least))
+        most = np.minimum(wide * s.R, gaps * 2.0 * np.pi * r / self.need.blades)
+        return np.full(r.size, limits.min_chord_m), limits.min_thickness_m / thickness, most
+
+    @cached_property
+    def chord_range(self) -> tuple[Array, Array]:
+        """Least and largest ln(chord / R) at hub, elements and tip, (N + 2,)."""
+        asked, thick, most = self.chord_limits
+        least = np.maximum(asked, thick)
+        return np.log(least / self.shape.R), np.log(np.maximum(most, least) / self.shape.R)
 
     def speeds(self, x: Array) -> Array:
         """Speeds of the points, (P,) [rev/min]."""
@@ -217,7 +223,7 @@ class Problem:
         spline = self.shape.ln_chord(x)
         margins = np.concatenate([
             T[:P] / self.asked - 1.0, _STEEP * e[_ROOM, self.flown].ravel(),
-            *(np.log(allowed / one.value[::2]) for one in stress), spline - low, high - spline,
+            *(np.log(allowed / one.value) for one in stress), spline - low, high - spline,
         ])  # fmt: skip
         objective = float(self.price @ power[:P] / self.scale_W)
         stresses = np.array([one.value for one in stress])
@@ -234,7 +240,7 @@ class Problem:
             _STEEP * chain(diagonal * by_c[_ROOM, k][:, None], diagonal * by_b[_ROOM, k][:, None])
             for k in self.flown
         ]  # fmt: skip
-        rows += [-chain(one.by_chord[::2], one.by_beta[::2]) / one.value[::2, None] for one in stress]
+        rows += [-chain(one.by_chord, one.by_beta) / one.value[:, None] for one in stress]
         none = np.zeros_like(self.shape.basis)
         rows += [np.c_[self.shape.basis, none], np.c_[-self.shape.basis, none]]
         power_rows = omega[:P, None] * chain(by_c[1, :P], by_b[1, :P])
@@ -255,9 +261,9 @@ class Problem:
             if k in self.flown:
                 place = P + N * int(np.searchsorted(self.flown, k))
                 jacobian[place : place + N, v] = _STEEP * slope(e[_ROOM])
-            ends = [self._stress(i, omega[i], s, e, None, None).value[::2] for i in (up, down)]
-            first = P + self.flown.size * N + k * ends[0].size
-            jacobian[first : first + ends[0].size, v] = -np.log(ends[0] / ends[1]) / wide
+            ends = [self._stress(i, omega[i], s, e, None, None).value for i in (up, down)]
+            first = P + (self.flown.size + k) * N
+            jacobian[first : first + N, v] = -np.log(ends[0] / ends[1]) / wide
         return Values(*rest, gradient, jacobian)
 
     def _solved(
@@ -348,7 +354,7 @@ class Problem:
         return self._words(v, lambda margin: margin < -_TIGHT)
 
     def _words(self, v: Values, chosen: Callable[[Array], NDArray[np.bool_]]) -> list[str]:
-        P, N, S = len(self.need.points), self.shape.r.size, v.stress_Pa[0, ::2].size
+        P, N = len(self.need.points), self.shape.r.size
         x = self.shape.r / self.shape.R
         words = []
         for i, k in enumerate(self.flown):
@@ -356,11 +362,11 @@ class Problem:
             words += [f"stall margin at r/R {_span(x[hit])}{self._of(int(k))}"] if hit.any() else []
         rest = v.margins[P + self.flown.size * N :]
         for k in range(P):
-            hit = chosen(rest[k * S : (k + 1) * S])
-            words += [f"stress at r/R {_span(x[::2][hit])}{self._of(k)}"] if hit.any() else []
+            hit = chosen(rest[k * N : (k + 1) * N])
+            words += [f"stress at r/R {_span(x[hit])}{self._of(k)}"] if hit.any() else []
         ends = np.r_[self.shape.Rhub / self.shape.R, x, 1.0]
         why = "thickness" if self.need.limits.min_thickness_m > 0.0 else "chord"
-        for margin, name in zip(rest[P * S :].reshape(2, -1), (f"least {why}", "largest chord"), strict=True):
+        for margin, name in zip(rest[P * N :].reshape(2, -1), (f"least {why}", "largest chord"), strict=True):
             hit = chosen(margin)
             words += [f"{name} at r/R {_span(ends[hit])}"] if hit.any() else []
         fast = chosen(1.0 - v.rpm[self.free] / self.need.slow)

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 STALL_MARGIN = 0.15
 """Share of the section's largest lift coefficient that is kept in hand: declared [1]."""
+LIGHTEST = 1.0
+"""Least disk loading of a request: human-powered helicopters have 3 and more [N/m2]."""
 MIN_CHORD_MM = 5.0
 """Least chord: a printed tip narrower than this has no section left; of small rotors `MIN_CHORD` [mm]."""
 MIN_CHORD = 0.04
@@ -47,7 +49,7 @@ class DesignPoint:
 
 
 @dataclass(frozen=True)
-class Limits:
+class BladeLimits:
     """What the blade must keep to.
 
     Parameters
@@ -84,7 +86,7 @@ class Requirement:
         Tip and hub radius [m].
     blades : int
         Number of blades.
-    limits : Limits
+    limits : BladeLimits
         What it must keep to.
     air : Air
         State of the air.
@@ -94,7 +96,7 @@ class Requirement:
     R: float
     Rhub: float
     blades: int
-    limits: Limits
+    limits: BladeLimits
     air: Air
 
     @property
@@ -163,7 +165,7 @@ def required(
     check("--min-chord-mm", min_chord_mm, 0.1, 0.2 * D if D > 0.0 else 1e3, "mm", "At most a fifth of the diameter")
     check("--min-thickness-mm", min_thickness_mm, 0.0, 0.05 * D if D > 0.0 else 1e3, "mm", "At most D / 20")
     check("--max-tip-mach", max_tip_mach, 0.05, 0.95, "", "Section theory ends below Mach 1")
-    check("--stall-margin", stall_margin, 0.0, 0.8)
+    check("--stall-margin", stall_margin, 0.0, 0.8, "", "In percent? Divide by 100" if stall_margin > 1.0 else "")
     check("--safety", safety, 1.0, 50.0)
     if not points:
         faults.append(Fault("--thrust, --point", "", "neither", "one of them", "As in --thrust 6 --rpm 7000"))
@@ -172,13 +174,20 @@ def required(
     if material not in MATERIALS:
         faults.append(Fault("--material", "", material, f"one of {', '.join(MATERIALS)}"))
     if not faults:
+        light = LIGHTEST * 0.25 * math.pi * diameter_m**2
+        faults += [Fault("--thrust", "", f"{p.thrust_N:g} N", f"{light:.2g} N or more on this disk",
+                         "Or a smaller diameter") for p in points if p.thrust_N < light]  # fmt: skip
         for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
             mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
-            if mach > max_tip_mach:
+            if mach > max_tip_mach and rpm is None:
+                hint = "The tip is faster still: raise --max-tip-mach"
+                expected = f"a Mach number up to {max_tip_mach:g}"
+                faults.append(Fault("--airspeed", "", f"{V:g} m/s, Mach {mach:.2f}", expected, hint))
+            elif mach > max_tip_mach:
                 top = (
                     60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
                 )
-                faults.append(Fault("--rpm", "", f"{rpm or 0.0:g} rev/min, tip Mach {mach:.2f}",
+                faults.append(Fault("--rpm", "", f"{rpm:g} rev/min, tip Mach {mach:.2f}",
                                     f"a tip Mach up to {max_tip_mach:g}",
                                     f"That is {top:.0f} rev/min at {V:g} m/s"))  # fmt: skip
     if faults:
@@ -186,7 +195,7 @@ def required(
     every = tuple(points)
     if static_thrust_N is not None:
         every = (*every, DesignPoint(static_thrust_N, 0.0, static_rpm, 0.0))
-    limits = Limits(
+    limits = BladeLimits(
         min_chord_mm * 1e-3, min_thickness_mm * 1e-3, max_tip_mach, stall_margin, MATERIALS[material], safety
     )
     return Requirement(every, 0.5 * diameter_m, 0.5 * hub_ratio * diameter_m, blades, limits, air)

@@ -15,9 +15,12 @@ from bemt.case import Case, case_of, fresh
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import propagate
 from bemt.drive.rotor_table import SPEEDS
+from geometry.common import pchip
 
 Array = NDArray[np.float64]
 FINE = 481
+SPEED_STEP = 1.2
+"""Ratio of neighbouring speeds at which bands are computed [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class LoadScatter:
 @lru_cache(maxsize=512)
 def case_of_label(label: str) -> Case:
     """Case of a label with its declared unknowns."""
-    return case_of(fresh.label_text(label))
+    return case_of(fresh.label_text(label), ends=False)
 
 
 def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None) -> RotorLoads | None:
@@ -76,24 +79,31 @@ def loads_of_case(
     label: str, case: Case, rpm_max: float, airspeed_m_s: float, air: Air | None = None
 ) -> RotorLoads | None:
     """Solve a case over speed, in its own air unless told; None where too few speeds converge."""
-    from scipy.interpolate import PchipInterpolator
-
     air = case.air() if air is None else air
-    points = prepare_case(case).solve(SPEEDS * rpm_max, airspeed_m_s, air)
+    rpm = SPEEDS * rpm_max
+    points = prepare_case(case).at_speeds(rpm, airspeed_m_s, air).solve(rpm, airspeed_m_s, air)
     T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
     good = np.isfinite(T) & np.isfinite(Q)
     if np.count_nonzero(good) < 4:
         return None
     n = points.rpm[good]
     fine = np.linspace(n[0], n[-1], FINE)
-    thrust, torque = (np.asarray(PchipInterpolator(n, v[good] / n**2)(fine)) * fine**2 for v in (T, Q))
+    thrust, torque = (pchip(n, v[good] / n**2, fine) * fine**2 for v in (T, Q))
     pitch = case.stated_pitch_m
     return RotorLoads(label, case.diameter_m, pitch, int(case.file.rotor.blades), fine, thrust, torque,
                       float(air.a_sound))  # fmt: skip
 
 
 def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
-    """Bands of a label at one speed, by `bemt.case.propagate`: declared unknowns, model and numerics."""
+    """Bands of a label near a speed, by `bemt.case.propagate`: declared unknowns, model and numerics.
+
+    Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.
+    """
+    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s)
+
+
+@lru_cache(maxsize=512)
+def _scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
     case = case_of_label(label)
     found = propagate(case, rpm, airspeed_m_s)
     T, Q = (float(found.nominal[key][0]) for key in ("thrust_N", "torque_Nm"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from numbers import Real
 from typing import TYPE_CHECKING
 
 from bemt.base.errors import Fault, InputError
@@ -85,6 +86,13 @@ def design(
     from bemt.design.blade_design import design_blade
     from bemt.design.requirement import DesignPoint
 
+    given = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
+             "blades": blades, "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,
+             "min_chord_mm": min_chord_mm, "min_thickness_mm": min_thickness_mm, "max_tip_mach": max_tip_mach,
+             "stall_margin": stall_margin, "safety": safety, "density_kg_m3": density_kg_m3}  # fmt: skip
+    words = [k for k, v in given.items() if not isinstance(v, (Real, type(None)))]
+    if words:
+        raise InputError([Fault("", k, repr(given[k]), "a number") for k in words])
     with in_words_of_the_library():
         asked = [] if thrust_N is None else [DesignPoint(thrust_N, airspeed_m_s, rpm)]
         for i, point in enumerate(points):

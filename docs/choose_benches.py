@@ -1,0 +1,206 @@
+"""Does `choose` put the propeller first that measured best: benches with several propellers on one motor or drive.
+
+    python docs/choose_benches.py DATA
+
+DATA holds the recorded benches (docs/choose.md names them). At a thrust that every propeller of a bench reached, the
+measured g/W are ranked against those of `choose` for the same labels on one motor of the same K_v, which knows no blade
+and no loss of the bench. Where no motor was on the stand (shaft power), the motor of `choose` has no losses either.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from bemt.base.units import G0, INCH
+from bemt.design import choose
+from bemt.design.motors_file import KnownMotor
+from bemt.readers._uiuc_names import class_of, parse_file_name
+
+Array = NDArray[np.float64]
+LBF = 4.4482216
+KT = 0.514444
+SHARES = (0.3, 0.6, 0.9)
+"""Thrusts that are compared, over the most that every propeller reached [1]."""
+IDEAL = KnownMotor("no losses", 1000.0, 1e-4, 0.0)
+SUFFIX = {"electric": "E", "slow_flyer": "SF"}
+UIUC = {"8 in": 8.0, "9 in": 9.0, "10 in": 10.0, "11 in": 11.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Labels with their measured thrusts [N] and powers [W], and what turned them."""
+
+    name: str
+    rows: dict[str, tuple[Array, Array]]
+    motor: KnownMotor
+    cells: int
+    airspeed_m_s: float = 0.0
+
+
+def power_at(thrust_N: float, thrusts: Array, powers: Array) -> float:
+    """Power at a thrust: a line through the nearest points, of the logarithms. [W]"""
+    x, y = np.log(thrusts / thrust_N), np.log(powers)
+    near = np.argsort(np.abs(x))[: max(4, x.size // 6)]
+    slope, at = np.polyfit(x[near], y[near], 1)
+    return float(np.exp(at))
+
+
+def _clean(T: Array, P: Array, least: float = 0.1) -> tuple[Array, Array]:
+    good = np.isfinite(T) & np.isfinite(P) & (P > 0.0)
+    T, P = T[good], P[good]
+    keep = least * T.max() < T
+    return T[keep], P[keep]
+
+
+def tunnel(folder: Path) -> Iterator[Bench]:
+    """West Virginia University: throttle ramps of some 20 s, so only up to the greatest thrust.
+
+    Behind it the rotor gives back what it has stored: at 10 N the power is a quarter to a half of that on the way up.
+    """
+    runs: dict[int, dict[str, tuple[Array, Array]]] = {0: {}, 35: {}, 45: {}}
+    for file in sorted((folder / "contrasts/pitch_diameter_wvu_tunnel").glob("run??_*kt.csv")):
+        run, label, wind = file.stem.split("_")
+        table = pd.read_csv(file)
+        T, volt, amp = (table[c].to_numpy(float) for c in ("Thrust (lbf)", "Voltage (V)", "Current (A)"))
+        top = int(np.argmax(pd.Series(T).rolling(5, center=True, min_periods=1).median()))
+        if run != "run15":  # the same as run 2
+            runs[int(wind[:-2])][label] = _clean(LBF * T[: top + 1], volt[: top + 1] * amp[: top + 1])
+    for wind_kt, rows in runs.items():
+        yield Bench(f"WVU, {wind_kt} kt", rows, KnownMotor("M", 420.0), 6, wind_kt * KT)
+
+
+def racing(folder: Path) -> Iterator[Bench]:
+    """RCbenchmark: an EMAX RS2205S 2600 with four propellers, at the voltages of two and three cells."""
+    labels = {"a1": "5x4x3", "a2": "5x4.5x3", "a4": "5x4"}  # a3 has the label of a2
+    for volts, cells in ((7, 2), (11, 3)):
+        rows = {}
+        for key, label in labels.items():
+            tables = [pd.read_csv(folder / f"rcbenchmark/{key}_{volts}.csv", encoding="utf-8-sig")]
+            if key == "a2":
+                tables.append(pd.read_csv(folder / f"rcbenchmark/a3_{volts}.csv", encoding="utf-8-sig"))
+            T, P = (
+                np.concatenate([t[c].to_numpy(float)[: int(t["Thrust (gf)"].argmax()) + 1] for t in tables])
+                for c in ("Thrust (gf)", "Electrical Power (W)")
+            )
+            rows[label] = _clean(1e-3 * G0 * T, P)
+        yield Bench(f"RS2205S 2600, {cells}S", rows, KnownMotor("RS2205S", 2600.0), cells)
+
+
+def thrust_tool(folder: Path) -> Iterator[Bench]:
+    """Author's stand of thrust_tool: an ECO 2814C with three labels on 3S and 4S, an MN2206 with three.
+
+    The current of the MN2206's runs is wrong between 2 and 9 A (the shaft would give up to 1.5 times what the battery
+    does), so that its propellers are compared by shaft power.
+    """
+    eco = {"aeronaut-12x6_3s": "12x6", "graupner-12x6_3s": "12x6", "graupner-10x6_4s": "10x6", "aeronaut-9x7_4s": "9x7"}
+    small = {"gemfanbull6045_3s": "6x4.5", "hqprop6x3-5_3s": "6x3.5", "hqprop6x4x3_3s": "6x4x3"}
+    for labels, shaft in ((eco, False), (small, True)):
+        rows: dict[str, tuple[Array, Array]] = {}
+        for part, label in labels.items():
+            table = pd.concat([pd.read_csv(f) for f in (folder / "jmajew").glob(f"*_{part}_table*.csv")])
+            omega = table.rpm.to_numpy(float) * math.pi / 30.0
+            P = 1e-5 * G0 * table.tq.to_numpy(float) * omega if shaft else table.pin.to_numpy(float)
+            old = rows.get(label, (np.empty(0), np.empty(0)))
+            T, P = _clean(1e-3 * G0 * table.th.to_numpy(float), P)
+            rows[label] = np.r_[old[0], T], np.r_[old[1], P]
+        yield (Bench("MN2206, shaft", rows, IDEAL, 12) if shaft
+               else Bench("ECO 2814C, 3S and 4S", rows, KnownMotor("ECO 2814C", 850.0), 4))  # fmt: skip
+
+
+def aerocats(folder: Path) -> Bench:
+    """University of Cincinnati: APC E propellers; thrust and torque in separate runs, so power by CP at the speed."""
+    table = pd.read_csv(folder / "contrasts/density_aerocats/aerocats_static.csv")
+    rows = {}
+    for _, one in table.groupby("propeller"):
+        D, P = float(one.D_in.iloc[0]), float(one.pitch_in.iloc[0])
+        thrust, torque = (one[one.quantity == q].sort_values("rpm") for q in ("thrust", "torque"))
+        if len(thrust) < 4 or len(torque) < 4:
+            continue
+        n = thrust.rpm.to_numpy(float)
+        CP = np.interp(n, torque.rpm, torque.CT_or_CP)
+        d5 = (D * INCH) ** 5
+        power = CP * thrust.rho_kg_m3_dry.to_numpy(float) * (n / 60.0) ** 3 * d5
+        rows[f"{D:g}x{P:g}E"] = _clean(thrust["value_N_or_Nm"].to_numpy(float), power)
+    return Bench("Aerocats, shaft", rows, IDEAL, 12)
+
+
+def uiuc(folder: Path) -> Iterator[Bench]:
+    """UIUC static runs by diameter, two blades, printed families left out; equal labels of several makers together."""
+    found: dict[str, dict[str, tuple[Array, Array]]] = {name: {} for name in UIUC}
+    for file in sorted(folder.glob("uiuc*/volume-*/*_static_*.txt")):
+        parsed = parse_file_name(file.stem)
+        one = None if parsed is None else parsed.propeller
+        if one is None or one.family.startswith(("da4", "nr")) or (one.blades or 2) != 2:
+            continue
+        for name, D in UIUC.items():
+            if one.diameter_in == D and one.pitch_in:
+                rpm, CT, CP = np.loadtxt(file, skiprows=1, ndmin=2).T[:3]
+                n = rpm / 60.0
+                label = f"{D:g}x{one.pitch_in:g}{SUFFIX.get(class_of(one.family) or '', '')}"
+                T, P = 1.225 * CT * n**2 * (D * INCH) ** 4, 1.225 * CP * n**3 * (D * INCH) ** 5
+                old = found[name].get(label, (np.empty(0), np.empty(0)))
+                found[name][label] = np.r_[old[0], T], np.r_[old[1], P]
+    for name, rows in found.items():
+        yield Bench(f"UIUC {name}, shaft", rows, IDEAL, 12)
+
+
+def benches(folder: Path) -> Iterator[Bench]:
+    """Every bench with three propellers or more on one motor, then those on a dynamometer."""
+    yield from tunnel(folder)
+    yield from racing(folder)
+    yield from thrust_tool(folder)
+    yield aerocats(folder)
+    yield from uiuc(folder)
+
+
+def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float]]]]:
+    """Thrusts [N], and measured and predicted g/W of each label there."""
+    most = min(T.max() for T, _ in bench.rows.values())
+    for share in SHARES:
+        thrust = float(f"{share * most:.2g}")
+        inside = {label: row for label, row in bench.rows.items() if row[0].min() <= 1.05 * thrust}
+        if len(inside) < 3:
+            continue
+        table = choose(
+            thrust, bench.cells, labels=list(inside), motors=[bench.motor], airspeed_m_s=bench.airspeed_m_s,
+            max_tip_mach=0.95,
+        ).set_index("label")  # fmt: skip
+        out = {
+            label: (1e3 * thrust / G0 / power_at(thrust, *row), float(table.g_per_W[label]))
+            for label, row in inside.items()
+            if math.isfinite(table.g_per_W[label])
+        }
+        if len(out) >= 3:
+            yield thrust, out
+
+
+def main() -> None:
+    """Print the table."""
+    folder = Path(sys.argv[1])
+    right = total = 0
+    losses = []
+    print("| bench | propellers | thrust N | measured best | first of `choose` | loses |\n|---|---|---|---|---|---|")
+    for bench in benches(folder):
+        for thrust, found in compared(bench):
+            best, first = (max(found, key=lambda label: found[label][i]) for i in (0, 1))
+            lost = 1.0 - found[first][0] / found[best][0]
+            total, right = total + 1, right + (first == best)
+            losses.append(lost)
+            shown = [f"{label}, {found[label][0]:.3g} ({found[label][1]:.3g})" for label in (best, first)]
+            row = (bench.name, f"{len(found)}", f"{thrust:g}", *shown, "-" if first == best else f"{lost:.1%}")
+            print(f"| {' | '.join(row)} |", flush=True)
+            if "-v" in sys.argv:
+                print("   ", {k: (round(a, 2), round(b, 2)) for k, (a, b) in found.items()})
+    print(f"{right} of {total} right; g/W lost: mean {np.mean(losses):.1%}, most {np.max(losses):.1%}")
+
+
+if __name__ == "__main__":
+    main()
