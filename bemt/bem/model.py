@@ -279,7 +279,7 @@ def solve(
 
 
 def _has(effect: Effect, *hooks: str) -> bool:
-    return _overrides(type(effect), hooks)
+    return _overrides(type(effect), hooks)  # type: ignore[arg-type]  # a class hashes by identity
 
 
 @cache  # asked some ten thousand times by a diagnosis
