@@ -368,8 +368,7 @@ LOG = ["Creating block mesh", "--> FOAM FATAL ERROR:", "Unknown patch, \"walls\"
        "    in file blockMesh.C at line 99.", "FOAM exiting"]  # fmt: skip
 
 
-@pytest.mark.parametrize("program", ["blockMesh", "simpleFoam"])
-@pytest.mark.parametrize("again", [[], ["--only", "1"]])
+@pytest.mark.parametrize(("program", "again"), [("blockMesh", []), ("simpleFoam", ["--only", "1"])])
 def test_a_run_that_never_began_says_why_and_is_tried_again(
     project: Path, tmp_path: Path, programs: Path, program: str, again: list[str]
 ) -> None:

@@ -7,6 +7,7 @@ import math
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,11 +22,12 @@ from bemt.compare.contrast_figure import picture
 from bemt.compare.contrast_text import text
 from bemt.compare.drive_laws import LAWS
 from bemt.compare.recordings import RunChange
-from bemt.compare.stand_run import StandRun
+from bemt.compare.stand_run import StandRun, stand_run
 from bemt.dataset import Dataset
 from bemt.diagnose.by_laws import changed
 from bemt.diagnose.contrast import compare
 from bemt.effects import catalogue
+from bemt.recordings.load import import_file
 
 Array = NDArray[np.float64]
 D = 0.254
@@ -76,24 +78,31 @@ def pair(tmp_path: Path, change: Callable[[dict[str, Array]], None], seed: int =
     return written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
 
 
+def ratios_of(a: str, b: str) -> Mapping[str, Mapping[str, Any]]:
+    """Ratios without their cause, which takes most of the time of a comparison."""
+    return changed(*(stand_run(import_file(file), file) for file in (a, b))).ratios
+
+
 def test_intervals_hold_the_true_ratio_as_often_as_they_say(tmp_path: Path) -> None:
     inside = 0
     for seed in range(24):
-        ratios = compare(*pair(tmp_path, scaled(thrust_N=1.08), seed)).document["ratios"]
+        ratios = ratios_of(*pair(tmp_path, scaled(thrust_N=1.08), seed))
         inside += ratios["thrust_N"]["low95"] <= 1.08 <= ratios["thrust_N"]["high95"]
         inside += ratios["torque_Nm"]["low95"] <= 1.0 <= ratios["torque_Nm"]["high95"]
     assert 42 <= inside <= 48
 
 
-def test_nothing_is_claimed_where_only_the_set_up_differs(tmp_path: Path) -> None:
-    said = [compare(*pair(tmp_path, scaled(), seed)).verdict for seed in range(24)]
-    assert said.count("none") >= 22
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(24), marks=pytest.mark.slow)], ids=len)
+def test_nothing_is_claimed_where_only_the_set_up_differs(tmp_path: Path, seeds: range) -> None:
+    """By default a few; real runs of one stand are those of tests/test_real_pairs.py."""
+    said = [compare(*pair(tmp_path, scaled(), seed)).verdict for seed in seeds]
+    assert said.count("none") >= 11 / 12 * len(seeds)
     assert set(said) <= {"none", "insufficient", "unknown"}
 
 
 def test_exchanged_recordings_give_the_inverse_ratio(tmp_path: Path) -> None:
     a, b = pair(tmp_path, scaled(thrust_N=1.2))
-    there, back = compare(a, b).document["ratios"], compare(b, a).document["ratios"]
+    there, back = ratios_of(a, b), ratios_of(b, a)
     for channel in ("thrust_N", "torque_Nm"):
         assert there[channel]["ratio"] * back[channel]["ratio"] == pytest.approx(1.0, abs=0.004)
 
@@ -123,7 +132,7 @@ def test_the_cause_is_named_or_in_the_class(
 
 
 def test_what_scales_alike_is_a_class_and_never_one_name(tmp_path: Path) -> None:
-    for seed in range(6):
+    for seed in range(3):
         answer = compare(*pair(tmp_path, scaled(thrust_N=1.1, torque_Nm=1.1), seed))
         several = "air_density" in answer.effects and answer.verdict == "class"
         assert several or answer.verdict == "insufficient"

@@ -64,7 +64,11 @@ def test_our_cfd_names_a_class_with_the_row(project: Path, tmp_path: Path, old: 
     assert len(runs) == 2  # the sector that leaks at its sides, and the mended one
     assert all(found.left["cascade"] < EXPLAINED for found in runs.values())
     assert sum("cascade" in found.named for found in runs.values()) >= sure
-    assert all(now.named == () for now in along(fan(project, tmp_path), path).values())
+
+
+def test_our_cfd_beside_its_own_row_names_nothing(project: Path, tmp_path: Path) -> None:
+    runs = along(fan(project, tmp_path), project / "reports" / "cfd" / "ds30" / "radial.csv")
+    assert runs and all(now.named == () for now in runs.values())
 
 
 def test_what_lies_within_the_recordings_own_uncertainty_is_not_named(project: Path, tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 
 from bemt import effects
 from bemt.base.errors import InputError
+from bemt.case import load_case
 from bemt.commands.cli import main
-from bemt.drive import mission, rotor_table, transient
+from bemt.drive import drive_result, mission, rotor_table, transient
 from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
 from bemt.drive.map_points import map_points
 from bemt.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
@@ -227,7 +228,6 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
 
 
 def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
-    from bemt.case import load_case
     from bemt.case.prepare import prepare_case
 
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
@@ -354,22 +354,18 @@ def test_an_airspeed_that_nothing_flies_at_is_refused_with_all_other_faults(
     assert "--off: got 'wind'" in words and not out.exists()
 
 
-@pytest.mark.parametrize(("airspeed", "known"), [("100", True), ("200", False), ("300", False)])
-def test_an_airspeed_beyond_the_drive_is_answered(
-    project: Path, tmp_path: Path, airspeed: str, known: bool, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = str(project / "cases" / "ds30")
-    assert main(["drive", case, "--airspeed", airspeed, "--json", "--out", str(tmp_path / "out")]) == 1
-    doc = json.loads(capsys.readouterr().out)
-    assert doc["response"] == [] and doc["hover"]["throttle"]["value"] is None
+@pytest.mark.parametrize(("airspeed", "known"), [(100.0, True), (300.0, False)])
+def test_an_airspeed_beyond_the_drive_is_answered(project: Path, tmp_path: Path, airspeed: float, known: bool) -> None:
+    result = drive_result.solve(load_case(project / "cases" / "ds30" / "case.toml"), airspeed)
+    drive_result.write(result, tmp_path / "out")
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"drive.json", "drive.csv", "drive.png"}
+    doc, words = json.loads((tmp_path / "out" / "drive.json").read_text()), result.text
+    assert not result.reached and doc["response"] == [] and doc["hover"]["throttle"]["value"] is None
     full = doc["steady"]["thrust_N"][-1]
     # 100 m/s turns the fan faster than the battery does: drag; above, faster than its table reaches
     assert (full is not None and full < 0.0) if known else full is None
     assert doc["steady"]["converged"][-1] is known
-    assert f"at {airspeed} m/s" in doc["notes"][-1] and "does not hold this airspeed" in doc["notes"][-1]
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"drive.json", "drive.csv", "drive.png"}
-    assert main(["drive", case, "--airspeed", airspeed]) == 1
-    words = capsys.readouterr().out
+    assert f"at {airspeed:g} m/s" in doc["notes"][-1] and "does not hold this airspeed" in doc["notes"][-1]
     assert "does not hold this airspeed" in words and "runs away" not in words
     assert ("gives an unknown maximum" in words) is not known and " nan " not in words
 

@@ -55,9 +55,10 @@ def test_a_pair_is_answered_by_a_process_of_its_own(drawn: list[Item], tmp_path:
     assert score.answered(score.judge(item.entry, answer)) == "found"
 
 
-def test_runs_of_one_stand_that_nobody_touched_agree(drawn: list[Item], tmp_path: Path) -> None:
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_runs_of_one_stand_that_nobody_touched_agree(drawn: list[Item], tmp_path: Path, every: int) -> None:
     said = []
-    for k, item in enumerate(i for i in drawn if i.entry["set"] == "pair null"):
+    for k, item in enumerate([i for i in drawn if i.entry["set"] == "pair null"][::every]):
         folder = tmp_path / str(k)
         folder.mkdir()
         for name, text in item.files.items():

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import subprocess
 import sys
-import tempfile
 from typing import Any
 
 import numpy as np
@@ -335,16 +333,25 @@ def test_interpreted_points_equal_compiled_ones(rotor: Rotor, polar: Polar, duct
     np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-10, atol=1e-12)
 
 
-def test_a_few_points_are_interpreted_and_many_compiled() -> None:
-    code = (
-        "import bemt\nfrom bemt.bem import kernel as K\n"
-        'p = bemt.propeller("10x5")\np.solve(6000, bands=False)\n'
-        'compiled = K.entry(False, "factored").compiled\nassert not compiled.signatures\n'
-        "p.solve([5000.0 + i for i in range(400)], bands=False)\nassert compiled.signatures"
-    )
-    with tempfile.TemporaryDirectory() as empty:
-        env = os.environ | {"BEMT_COMPILE": "", "NUMBA_CACHE_DIR": empty}
-        subprocess.run([sys.executable, "-c", code], check=True, env=env)
+def test_a_few_points_are_interpreted_and_many_compiled(
+    rotor: Rotor, polar: Polar, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As long as there is no compiled code; after that always by it."""
+    entry, *constant = solver.prepare(rotor, [(0.7, polar)], n_stations=10).kernel
+    run: list[str] = []
+
+    class Nothing:
+        signatures = ()  # in this process, and no cache on the disk
+
+        def __call__(self, *given: object) -> None:
+            run.append("compiled")
+
+    monkeypatch.setenv("BEMT_COMPILE", "")
+    monkeypatch.setattr(kernel, "interpret", lambda *given: run.append("interpreted"))
+    fresh = kernel.KernelEntry(*entry.kind, Nothing())
+    for count in (1, 2, kernel.INTERPRETED // 10, 1):
+        fresh(np.zeros((count, kernel.N_POINT)), *constant, None, None)
+    assert run == ["interpreted", "interpreted", "compiled", "compiled"]
 
 
 def test_broadcasting_of_speeds_and_air(rotor: Rotor, polar: Polar) -> None:

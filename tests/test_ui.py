@@ -78,28 +78,37 @@ class Tab:
         self.call("DOM.setFileInputFiles", files=[str(file)], nodeId=node)
 
 
-@pytest.fixture
-def tab(tmp_path: Path, project: Path) -> Iterator[Tab]:
-    port, door = free_port(), free_port()
+@pytest.fixture(scope="module")
+def page_and_browser(tmp_path_factory: pytest.TempPathFactory, project: Path) -> Iterator[tuple[str, str]]:
+    """Addresses of the page and of a tab."""
+    folder, port, door = tmp_path_factory.mktemp("ui"), free_port(), free_port()
     serve = [sys.executable, "-m", "bemt", "ui", "--no-browser", "--port", str(port)]
     browse = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-              f"--user-data-dir={tmp_path / 'profile'}", f"--remote-debugging-port={door}",
+              f"--user-data-dir={folder / 'profile'}", f"--remote-debugging-port={door}",
               "--remote-allow-origins=*", "about:blank"]  # fmt: skip
     paths = os.pathsep.join(filter(None, (str(project), os.environ.get("PYTHONPATH"))))
     quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
-    started = [subprocess.Popen(serve, cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths}, **quiet),
+    started = [subprocess.Popen(serve, cwd=folder, env={**os.environ, "PYTHONPATH": paths}, **quiet),
                subprocess.Popen(browse, **quiet)]  # fmt: skip
     try:
         until(lambda: urllib.request.urlopen(f"http://localhost:{port}/_stcore/health").read(), "the page")
         tabs = until(lambda: json.load(urllib.request.urlopen(f"http://127.0.0.1:{door}/json")), "the browser")
-        with sync.connect(next(t["webSocketDebuggerUrl"] for t in tabs if t["type"] == "page"), max_size=None) as ws:
-            one = Tab(ws)
-            one.call("Page.navigate", url=f"http://localhost:{port}")
-            yield one
+        yield f"http://localhost:{port}", next(t["webSocketDebuggerUrl"] for t in tabs if t["type"] == "page")
     finally:
         for process in started:
             os.killpg(process.pid, signal.SIGTERM)
             process.wait(timeout=20)
+
+
+@pytest.fixture
+def tab(page_and_browser: tuple[str, str]) -> Iterator[Tab]:
+    """The page as somebody who opens it sees it: a session of its own."""
+    page, address = page_and_browser
+    with sync.connect(address, max_size=None) as ws:
+        one = Tab(ws)
+        one.call("Page.navigate", url=page)
+        yield one
+        one.call("Page.navigate", url="about:blank")
 
 
 def test_the_page_answers_reads_and_judges(tab: Tab, tmp_path: Path) -> None:

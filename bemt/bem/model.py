@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -254,7 +254,12 @@ def solve(
 
 
 def _has(effect: Effect, *hooks: str) -> bool:
-    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
+    return _overrides(type(effect), hooks)  # type: ignore[arg-type]  # a class hashes by identity
+
+
+@cache  # asked some ten thousand times by a diagnosis
+def _overrides(kind: type[Effect], hooks: tuple[str, ...]) -> bool:
+    return any(getattr(kind, hook) is not getattr(Effect, hook) for hook in hooks)
 
 
 def acts_on_rotor(effect: Effect) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt.diagnose.problem import Part
 from bemt.diagnose.record import Record
-from bemt.effects.base import Effect, Flow, Loads, Reading
+from bemt.effects.base import Effect, Flow, Loads
 
 __all__ = ["BLADE_LAWS", "CoefficientCurve", "LawPart", "LawRotor", "law_part"]
 
@@ -236,11 +236,12 @@ class LawRotor:
         return T, Q, dT, dQ
 
     def respond(self, effects: Sequence[Effect], flow: Flow) -> tuple[Loads, Flow]:
-        """Loads with effects on, and the flow that the rotor meets."""
+        """Loads with effects on, and the flow that the rotor meets; ``flow`` is one of :meth:`flow`."""
         met = replace(flow, **{k: getattr(flow, k).copy() for k in ("rpm", "V", "rho", "mu", "a_sound")})
         for e in sorted(effects, key=lambda e: e.kind != "stand"):
             e.flow(met)
-        met.T0, met.Q0, met.dT_dV, met.dQ_dV = self.loads(met)
+        if not all(np.array_equal(getattr(met, k), getattr(flow, k)) for k in ("rpm", "V", "rho")):
+            met.T0, met.Q0, met.dT_dV, met.dQ_dV = self.loads(met)
         loads = Loads(met.T0.copy(), met.Q0.copy(), np.zeros_like(met.T0))
         for e in effects:
             law = BLADE_LAWS.get(e.id)
@@ -364,13 +365,9 @@ class LawPart(Part):
         """Yes."""
         return True
 
-    def _ours(self, effects: Sequence[Effect]) -> Array:
-        key = tuple(effects)
-        loads, met = self.rotor.respond(key, self.flow)
-        reading = Reading({"thrust_N": loads.T.copy(), "torque_Nm": loads.Q.copy()}, self.full_scale)
-        for e in key:
-            e.reading(reading, met)
-        return np.concatenate([reading.values[c] for c in self.channels])
+    def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
+        loads, met = self.rotor.respond(effects, self.flow)
+        return loads.T, loads.Q, met
 
 
 def law_part(record: Record, rotor: LawRotor) -> LawPart:

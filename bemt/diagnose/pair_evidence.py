@@ -114,20 +114,21 @@ def _form_gain(
         return np.zeros((1, 1))
     plain = state.white.changes(np.concatenate([x for _, x in shapes], axis=1))
     rest, of_a, of_b = plain.T @ state.r, plain.T @ state.S[:, A], plain.T @ state.S[:, B]
-    gram, found = plain.T @ plain, []
+    gram = plain.T @ plain
     choices = [(tuple(form.FORM) if modes else (min(form.FORM),)) if width else (1.0,)
                for (modes, _), width in zip(shapes, widths, strict=True)]  # fmt: skip
-    for sizes in product(*choices):
-        scale = np.concatenate([
-            np.where(np.arange(width) < modes, size, 1.0)
-            for (modes, _), width, size in zip(shapes, widths, sizes, strict=True)
-        ])  # fmt: skip
-        root = np.linalg.cholesky(np.eye(scale.size) + scale[:, None] * gram * scale)
-        chosen = sum(float(np.log(form.FORM.get(s, 1.0))) for s, w in zip(sizes, widths, strict=True) if w)
-        level = chosen - float(np.sum(np.log(np.diag(root))))
-        d = np.linalg.solve(root, scale * (rest - of_a[:, at[0]] - of_b[:, at[1]]))
-        found.append((0.5 * float(d @ d) + level, level, root, scale))
-    _, level, root, scale = max(found, key=lambda f: f[0])
+    sizes = list(product(*choices))
+    scales = np.array([
+        np.concatenate([np.where(np.arange(width) < modes, size, 1.0)
+                        for (modes, _), width, size in zip(shapes, widths, chosen, strict=True)])
+        for chosen in sizes
+    ])  # fmt: skip
+    roots = np.linalg.cholesky(np.eye(scales.shape[1]) + scales[:, :, None] * gram * scales[:, None, :])
+    weights = np.array([sum(float(np.log(form.FORM.get(s, 1.0))) for s in chosen) for chosen in sizes])
+    levels = weights - np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
+    found = np.linalg.solve(roots, (scales * (rest - of_a[:, at[0]] - of_b[:, at[1]]))[:, :, None])[:, :, 0]
+    best = int(np.argmax([0.5 * float(d @ d) + level for d, level in zip(found, levels, strict=True)]))
+    level, root, scale = float(levels[best]), roots[best], scales[best]
     r, a, b = (np.linalg.solve(root, scale[:, None] * v) for v in (rest[:, None], of_a, of_b))
     left = r - a
     out = 0.5 * np.sum(left * left, axis=0)[:, None] + 0.5 * np.sum(b * b, axis=0)[None, :] - left.T @ b + level

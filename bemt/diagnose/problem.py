@@ -104,10 +104,7 @@ class Part:
         # instruments do not change the flow: what they show of the same flow needs no new solution
         key = tuple(e for e in effects if not bem.only_reads(e))
         if key not in self._solved:
-            model = self._whole if self._far(key) else self.model
-            loads, met, ok = bem.respond(model.prepared, key, self.flow)
-            nan = np.where(ok, 1.0, np.nan)
-            self._solved[key] = loads.T * nan, loads.Q * nan, met
+            self._solved[key] = self._respond(key)
         T, Q, met = self._solved[key]
         values = {"thrust_N": T.copy(), "torque_Nm": Q.copy()}
         if "rpm" in self.record.measured:
@@ -116,6 +113,13 @@ class Part:
         for e in effects:
             e.reading(reading, met)
         return np.concatenate([reading.values[c] for c in self.channels])
+
+    def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
+        """Thrust [N] and torque [N m] with a set of effects, NaN where not converged, and the flow that is met."""
+        model = self._whole if self._far(effects) else self.model
+        loads, met, ok = bem.respond(model.prepared, effects, self.flow)
+        nan = np.where(ok, 1.0, np.nan)
+        return loads.T * nan, loads.Q * nan, met
 
     @cached_property
     def _whole(self) -> bem.Model:
@@ -315,11 +319,12 @@ class Problem:
         """What the signature of an effect is off by in each of the other laws, (M, D) [units of the readings]."""
         if not self.variants or effect.kind == "stand" or effect.exact:
             return np.zeros((self.y.size, 0))
-        mine, out = self.signature((effect,)), []
-        for parts in self.variants:
-            other = replace(self, parts=parts, predicted={}, variants=())
-            out.append(other.predict((effect,)) - other.predict(()) - mine)
-        return np.stack(out, axis=1)
+        mine = self.signature((effect,))
+        return np.stack([other.predict((effect,)) - other.predict(()) - mine for other in self._under_variants], axis=1)
+
+    @cached_property
+    def _under_variants(self) -> tuple[Problem, ...]:
+        return tuple(replace(self, parts=parts, predicted={}, variants=()) for parts in self.variants)
 
     def signature(self, extra: Sequence[Effect]) -> Array:
         """Change of the readings when effects are added: solve(with) - solve(without), (M,)."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.gaussian.whitening import triangular
+
 __all__ = ["LinearTerms", "log_sum", "shares"]
 
 Array = NDArray[np.float64]
@@ -63,11 +65,7 @@ class LinearTerms:
 
     def project(self, x: Array) -> Array:
         """Part of whitened vectors (M,) or (M, n) that the terms may explain, (q,) or (q, n)."""
-        from scipy.linalg import solve_triangular
-
-        if not self.B.shape[1]:
-            return np.zeros((0, *x.shape[1:]))
-        return np.asarray(solve_triangular(self.root, self.B.T @ x, lower=True, check_finite=False))
+        return triangular(self.root, self.B.T @ x)
 
     @property
     def half_log_det(self) -> float:
@@ -81,8 +79,5 @@ class LinearTerms:
 
     def posterior(self, x: Array) -> tuple[Array, Array]:
         """Mean and standard deviation of the coefficients given a whitened vector, (q,), (q,) [prior size]."""
-        from scipy.linalg import solve_triangular
-
-        mean = solve_triangular(self.root, self.project(x), lower=True, trans="T", check_finite=False)
-        inverse = solve_triangular(self.root, np.eye(self.root.shape[0]), lower=True, check_finite=False)
-        return np.asarray(mean), np.sqrt(np.sum(inverse**2, axis=0))
+        inverse = triangular(self.root, np.eye(self.root.shape[0]))
+        return triangular(self.root, self.project(x), transposed=True), np.sqrt(np.sum(inverse**2, axis=0))

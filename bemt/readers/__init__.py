@@ -23,7 +23,7 @@ import pkgutil
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
@@ -109,15 +109,25 @@ _CODES = ("gb18030", "shift_jis", "big5", "cp1251")
 
 def _other_code(raw: bytes) -> str:
     """Text of bytes that are no UTF-8, in the code in which a heading shows words that are known."""
-    from bemt.readers._words import FOREIGN
-
-    for code in _CODES:
-        if any(word in raw[:HEAD_BYTES].decode(code, errors="ignore").lower() for word in FOREIGN):
-            return raw.decode(code, errors="replace")
+    code = _shown_code(raw[:HEAD_BYTES])
+    if code is not None:
+        return raw.decode(code, errors="replace")
     try:
         return raw.decode("cp1252")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
+
+
+@lru_cache(maxsize=4)  # every reader asks about the head of one file
+def _shown_code(head: bytes) -> str | None:
+    """Code in which the head of a file shows a known word."""
+    from bemt.readers._words import FOREIGN
+
+    for code in _CODES:
+        text = head.decode(code, errors="ignore").lower()
+        if any(word in text for word in FOREIGN):
+            return code
+    return None
 
 
 def load_text(path: str | os.PathLike[str]) -> SourceText:
