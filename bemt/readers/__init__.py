@@ -22,8 +22,7 @@ import os
 import pkgutil
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
@@ -31,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.toml_text import Collector
 from bemt.readers._packed import MAX_BYTES, packed, unpacked
 
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
@@ -41,9 +41,8 @@ HEAD_BYTES = 16384
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 
 
-@dataclass(frozen=True)
-class SourceText:
-    """Text of one input file, with its provenance.
+class SourceText(Collector):
+    """Text of one input file, with its provenance and the faults found in it.
 
     Parameters
     ----------
@@ -55,14 +54,19 @@ class SourceText:
         Hash of the bytes of the file, hexadecimal.
     """
 
-    name: str
-    text: str
-    sha256: str
+    def __init__(self, name: str, text: str, sha256: str) -> None:
+        super().__init__(name)
+        self.name, self.text, self.sha256 = name, text, sha256
 
-    @property
+    @cached_property
     def lines(self) -> list[str]:
         """Lines without line ends; line numbers in faults count from 1."""
         return self.text.splitlines()
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Provenance of what is read from it."""
+        return {"file": self.name, "sha256": self.sha256}
 
 
 WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -173,6 +177,15 @@ def head_text(head: bytes | str) -> str:
     if isinstance(head, str):
         return head.removeprefix("\ufeff")
     return "" if _binary(head) else decode(head)
+
+
+def first_cells(head: bytes | str) -> set[str]:
+    r"""Cells of the first line of a comma-separated file, for sniffers.
+
+    >>> sorted(first_cells("rpm, thrust\n1,2"))
+    ['rpm', 'thrust']
+    """
+    return {cell.strip() for cell in head_text(head).partition("\n")[0].split(",")}
 
 
 def number(token: str) -> float | None:

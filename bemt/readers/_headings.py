@@ -117,19 +117,7 @@ _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
 _SHAFT_LETTERS = {"n", "ω"}
-_SHAFT_WORDS = {
-    "speed",
-    "omega",
-    "rotation",
-    "rotational",
-    "rev",
-    "revs",
-    "revolution",
-    "revolutions",
-    "rps",
-    "rpm",
-    "krpm",
-}
+_SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
 _SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
 _OTHER_SPEEDS = {
     "air", "airspeed", "wind", "flow", "tip", "sound", "stream", "freestream", "tunnel", "flight", "ground", "vehicle",
@@ -218,6 +206,23 @@ def unit_of(text: str) -> units.Unit | str:
     if key is not None:
         return units.UNITS[key]
     return ""
+
+
+def known(text: str, base: str, unit: str) -> Heading:
+    """Heading of a column that a reader knows: its name without the unit, and the unit ("-": none).
+
+    >>> known("th", "thrust", "gf").name, known("Speed", "", "rpm").name, known("out", "throttle", "pct").name
+    ('thrust_N', 'rpm', 'throttle')
+    """
+    found = units.Unit("", "none", 1.0) if unit == "-" else unit_of(unit)
+    assert isinstance(found, units.Unit), unit
+    return Heading(text, _channel(base, found).lstrip("_"), found)
+
+
+def _channel(base: str, unit: units.Unit) -> str:
+    """Name of a channel with its unit in SI."""
+    si = _si_name(unit).replace("/", "_")
+    return base if si == "-" else f"{base}_{si}"
 
 
 def _tail(core: str) -> tuple[str, units.Unit | str] | None:
@@ -399,9 +404,7 @@ def _by_words(text: str) -> Heading | None:
                     return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
                 made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
                 return Heading(text, "rpm", made)
-            si = _si_name(made)
-            label = slug(name) + ("" if si == "-" else f"_{si}")
-            return Heading(text, label, made, told=f"{text!r} is read as {told}" if told else "")
+            return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
 
 
@@ -518,7 +521,5 @@ def _heading(text: str) -> Heading:
         if flat.lower() == "e":
             flat = "electrical"
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
-    si = _si_name(unit)
     base = re.sub(r"\b[A-Z][a-z]{2,}", lambda word: word[0].lower(), base)
-    tail = "" if si == "-" else "_" + {"N/W": "N_W", "m/s2": "m_s2"}.get(si, si)
-    return Heading(text, slug(base) + tail, unit)
+    return Heading(text, _channel(slug(base), unit), unit)

@@ -7,6 +7,7 @@ number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.r
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,11 +21,12 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
+from bemt.readers import load_text
 from bemt.readers._clock import clock_seconds
 from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading, may_be_shaft_speed, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
-from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, with_unit
+from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.readers._words import english, quantities
 
 Array = NDArray[np.float64]
@@ -37,6 +39,8 @@ BLOCK = 1 << 17
 """Samples that are searched for spikes at once."""
 HALF, TIMES, SLIP = 3, 2.0, 0.02
 """Neighbours on each side of a spike, and ranges of theirs that it leaves; share that a ratio is near a slip by."""
+MISREAD = 2.5
+"""Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
@@ -82,6 +86,15 @@ def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
     return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
 
 
+def against_load(speed: Array, load: Array) -> Array:
+    """Root of a load over its speed, relative to the median of the rows, (N,); a speed is misread far from 1.
+
+    Loads go with the square of the speed: outside 1 / `MISREAD` to `MISREAD` the two of one row do not belong together.
+    """
+    k = np.sqrt(load) / speed
+    return np.asarray(k / np.median(k))
+
+
 @dataclass
 class Builder:
     """Gathers the channels, texts, flags and warnings of one table and makes the `Dataset`."""
@@ -108,6 +121,41 @@ class Builder:
             self.flag([self.table.cut], "line cut off at the end of the file")
         self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
 
+    @classmethod
+    def of_stand(cls, path: str | os.PathLike[str], format: str) -> Builder:  # noqa: A002
+        """Begin with the table of a stand, whose headings are known and stand once each."""
+        build = cls(split_table(load_text(path), header=True), format)
+        names = build.table.headings
+        for name in sorted({h for h in names if h and names.count(h) > 1}):
+            build.fault("1", f"a second column {name!r}", "each column once")
+        return build
+
+    def fault(self, where: object, got: str, expected: str, hint: str = "") -> None:
+        """Note a fault."""
+        self.faults.append(Fault(self.table.source.name, str(where), got, expected, hint))
+
+    def check(self) -> None:
+        """Raise the faults so far, if any."""
+        if self.faults:
+            raise InputError(self.faults)
+
+    def need(self, *names: str) -> None:
+        """Note channels that are not there."""
+        for name in names:
+            if name not in self.channels:
+                self.fault("1", f"no numbers for {name}", "a column of numbers")
+
+    def at(self, name: str) -> Array | None:
+        """Values of a channel, None without it."""
+        channel = self.channels.get(name)
+        return None if channel is None else channel.values
+
+    def rename(self, old: str, new: str) -> str:
+        """Give a channel another name, in its place; gives its heading."""
+        self.channels = {new if k == old else k: c for k, c in self.channels.items()}
+        self.headings[new] = self.headings.pop(old)
+        return self.headings[new]
+
     def line(self, row: int) -> int:
         """Line in the file of a row."""
         return self.table.lines[row]
@@ -120,6 +168,19 @@ class Builder:
         if hit:
             where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(map(self.line, hit))})"
             self.warnings.append(f"{what} in {where}: flagged{why}")
+
+    def flag_speeds(self, *names: str) -> None:
+        """Flag speeds of 0 and below, of those that are there."""
+        for name in names:
+            if (values := self.at(name)) is not None:
+                self.flag(np.flatnonzero(values == 0.0), f"{name} is 0")
+                self.flag(np.flatnonzero(values < 0.0), f"{name} is negative")
+
+    def flag_spikes(self, *names: str) -> None:
+        """Flag single samples that jump, in the channels of these that are there."""
+        for name in names:
+            if (values := self.at(name)) is not None:
+                self.flag(np.flatnonzero(spikes(values)), f"spike of {name}")
 
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
@@ -145,7 +206,7 @@ class Builder:
             hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
             if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
                 hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
-            self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))
+            self.fault(where, got, "a number with a decimal point", hint)
             return ""
         if bad and (stated := self._one_unit(index, bad)):
             values, bad, _ = column_numbers([(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], decimal)
@@ -215,22 +276,15 @@ class Builder:
     def check_air(self) -> None:
         """A temperature that only a part reaches is not that of the air, whatever its heading leaves open."""
         channel = self.channels.get("temperature_K")
-        stated = self.format == "recording" or set(english(self.headings.get("temperature_K", "air"))) & {
-            "ambient",
-            "air",
-        }
-        if channel is None or stated:
+        words = set(english(self.headings.get("temperature_K", "air")))
+        if channel is None or self.format == "recording" or words & {"ambient", "air"}:
             return
         v = channel.values[np.isfinite(channel.values)]
         slip = v.size and np.min(v) < COLDEST_PART  # degrees Celsius under a heading of kelvin, say
         if v.size and not slip and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):
-            label = self.headings.pop("temperature_K")
-            name = self.free("part_temperature_K")
-            self.channels = {name if k == "temperature_K" else k: c for k, c in self.channels.items()}
-            self.headings[name] = label
-            told = (
-                f"{label!r} goes from {np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C: a part's, not the air's"
-            )
+            label = self.rename("temperature_K", self.free("part_temperature_K"))
+            span = f"{np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C"
+            told = f"{label!r} goes from {span}: a part's, not the air's"
             self.warnings.append(told + "; head that of the air Ambient temperature (C)")
 
     def check_magnitudes(self) -> None:
@@ -266,9 +320,7 @@ class Builder:
     def flag_time(self) -> None:
         """Flag rows where time does not advance; the only clock is the time of a file that has no other."""
         if "time_s" not in self.channels and len(self.clocks) == 1:
-            clock = self.clocks.pop()
-            self.channels = {"time_s" if k == clock else k: channel for k, channel in self.channels.items()}
-            self.headings["time_s"] = self.headings.pop(clock)
+            self.rename(self.clocks.pop(), "time_s")
         if "time_s" in self.channels:
             t = self.channels["time_s"].values
             rows = np.flatnonzero(np.isfinite(t))
@@ -276,19 +328,15 @@ class Builder:
             self.flag(rows[1:][step < 0.0], "time goes backwards")
             same = rows[1:][step == 0.0]
             if same.size:
-                self.warnings.append(
-                    f"{same.size} rows repeat the time of the row before (lines "
-                    f"{some(self.line(int(r)) for r in same)})"
-                )
+                where = some(self.line(int(r)) for r in same)
+                self.warnings.append(f"{same.size} rows repeat the time of the row before (lines {where})")
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""
         if not self.channels and not self.faults:
             columns = f"{len(self.texts)} columns of text" if self.texts else "empty columns"
-            expected = "one column of numbers or more"
-            self.faults.append(Fault(self.table.source.name, "", f"no column of numbers ({columns})", expected))
-        if self.faults:
-            raise InputError(self.faults)
+            self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
+        self.check()
         if self.empty:
             self.warnings.append(f"no values in {len(self.empty)} columns: {some(self.empty, 8)}")
         if self.words:
@@ -302,7 +350,7 @@ class Builder:
             out = shlex.quote(file.with_name("recording.toml").as_posix())
             step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
             self.warnings.append(f"in one step, with your units in place of UNIT: {step}" if "UNIT" in step else step)
-        said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
+        said = {**self.table.source.about, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
             flags[row] = tuple(words)
@@ -377,20 +425,11 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
 
 
 _UNITS_MEANT = {
-    "rpm": "rpm, krpm, rev_s or rad_s",
-    "thrust": "N, kgf, gf, lbf or ozf",
-    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in",
-    "voltage": "V or mV",
-    "current": "A or mA",
-    "power": "W or kW",
-    "time": "s or ms",
-    "airspeed": "m_s, km_h, kt or mph",
-    "throttle": "pct",
-    "pressure": "Pa, hPa or mbar",
-    "temperature": "C, K or F",
-    "density": "kg_m3",
-    "humidity": "pct",
-}
+    "rpm": "rpm, krpm, rev_s or rad_s", "thrust": "N, kgf, gf, lbf or ozf", "voltage": "V or mV",
+    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in", "current": "A or mA", "power": "W or kW", "time": "s or ms",
+    "airspeed": "m_s, km_h, kt or mph", "throttle": "pct", "pressure": "Pa, hPa or mbar", "temperature": "C, K or F",
+    "density": "kg_m3", "humidity": "pct",
+}  # fmt: skip
 """Units that a column of each meaning usually has; which, the file does not say."""
 
 

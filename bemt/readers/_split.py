@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
 from bemt.readers._words import english, quantities
@@ -315,7 +315,7 @@ def split_table(
     bare = [i for i, t in used if not t.strip(" \t;,|")]
     used = [(i, t) for i, t in used if t.strip(" \t;,|")]
     if not used:
-        raise InputError(Fault(source.name, "", "no data", "a heading line and rows of numbers"))
+        source.refuse("", "no data", "a heading line and rows of numbers")
     notes = [f"{comments} comment lines left out"] if comments else []
     notes += [f"{len(bare)} lines of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
@@ -326,7 +326,7 @@ def split_table(
         notes += [] if _EXCEL.fullmatch(used[0][1]) else [f"{start} lines above the headings left out: {above}"]
         used = used[start:]
     if any(len(t) > 100_000 for _, t in used):
-        raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
+        source.refuse("", "a line of more than 100000 characters", "a table of short lines")
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
@@ -372,30 +372,24 @@ def split_table(
     cut = None
     body = split[1:] if header else split
     for k, (i, cells) in enumerate(body):
-        over = cells[width:]
-        if any(over):
-            got, hint = f"{len(cells)} cells", "A delimiter inside a value, or a decimal comma?"
-            faults.append(Fault(source.name, str(i), got, f"{width} as in line {split[0][0]}", hint))
-            misfits.append(len(rows))
-            rows.append(("",) * width)
-        elif len(cells) < width and k == len(body) - 1 and not lines[-1] == "" and k > 0:
+        short = len(cells) < width
+        if short and k == len(body) - 1 and lines[-1] and k > 0:
             cut = k
             rows.append(tuple(cells) + ("",) * (width - len(cells)))
-        elif len(cells) < width:
-            hint = "Was a line cut?"
-            faults.append(Fault(source.name, str(i), f"{len(cells)} cells", f"{width} as in line {split[0][0]}", hint))
-            misfits.append(len(rows))
+        elif short or any(cells[width:]):
+            hint = "Was a line cut?" if short else "A delimiter inside a value, or a decimal comma?"
+            faults.append(source.fault(i, f"{len(cells)} cells", f"{width} as in line {split[0][0]}", hint))
+            misfits.append(k)
             rows.append(("",) * width)
         else:
             rows.append(tuple(cells[:width]))
     if len(faults) > most_misfits * len(body):
-        extra = len(faults) - MAX_FAULTS
-        faults = faults[:MAX_FAULTS]
-        if extra > 0:
-            faults.append(Fault(source.name, "", f"{extra} more lines of another length", f"{width} cells"))
-        raise InputError(faults)
+        source.faults += faults[:MAX_FAULTS]
+        if len(faults) > MAX_FAULTS:
+            source.add("", f"{len(faults) - MAX_FAULTS} more lines of another length", f"{width} cells")
+        source.check()
     if not rows:
-        raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
+        source.refuse("", "no rows", "a heading line and rows of numbers")
     names = tuple(first[:width]) if header else ()
     return SplitTable(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
                  tuple(notes), cut, split[0][0], tuple(misfits))  # fmt: skip

@@ -13,8 +13,7 @@ import os
 import re
 
 from bemt.dataset import Dataset
-from bemt.readers._cfd import head_lines
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Layout, head_lines, read_history
 from bemt.readers.fluent_report import column_of
 
 KIND = "fluent_monitor"

@@ -19,8 +19,7 @@ import os
 import re
 
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, ExportTable, head_lines, si_unit
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Column, ExportTable, Layout, head_lines, read_history, si_unit
 
 KIND = "fluent_report"
 

@@ -23,9 +23,9 @@ from bemt.base.toml_text import Collector, load_toml
 from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text
 from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, heading
+from bemt.readers._headings import Heading, heading, known
 from bemt.readers._large import large_table
-from bemt.readers._recording import Builder, spikes
+from bemt.readers._recording import Builder
 from bemt.readers._split import SplitTable, decimal_mark, some, split_table
 
 __all__ = ["KIND", "QUANTITIES", "RecordingToml", "read", "sniff"]
@@ -253,12 +253,9 @@ def _check_poles(out: Collector, document: Mapping[str, Any]) -> None:
         hint = "An outrunner with 14 magnets has 7; a stand that divided already gives rpm, not electrical_rpm"
         out.add("rotor.pole_pairs", "nothing", "the pole pairs of the motor, since electrical_rpm is given", hint)
     if poles and not electrical and isinstance(columns, Mapping):
-        out.add(
-            "rotor.pole_pairs",
-            shown(rotor["pole_pairs"]) if rotor else "",
-            "no pole_pairs without electrical_rpm",
-            "Name the column electrical_rpm if it counts electrical revolutions",
-        )
+        got = shown(rotor["pole_pairs"]) if rotor else ""
+        hint = "Name the column electrical_rpm if it counts electrical revolutions"
+        out.add("rotor.pole_pairs", got, "no pole_pairs without electrical_rpm", hint)
 
 
 def _instrument(columns: Any) -> dict[str, dict[str, float]]:
@@ -276,11 +273,11 @@ def _instrument(columns: Any) -> dict[str, dict[str, float]]:
 
 def _heading(name: str, unit: str, text: str) -> Heading:
     if unit == "-":
-        return Heading(text, name, units.Unit("", "none", 1.0))
+        return known(text, name, "-")
     if QUANTITIES[name] == "angular_speed":
         u = units.UNITS[unit]
         return Heading(text, name, u if unit == "rpm" else units.Unit("", "angular_speed", u.factor / units.RPM))
-    return Heading(text, heading(f"{name}_{unit}").name, units.UNITS[unit])
+    return known(text, name, unit)
 
 
 def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
@@ -330,21 +327,14 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
 
 def _derive(build: Builder, pairs: int) -> None:
     """Mechanical speed from the electrical one, and the flags."""
-    for name in ("rpm", "electrical_rpm", "optical_rpm"):
-        if name in build.channels:
-            values = build.channels[name].values
-            build.channels[name] = Channel(values, "rpm")
-            build.flag(np.flatnonzero(values == 0.0), f"{name} is 0")
-            build.flag(np.flatnonzero(values < 0.0), f"{name} is negative")
+    build.flag_speeds("rpm", "electrical_rpm", "optical_rpm")
     if "electrical_rpm" in build.channels:
         label = build.free("rpm") if "rpm" not in build.channels else "rpm_from_electrical_rpm"
         build.channels[label] = Channel(build.channels["electrical_rpm"].values / pairs, "rpm")
         build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says")
     build.flag_time()
     if "time_s" in build.channels:
-        for name in ("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm"):
-            if name in build.channels:
-                build.flag(np.flatnonzero(spikes(build.channels[name].values)), f"spike of {name}")
+        build.flag_spikes("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm")
     build.check_magnitudes()
 
 

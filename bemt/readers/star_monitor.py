@@ -15,8 +15,7 @@ import os
 import re
 
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, cells_of, head_lines, si_unit
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Column, Layout, cells_of, head_lines, read_history, si_unit
 
 KIND = "star_monitor"
 

@@ -16,8 +16,7 @@ import os
 import re
 
 from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, cells_of, head_lines
-from bemt.readers._cfd_record import Layout, outermost, read_history
+from bemt.readers._cfd import Column, Layout, cells_of, head_lines, outermost, read_history
 
 KIND = "su2_history"
 

@@ -28,18 +28,9 @@ from bemt.recordings.cfd_setup import with_grid_floor
 from bemt.recordings.grid_study import COVERAGE
 
 __all__ = [
-    "DUCT",
-    "FIELDS",
-    "NO_LOAD",
-    "PROGRAMS",
-    "assemble",
-    "cfd_files",
-    "document",
-    "is_run",
-    "run_at",
-    "run_text",
-    "settled",
-]
+    "DUCT", "FIELDS", "NO_LOAD", "PROGRAMS", "assemble", "cfd_files", "clock_of", "document", "is_run", "run_at",
+    "run_text", "settled",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 PROGRAMS: Mapping[str, str] = {
@@ -102,9 +93,13 @@ class _Settled:
 
 
 def cfd_files(folder: Path) -> tuple[Path, ...]:
-    """Exports of a run in a folder: the files in it, or those below ``postProcessing``."""
-    post = folder / "postProcessing" if (folder / "postProcessing").is_dir() else None
-    files = sorted(post.glob("*/*/*.dat")) if post else sorted(p for p in folder.iterdir() if p.is_file())
+    """Exports of a run in a folder: the files in it, or those below ``postProcessing`` or one of its folders."""
+    post = folder / "postProcessing"
+    if post.is_dir() or folder.name == "postProcessing":
+        found = (post if post.is_dir() else folder).glob("*/*/*.dat")
+    else:
+        found = folder.glob("*/*.dat" if folder.parent.name == "postProcessing" else "*")
+    files = sorted(p for p in found if p.is_file())
     out = []
     for path in files:
         try:
@@ -213,18 +208,19 @@ def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
             out.append((name, record))
             continue
         file, before = out[at]
-        how = relation(_clock(before), _clock(record))
-        if home[0] == "openfoam_forces" and not _clock(record)[1].size and _clock(record)[0][0] > _clock(before)[0][0]:
-            how = "continues" if _clock(record)[0][0] > _clock(before)[0][-1] else "overlaps"  # one folder a start
-        if how == "other clock" and _clock(record)[0].size and _clock(record)[0][-1] < _clock(before)[0][0]:
-            before, record, how = record, before, relation(_clock(record), _clock(before))
+        then, now = clock_of(before), clock_of(record)
+        how = relation(then, now)
+        if home[0] == "openfoam_forces" and not now[1].size and now[0][0] > then[0][0]:  # one folder a start
+            how = "continues" if now[0][0] > then[0][-1] else "overlaps"
+        if how == "other clock" and now[0].size and now[0][-1] < then[0][0]:
+            before, record, then, now = record, before, now, then
+            how = relation(then, now)
         if how == "other clock":
             got = f"the same columns as {Path(file).name} on another clock"
-            raise InputError(
-                Fault(name, "", got, "parts of one history", "A restart with a clock of its own: give it alone")
-            )
-        cut = _clock(record)[0][0]
-        kept = _clock(before)[0] < cut
+            hint = "A restart with a clock of its own: give it alone"
+            raise InputError(Fault(name, "", got, "parts of one history", hint))
+        cut = now[0][0]
+        kept = then[0] < cut
         values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
         note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
         out[at] = (
@@ -240,7 +236,8 @@ def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
     return form, _zone_of(Path(name), form), tuple(record.values)
 
 
-def _clock(record: Dataset) -> tuple[Array, Array]:
+def clock_of(record: Dataset) -> tuple[Array, Array]:
+    """Steps (times where none are counted) and times of a history; empty: none."""
     time = str(record.provenance.get("time_channel", ""))
     names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
     times = record[time] if time in record else np.empty(0)
@@ -251,7 +248,7 @@ def _one_base(read: Sequence[tuple[str, Dataset]]) -> None:
     """Refuse histories that do not overlap: they are not one run."""
     for kind in ("time", "iteration"):
         own = [
-            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := _clock(r)[kind == "time"]).size > 1
+            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := clock_of(r)[kind == "time"]).size > 1
         ]
         for (a, x), (b, y) in zip(own, own[1:], strict=False):
             shared = min(x[-1], y[-1]) - max(x[0], y[0])
@@ -324,6 +321,10 @@ class _Run:
     def __post_init__(self) -> None:
         self.notes, self.faults = [], []
 
+    def fault(self, at: _Found | None, where: str, got: str, expected: str, hint: str = "") -> None:
+        """Note a fault of a column's file, or of the run."""
+        self.faults.append(Fault(self.name if at is None else at.file, where, got, expected, hint))
+
     def fact(self, quantity: str) -> RunColumn:
         """What the user said of a quantity."""
         return getattr(self.run.columns, quantity) or RunColumn()
@@ -335,7 +336,7 @@ class _Run:
             hits = [c for c in self.columns if told in (c.name, c.stem)]
             if not hits:
                 known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
-                self.faults.append(Fault(self.name, f"columns.{quantity}.column", repr(told), f"one of {known}"))
+                self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             return hits
         dimension = QUANTITIES[quantity][0]
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
@@ -363,7 +364,7 @@ class _Run:
         stated = unit_of(c.unit)
         if told and stated is not None and unit is not None and stated.suffix != unit.suffix:
             got = f"{told}, where the file says {c.unit}"
-            self.faults.append(Fault(c.file, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=..."))
+            self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=...")
             return None
         if c.part and c.axis and not c.unit and not told:
             factor = self._reference(c)
@@ -373,7 +374,7 @@ class _Run:
             hint = f'--unit {quantity}="{usual}" if that is its unit; '
             hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
             got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
-            self.faults.append(Fault(c.file, c.name, got, f"the unit of the {quantity}", hint))
+            self.fault(c, c.name, got, f"the unit of the {quantity}", hint)
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
@@ -388,7 +389,7 @@ class _Run:
         length = 1.0 if c.part == "force" else ref.length_m
         if math.isnan(force) or length is None:
             hint = "--reference area=A,length=L,speed=V,density=RHO in m2, m, m/s, kg/m3, as set in the solver"
-            self.faults.append(Fault(c.file, c.name, "a coefficient", "the reference values it rests on", hint))
+            self.fault(c, c.name, "a coefficient", "the reference values it rests on", hint)
             return None
         return force * length
 
@@ -400,7 +401,7 @@ class _Run:
         found = settled(values, c.record, self.period, self.run.run.revolutions, self.end)
         if isinstance(found, str):
             hint = "--revolutions N, or run on" if "revolution" in found else "Run on, or leave the file out"
-            self.faults.append(Fault(c.file, c.name, found, "a history with an average", hint))
+            self.fault(c, c.name, found, "a history with an average", hint)
             return None
         return found
 
@@ -418,7 +419,7 @@ class _Run:
                 v = np.unique(own[0].record[own[0].name])
                 got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
                 usual = '--unit rpm=rpm, or --unit rpm="rad/s", says its unit' if not stated else "Leave out --rpm"
-                self.faults.append(Fault(own[0].file, own[0].name, got, "one source of the speed", usual))
+                self.fault(own[0], own[0].name, got, "one source of the speed", usual)
         if own and head.rpm is None:
             values = self.si("rpm", own[0])
             if values is not None:
@@ -430,8 +431,7 @@ class _Run:
                 return np.abs(found.values if isinstance(found, _Settled) else values[-1:])
             return np.array([math.nan])
         if head.rpm is None:
-            hint = "--rpm N; run.toml: [run] rpm = N"
-            self.faults.append(Fault(self.name, "rpm", "no speed of rotation", "rev/min of the run", hint))
+            self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
         return np.array([math.nan if head.rpm is None else head.rpm])
 
 
@@ -448,9 +448,7 @@ def _axis(run: _Run, forces: Sequence[_Found], moments: Sequence[_Found]) -> str
     side = max((v for a, v in size.items() if a != axis), default=0.0)
     if size[axis] < _ALONG * side:
         got = ", ".join(f"{a} {v:.4g}" for a, v in size.items())
-        run.faults.append(
-            Fault(lead[0].file, "axis", got, "one component that stands out", "Name the shaft's: --axis z")
-        )
+        run.fault(lead[0], "axis", got, "one component that stands out", "Name the shaft's: --axis z")
     return axis
 
 
@@ -480,7 +478,7 @@ def _pool(run: _Run, quantity: str) -> dict[str, _Found]:
         if label in out and twice == 1:
             got = f"{out[label].name} ({Path(out[label].file).name}) and {c.name} ({Path(c.file).name})"
             option = f"--column {quantity}=NAME" if out[label].name != c.name else "Give one of the files"
-            run.faults.append(Fault(c.file, quantity, got, "one column", option))
+            run.fault(c, quantity, got, "one column", option)
         out.setdefault(label, c)
     return out
 
@@ -493,15 +491,13 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     if head.zones is not None:
         known = [z for z in head.zones if z in pool]
         if "Net" in head.zones and len(head.zones) > 1:
-            run.faults.append(
-                Fault(run.name, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
-            )
+            run.fault(None, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
         if torque and not known and list(pool) == [""]:
             return [(1.0, "")], []
         if absent := [z for z in head.zones if z not in pool]:
             if not torque or not known:
                 hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
-                run.faults.append(Fault(run.name, "zones", ", ".join(absent), f"zones with a {quantity}", hint))
+                run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
             elif bare := [z for z in absent if not DUCT.search(z)]:
                 run.notes.append(f"torque: no column for {', '.join(bare)}")
         duct = [z for z in known if z in ducts]
@@ -515,7 +511,7 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     if len(pool) > 1:
         names = ",".join(pool)
         hint = f"--zones {names} (leave out what does not count)"
-        run.faults.append(Fault(run.name, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint))
+        run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
     return [(1.0, z) for z in pool], [z for z in ducts if len(pool) > 1]
 
 
@@ -560,13 +556,12 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     work.notes += [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
-    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := _clock(r))[1].size]
+    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
     work.end = float(min(times)) if times else math.inf
     if times and not math.isfinite(work.period):
         work.period = 1.0
-        times = []
         _ask_all(work)
-        raise InputError(work.faults)
+        raise InputError(list(dict.fromkeys(work.faults)))
     loads: dict[str, _Settled] = {}
     for quantity in ("thrust", "torque", "power"):
         pool = _pool(work, quantity)
@@ -603,16 +598,16 @@ def _nothing(work: _Run) -> None:
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
     first = next((c.name for c in work.columns if not c.unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
-    work.faults.append(Fault(work.name, "", f"columns {known}", NO_LOAD, hint))
+    work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
 def _ask_all(work: _Run) -> None:
-    """Say with a missing speed which units are missing too."""
-    pools = {quantity: _pool(work, quantity) for quantity in ("thrust", "torque")}
+    """Say with a missing speed which units, zones and reference values are missing too."""
+    pools = {quantity: pool for quantity in ("thrust", "torque", "power") if (pool := _pool(work, quantity))}
     for quantity, pool in pools.items():
-        for c in list(pool.values())[:1]:
-            work.si(quantity, c)
-    if not any(pools.values()):
+        _counted(work, quantity, pool)
+        work.si(quantity, next(iter(pool.values())))
+    if not pools:
         _nothing(work)
 
 
@@ -664,9 +659,7 @@ def _applied(
             drift[name] = found.drift / mean
             if abs(drift[name]) > LOST:
                 got = f"a mean that drifts by {drift[name]:+.0%}"
-                work.faults.append(
-                    Fault(work.name, quantity, got, "a run that has converged", "Run on, or start later")
-                )
+                work.fault(None, quantity, got, "a run that has converged", "Run on, or start later")
             elif abs(drift[name]) > MOVING:
                 work.notes.append(f"not settled: {quantity} drifts by {drift[name]:+.1%} over the averaged part; in u")
     if sector > 1:

@@ -136,7 +136,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
         for other in _earlier(Path(path), paths, records):
             text = f"next to {other}: not joined"
             if other in records:
-                how = relation(_clock(records[other]), _clock(record))
+                how = relation(cfd_run.clock_of(records[other]), cfd_run.clock_of(record))
                 text = f"restart of {other} ({how}): not joined"
                 if how == "other clock":
                     text += "; the same steps mean other times"
@@ -165,13 +165,6 @@ def _before(name: str, start: float) -> bool:
         return float(name) < start
     except ValueError:
         return False
-
-
-def _clock(record: Dataset) -> tuple[Any, Any]:
-    time = record.provenance.get("time_channel", "")
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
-    times = record[time] if time in record else np.empty(0)
-    return (record[names[0]] if names else times), times
 
 
 def document(
@@ -221,8 +214,9 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
             if insist:
                 raise
     if insist and not exports:
-        hint = "A run.toml has its own" if runs else ""
-        raise InputError(Fault("", "", "options of a CFD run", "exports of a CFD run", hint))
+        hint = "A run.toml has its own" if runs else "Name the files, or the folder that holds them (postProcessing)"
+        got = "no export of CFD, which options of a run are about"
+        raise InputError([Fault(name, "", got, "exports of a CFD run", hint) for name in names])
     if not exports:
         return runs, None
     head = (run.run if run else RunToml.model_validate({"run": {"files": ()}}).run).model_copy(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
@@ -65,6 +65,8 @@ def write_recording(
     InputError
         On what is no column, unit or quantity, and where `out` exists.
     """
+    import tomlkit
+
     path = Path(out) if out.endswith(".toml") else Path(out) / "recording.toml"
     faults: list[Fault] = []
     if path.resolve().parent != Path(file).resolve().parent:
@@ -121,13 +123,12 @@ def write_recording(
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
     validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)
-    if out_faults.faults:
-        raise InputError(out_faults.faults)
-    lines = ["# Written by bemt import. Give this file in place of the table.", "[recording]"]
-    lines += [f"{key} = {json.dumps(value)}" for key, value in head.items()]
-    lines += ["", "[columns]"]
-    for quantity, entry in columns.items():
-        inside = ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in entry.items())
-        lines.append(f"{quantity} = {{ {inside} }}")
-    write_atomic(path, "\n".join(lines) + "\n")
+    out_faults.check()
+    document: dict[str, dict[str, Any]] = {
+        "recording": head,
+        "columns": {name: tomlkit.inline_table() for name in columns},
+    }
+    for name, entry in columns.items():
+        document["columns"][name].update(entry)
+    write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
     return path
