@@ -71,23 +71,20 @@ _ALONE = {  # a heading that is the name of a unit
     "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
     "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
 }  # fmt: skip
-_WORDS = {  # heading in lower case -> name and dimension it must have
-    "time": ("time", "time"), "thrust": ("thrust", "force"), "torque": ("torque", "torque"),
-    "voltage": ("voltage", "voltage"), "current": ("current", "current"), "airspeed": ("airspeed", "speed"),
-    "electrical power": ("electrical_power", "power"), "mechanical power": ("mechanical_power", "power"),
-    "throttle": ("throttle", "fraction"), "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"),
-    "pwm": ("pulse_width", "time"),
+_WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves open -> name, dimension
+    "time": ("time", "time"), "airspeed": ("airspeed", "speed"), "throttle": ("throttle", "fraction"),
+    "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"), "pwm": ("pulse_width", "time"),
     "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
     "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
     "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
-    "power": ("power", "power"), "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
+    "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
     "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
     "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
     "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
     "torque mz (torque)": ("torque", "torque"), "electrical speed": ("electrical", "angular_speed"),
     "optical speed": ("optical", "angular_speed"), "vibration": ("vibration", "acceleration"),
-    "accx": ("acceleration_x", "acceleration"),
-    "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
+    "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
+    "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
 _WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
@@ -112,7 +109,6 @@ _QUALIFIED = re.compile(
     r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
 )
 """Words that a thrust or a torque goes with and that make no other quantity of it."""
-_PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| input| command)?")
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
@@ -132,8 +128,6 @@ _THOUSANDS = re.compile(
     re.IGNORECASE,
 )
 """Speeds in thousands: ``kRPM``, ``RPM x1000``, ``rpm (k)``, ``Speed [1000 rpm]``."""
-_SHAFT_RPM = re.compile(r"(prop|propeller|rotor|shaft|fan|mechanical)[ _]?rpm", re.IGNORECASE)
-"""Headings that name the speed of the rotor and no other."""
 _TURNS = {
     "rotation", "rotational", "rev", "revs", "revolution", "revolutions", "shaft", "prop", "propeller", "rotor", "fan",
 }  # fmt: skip
@@ -261,6 +255,16 @@ def _spoken(text: str) -> tuple[str, set[str]]:
     return base, set(english(base))
 
 
+def meanings(text: str) -> list[str]:
+    """Quantities of a recording.toml that the words of a heading may mean.
+
+    >>> meanings("Schub"), meanings("speed"), meanings("wibble")
+    (['thrust'], ['rpm', 'airspeed'], [])
+    """
+    found = [name for name, _ in quantities(english(re.split(r"[(\[]", text)[0]))]
+    return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
+
+
 def may_be_shaft_speed(text: str) -> bool:
     """Tell whether the words of a heading fit a speed of rotation; its unit is not looked at.
 
@@ -304,8 +308,6 @@ def heading(text: str) -> Heading:
         found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
         told = f"{text!r} is read as thousands of revolutions per minute"
         return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
-    if _SHAFT_RPM.fullmatch(text):
-        return Heading(text, "rpm", units.UNITS["rpm"])
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
@@ -497,8 +499,6 @@ def _heading(text: str) -> Heading:
         elif re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
             base, unit = core, units.UNITS["rpm"]
     word = _WORDS.get(base.lower().replace("_", " "))
-    if unit is not None and unit.dimension == "time" and _PULSE.fullmatch(base.lower().replace("_", " ")):
-        word = ("pulse_width", "time")
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
         unit, doubt = _GRAVITY, ""
     if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:

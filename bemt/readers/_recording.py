@@ -12,6 +12,7 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,8 @@ from bemt.base import unit_errors
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import load_text
-from bemt.readers._clock import clock_seconds
 from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, heading, may_be_shaft_speed, slug, surely_shaft_speed
+from bemt.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
 from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.readers._words import english, quantities
@@ -41,7 +41,43 @@ HALF, TIMES, SLIP = 3, 2.0, 0.02
 """Neighbours on each side of a spike, and ranges of theirs that it leaves; share that a ratio is near a slip by."""
 MISREAD = 2.5
 """Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
+_CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
+DAY = 86400.0
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
+
+
+def clock_seconds(cells: Sequence[str]) -> Array | None:
+    """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text, (N,)
+    [s].
+
+    >>> clock_seconds(["23:59:59.5", "", "00:00:01.0"]), clock_seconds(["1:2", "x"]) is None
+    (array([0. , nan, 1.5]), True)
+    """
+    out = np.full(len(cells), np.nan)
+    dated: set[bool] = set()
+    for i, cell in enumerate(cells):
+        if not cell:
+            continue
+        match = _CLOCK.fullmatch(cell)
+        if match is None:
+            return None
+        year, month, day, hour, minute, second = (int(part or 0) for part in match.groups()[:6])
+        dated.add(bool(match[1]))
+        try:
+            date = datetime(year, month, day) if match[1] else datetime(2000, 1, 1)
+        except ValueError:
+            return None
+        if hour > 23 or minute > 59 or second > 60:
+            return None
+        at = date - datetime(2000, 1, 1) + timedelta(hours=hour, minutes=minute, seconds=second)
+        out[i] = at.total_seconds() + float(f"0.{match[7] or 0}")
+    known = np.flatnonzero(np.isfinite(out))
+    if not known.size or len(dated) > 1:
+        return None
+    if not dated.pop():
+        out[known[1:]] += DAY * np.cumsum(np.diff(out[known]) < -0.5 * DAY)
+    out -= out[known[0]]
+    return out
 
 
 def spikes(values: Array) -> NDArray[np.bool_]:
@@ -388,9 +424,9 @@ def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
     out: dict[str, str] = {}
     for label in headings:
         name = label[1:].rsplit("'", 1)[0].split("' (")[0]
-        found = {q.replace(" ", "_") for q, _ in quantities(english(re.split(r"[(\[]", name)[0]))}
+        found = set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
-        quantity = "power" if found == {"mechanical_power"} else found.pop() if len(found) == 1 else ""
+        quantity = found.pop() if len(found) == 1 else ""
         if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
             out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
     return list(out.values())

@@ -152,21 +152,21 @@ def _speeds(build: Builder) -> None:
         if volt is not None:
             wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
         build.flag(np.flatnonzero(wild), f"spike of {name}")
-    electrical = [n for n in build.channels if n.startswith("electrical_rpm")]
+    electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
     if electrical and seen:
         build.warnings.append(
-            f"{electrical[0]} is derived from the motor's phases with the number of poles set in the stand's software, "
+            f"{electrical} is derived from the motor's phases with the number of poles set in the stand's software, "
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
         )
     if "rpm" in build.channels and seen:
         build.warnings.append(
             "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         )
-    both = [build.at(n) for n in _SPEEDS]
-    if both[0] is not None and both[1] is not None:
-        good = (both[0] > 0) & (both[1] > 0)
+    electric, optical = (build.at(n) for n in _SPEEDS)
+    if electric is not None and optical is not None:
+        good = (electric > 0) & (optical > 0)
         if np.count_nonzero(good) >= 3:
-            ratio = float(np.median(both[0][good] / both[1][good]))
+            ratio = float(np.median(electric[good] / optical[good]))
             text = f"electrical over optical speed: median {ratio:.4g} in {np.count_nonzero(good)} rows"
             near = round(ratio) if ratio > 1 else 1
             whole = near > 1 and abs(ratio / near - 1) < 0.05
@@ -195,28 +195,25 @@ def _power(build: Builder) -> None:
     """Tell which speed the mechanical power was computed with, and whether the units agree."""
     power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
     volt, ampere, electric = build.at("voltage_V"), build.at("current_A"), build.at("electrical_power_W")
-    if power is not None and torque is not None:
-        for name in (*_SPEEDS, "rpm"):
-            speed = build.at(name)
-            if speed is None:
-                continue
-            shaft = np.abs(torque) * speed * units.RPM
-            good = (shaft > 0.05 * np.nanmax(np.append(shaft, 0.0))) & (power > 0)
-            if np.count_nonzero(good) >= 3:
-                ratio = float(np.median(power[good] / shaft[good]))
-                if math.isclose(ratio, 1.0, rel_tol=0.02):
-                    build.warnings.append(f"mechanical_power_W is torque times {name}")
-                elif name == "optical_rpm" or "optical_rpm" not in build.channels:
-                    text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
-                    build.warnings.append(text + "; nothing was converted")
+    for name in (*_SPEEDS, "rpm") if power is not None and torque is not None else ():
+        speed = build.at(name)
+        ratio = None if speed is None else _times(power, np.abs(torque) * speed * units.RPM)
+        if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
+            build.warnings.append(f"mechanical_power_W is torque times {name}")
+        elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
+            text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
+            build.warnings.append(text + "; nothing was converted")
     if volt is not None and ampere is not None and electric is not None:
-        product = volt * ampere
-        good = product > 0.05 * np.nanmax(np.append(product, 0.0))
-        if np.count_nonzero(good) >= 3:
-            ratio = float(np.median(electric[good] / product[good]))
-            if abs(ratio - 1.0) > 0.1:
-                text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
-                build.warnings.append(text + "; nothing was converted")
+        ratio = _times(electric, volt * ampere)
+        if ratio is not None and abs(ratio - 1.0) > 0.1:
+            text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
+            build.warnings.append(text + "; nothing was converted")
+
+
+def _times(power: Array, product: Array) -> float | None:
+    """Median of a power over the product of its factors in the rows that carry load; None: fewer than three."""
+    good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & (power > 0)
+    return float(np.median(power[good] / product[good])) if np.count_nonzero(good) >= 3 else None
 
 
 def _sign(build: Builder) -> None:

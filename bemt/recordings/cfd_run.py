@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import readers
-from bemt.base.averaging import MIN_ROWS, Mean, keep_last, relation, revolution_average, steady_average
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.dataset import Dataset
 from bemt.readers._cfd import unit_of
 from bemt.readers._headings import may_be_shaft_speed
 from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
+from bemt.recordings.cfd_files import (
+    FIELDS,
+    PROGRAMS,
+    Settled,
+    cfd_files,
+    clock_of,
+    one_base,
+    read_run,
+    settled,
+    zone_of,
+)
 from bemt.recordings.cfd_setup import with_grid_floor
 from bemt.recordings.grid_study import COVERAGE
 
@@ -33,21 +44,11 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-PROGRAMS: Mapping[str, str] = {
-    "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",
-    "fluent_xy": "Fluent", "fluent_ascii": "Fluent", "cfd_post_csv": "CFD-Post", "design_points": "Workbench",
-    "star_monitor": "STAR-CCM+", "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
-}  # fmt: skip
-"""Program by reader."""
-FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
-"""Readers whose files may hold values at points, and no loads."""
 NO_LOAD = "a thrust or a torque"
 MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
-SCATTERED = 0.02
-"""Spread of the means of single revolutions above which a load is not periodic. [1]"""
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
 """Name of a zone that is the duct."""
@@ -66,6 +67,7 @@ _WORDS: dict[str, str] = {
 """Heading of a quantity."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,34 +82,6 @@ class _Found:
     part: str  # force, moment, or "" where only the heading tells
     unit: str
     record: Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class _Settled:
-    """A load after averaging."""
-
-    values: Array  # (N,) SI, rpm in rev/min
-    drift: float  # change over the averaged part, in the unit of the values; NaN: nothing was averaged
-    scatter: float  # standard deviation over it
-    over: str
-
-
-def cfd_files(folder: Path) -> tuple[Path, ...]:
-    """Exports of a run in a folder: the files in it, or those below ``postProcessing`` or one of its folders."""
-    post = folder / "postProcessing"
-    if post.is_dir() or folder.name == "postProcessing":
-        found = (post if post.is_dir() else folder).glob("*/*/*.dat")
-    else:
-        found = folder.glob("*/*.dat" if folder.parent.name == "postProcessing" else "*")
-    files = sorted(p for p in found if p.is_file())
-    out = []
-    for path in files:
-        try:
-            if readers.detect(path) in PROGRAMS:
-                out.append(path)
-        except InputError:
-            continue
-    return tuple(out)
 
 
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
@@ -148,18 +122,9 @@ def is_run(record: Dataset) -> bool:
     return record.provenance.get("format") == "cfd_run"
 
 
-def _zone_of(path: Path, form: str) -> str:
-    """Function object of a file of OpenFOAM, which writes name/time/file."""
-    try:
-        float(path.parent.name)
-    except ValueError:
-        return ""
-    return path.parent.parent.name if form == "openfoam_forces" else ""
-
-
 def _columns(file: str, record: Dataset, several: bool) -> list[_Found]:
     form = str(record.provenance["format"])
-    home = _zone_of(Path(file), form) if several else ""
+    home = zone_of(Path(file), form) if several else ""
     clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
     out = []
     for name in record.values:
@@ -179,127 +144,6 @@ def _columns(file: str, record: Dataset, several: bool) -> list[_Found]:
     return out
 
 
-def _read(paths: Sequence[Path]) -> list[tuple[str, Dataset]]:
-    """Files of a run, the parts of a restarted history put together."""
-    read: list[tuple[str, Dataset]] = []
-    faults: list[Fault] = []
-    for path in paths:
-        try:
-            found = readers.read(path)
-            if not isinstance(found, Dataset) or found.kind != "cfd":
-                got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
-                raise InputError(
-                    Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}")
-                )
-            read.append((str(path), found))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
-    return _joined(read)
-
-
-def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
-    out: list[tuple[str, Dataset]] = []
-    for name, record in read:
-        home = _home(name, record)
-        at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
-        if at is None or record.provenance.get("clock") not in ("time", "iteration"):
-            out.append((name, record))
-            continue
-        file, before = out[at]
-        then, now = clock_of(before), clock_of(record)
-        how = relation(then, now)
-        if home[0] == "openfoam_forces" and not now[1].size and now[0][0] > then[0][0]:  # one folder a start
-            how = "continues" if now[0][0] > then[0][-1] else "overlaps"
-        if how == "other clock" and now[0].size and now[0][-1] < then[0][0]:
-            before, record, then, now = record, before, now, then
-            how = relation(then, now)
-        if how == "other clock":
-            got = f"the same columns as {Path(file).name} on another clock"
-            hint = "A restart with a clock of its own: give it alone"
-            raise InputError(Fault(name, "", got, "parts of one history", hint))
-        cut = now[0][0]
-        kept = then[0] < cut
-        values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
-        note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
-        out[at] = (
-            file,
-            replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=(*before.notes, note)),
-        )
-    return out
-
-
-def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
-    """What the parts of one history have in common: format, function object, columns."""
-    form = str(record.provenance["format"])
-    return form, _zone_of(Path(name), form), tuple(record.values)
-
-
-def clock_of(record: Dataset) -> tuple[Array, Array]:
-    """Steps (times where none are counted) and times of a history; empty: none."""
-    time = str(record.provenance.get("time_channel", ""))
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
-    times = record[time] if time in record else np.empty(0)
-    return (record[names[0]] if names else times), times
-
-
-def _one_base(read: Sequence[tuple[str, Dataset]]) -> None:
-    """Refuse histories that do not overlap: they are not one run."""
-    for kind in ("time", "iteration"):
-        own = [
-            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := clock_of(r)[kind == "time"]).size > 1
-        ]
-        for (a, x), (b, y) in zip(own, own[1:], strict=False):
-            shared = min(x[-1], y[-1]) - max(x[0], y[0])
-            if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
-                got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
-                raise InputError(
-                    Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself")
-                )
-
-
-def settled(
-    values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf
-) -> _Settled | str:
-    """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
-    clock = record.provenance.get("clock")
-    coarse = ""
-    if clock == "time":
-        time = record[record.provenance["time_channel"]]
-        index, _ = keep_last(time)
-        index = index[time[index] <= end * (1.0 + 1e-9)]
-        step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
-        if step > period / MIN_ROWS:
-            clock, coarse = (
-                "iteration",
-                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
-            )
-    if clock == "time":
-        found = revolution_average(time[index], values[index], period, revolutions)
-        if found.mean is None:
-            return found.problem
-        turns = np.array(found.per_revolution)
-        scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
-        word = f"{found.revolutions} revolution" + ("s" if found.revolutions > 1 else "")
-        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({found.rows} rows)"
-        wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
-        over += "; revolutions differ by more than 2 %" if wide else ""
-        return _Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)
-    if clock == "iteration":
-        found = steady_average(values)
-        if found.mean is None:
-            return found.problem
-        part = values[values.size - found.rows :]
-        over = f"last {found.rows} of {values.size} rows{coarse}"
-        return _Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
-    mean = record.provenance.get("means", {})
-    over = "as in the file"
-    if values.size > 1 and mean and record.provenance["format"] == "fluent_transcript":
-        values, over = values[np.isfinite(values)][-1:], "the last one computed"
-    return _Settled(np.array(values, dtype=float), math.nan, 0.0, over)
-
-
 def _recorded(found: list[_Found]) -> list[_Found]:
     """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
     written = [c for c in found if c.record.provenance["format"] != "fluent_transcript"]
@@ -315,11 +159,8 @@ class _Run:
     columns: list[_Found]
     period: float = math.nan
     end: float = math.inf
-    notes: list[str] = None  # type: ignore[assignment]
-    faults: list[Fault] = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        self.notes, self.faults = [], []
+    notes: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
 
     def fault(self, at: _Found | None, where: str, got: str, expected: str, hint: str = "") -> None:
         """Note a fault of a column's file, or of the run."""
@@ -393,7 +234,7 @@ class _Run:
             return None
         return force * length
 
-    def mean(self, quantity: str, c: _Found) -> _Settled | None:
+    def mean(self, quantity: str, c: _Found) -> Settled | None:
         """Settled value of one column."""
         values = self.si(quantity, c)
         if values is None:
@@ -428,7 +269,7 @@ class _Run:
                     if own[0].record.provenance.get("clock") != "time"
                     else None
                 )
-                return np.abs(found.values if isinstance(found, _Settled) else values[-1:])
+                return np.abs(found.values if isinstance(found, Settled) else values[-1:])
             return np.array([math.nan])
         if head.rpm is None:
             self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
@@ -515,9 +356,9 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     return [(1.0, z) for z in pool], [z for z in ducts if len(pool) > 1]
 
 
-def _sum(parts: Sequence[tuple[float, _Settled]]) -> _Settled:
+def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
     over = parts[0][1].over + (f", {len(parts)} zones" if len(parts) > 1 else "")
-    return _Settled(
+    return Settled(
         np.sum([k * s.values for k, s in parts], axis=0), sum(k * s.drift for k, s in parts),
         math.hypot(*(s.scatter for _, s in parts)), over,
     )  # fmt: skip
@@ -546,10 +387,10 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         With everything that has to be said first: units, zones, speed.
     """
     paths = [folder / f for f in run.run.files]
-    read = _read(paths)
-    _one_base(read)
+    read = read_run(paths)
+    one_base(read)
     homes = {
-        _zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
+        zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
     }
     columns = [c for file, record in read for c in _columns(file, record, len(homes) > 1)]
     work = _Run(run, name, columns)
@@ -562,7 +403,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         work.period = 1.0
         _ask_all(work)
         raise InputError(list(dict.fromkeys(work.faults)))
-    loads: dict[str, _Settled] = {}
+    loads: dict[str, Settled] = {}
     for quantity in ("thrust", "torque", "power"):
         pool = _pool(work, quantity)
         if not pool:
@@ -612,7 +453,7 @@ def _ask_all(work: _Run) -> None:
 
 
 def _applied(
-    work: _Run, rpm: Array, loads: Mapping[str, _Settled], read: Sequence[tuple[str, Dataset]]
+    work: _Run, rpm: Array, loads: Mapping[str, Settled], read: Sequence[tuple[str, Dataset]]
 ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Any]]:
     """Sector and sign applied, the operating point beside the loads."""
     head = work.run.run
@@ -634,10 +475,7 @@ def _applied(
     drift: dict[str, float] = {}
     turned = 1.0
     for quantity, found in loads.items():
-        name = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}[
-            quantity
-        ]
-        told = work.fact(quantity).sign
+        name, told = _CHANNEL[quantity], work.fact(quantity).sign
         if quantity == "duct_thrust" and told is None:
             sign = turned
         elif told is None:
@@ -676,7 +514,7 @@ def _coefficients(work: _Run, values: dict[str, Array], u: dict[str, Array], ove
     for c in work.columns:
         if c.name in _COEFFICIENTS and c.name not in values:
             found = settled(c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
-            if isinstance(found, _Settled):
+            if isinstance(found, Settled):
                 values[c.name], over[c.name] = found.values, found.over
                 if c.name != "J":
                     u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -14,27 +13,16 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.readers import load_text
-from bemt.readers._headings import heading, unit_for
+from bemt.readers._headings import heading, meanings, unit_for
 from bemt.readers._split import decimal_mark, some, split_table
-from bemt.readers._words import english, quantities
 from bemt.readers.recording_toml import QUANTITIES, RecordingToml
 from bemt.recordings.cfd_options import pairs
 
-__all__ = ["meanings", "write_recording"]
+__all__ = ["write_recording"]
 
 _OF_DIMENSION = {"force": "thrust", "torque": "torque", "angular_speed": "rpm", "voltage": "voltage",
                  "current": "current", "speed": "airspeed", "density": "density", "pressure": "pressure"}  # fmt: skip
 """Quantity that a unit alone stands for."""
-
-
-def meanings(text: str) -> list[str]:
-    """Quantities of a recording.toml that the words of a heading may mean.
-
-    >>> meanings("Schub"), meanings("speed"), meanings("wibble")
-    (['thrust'], ['rpm', 'airspeed'], [])
-    """
-    found = [name for name, _ in quantities(english(re.split(r"[(\\[]", text)[0]))]
-    return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
 def _unit(quantity: str, text: str) -> str | None:
