@@ -120,7 +120,6 @@ _OTHER_SPEEDS = {
     "climb", "err", "error", "u", "std", "sd",
 }  # fmt: skip
 """Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
-_GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
 _THOUSANDS = re.compile(
     r"(?P<of>.*?)[\s_]*(?:[\[(]?\s*k[ -]?rpm\s*[\])]?"
     r"|rpm\s*(?:[\[(]\s*[x×*/]?|[x×*/])\s*(?:1000|1e3|10\^3|10³|k|thousands?)\s*[\])]?"
@@ -456,6 +455,35 @@ def _of_the_air(base: str, unit: units.Unit) -> str:
     return ""
 
 
+def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str]:
+    """Name, unit and doubt of a heading that has no unit in brackets."""
+    if alone := _ALONE.get(core.lower()):
+        return alone[0], units.UNITS[alone[1]], ""
+    if (ending := _tail(core)) is not None:
+        name, stated = ending
+        return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)
+    name, suffix = units.split_suffix(core)
+    goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
+    if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
+        return core, units.UNITS["rpm"], ""
+    if suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
+        return text, None, f"{suffix.suffix!r} does not go with {name}"
+    if suffix is not None and suffix.dimension == "mass" and not re.search(r"weight|mass", name, re.IGNORECASE):
+        return text, None, f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
+    if suffix is not None and (name or suffix.dimension == "mass"):
+        return name, suffix, ""
+    pure = units.Unit("", "none", 1.0)
+    if _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
+        return _PURE_NAMES.get(core, core), pure, ""
+    if re.fullmatch(r"\w+/[NAVWKCF]", core):
+        return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
+    if "rotor convention" in text and core in ("CT", "CP", "CQ"):
+        return f"{core}_rotor", pure, ""
+    if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
+        return core, units.UNITS["rpm"], ""
+    return text, None, ""
+
+
 def _heading(text: str) -> Heading:
     if either := _either(text):
         return Heading(text, slug(text), None, either)
@@ -470,45 +498,19 @@ def _heading(text: str) -> Heading:
     core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
     if found and (found[2].strip().lower() in ("erpm", "electrical") and "rpm" in text.lower()):
         return Heading(text, "electrical_rpm", units.UNITS["rpm"])
-    alone = _ALONE.get(core.lower())
-    ending = _tail(core) if unit is None and not doubt else None
-    if unit is None and not doubt and alone:
-        base, unit = alone[0], units.UNITS[alone[1]]
-    elif ending is not None:
-        base, stated = ending
-        unit, doubt = (stated, "") if isinstance(stated, units.Unit) else (None, stated)
-    elif unit is None and not doubt:
-        name, suffix = units.split_suffix(core)
-        goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
-        if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
-            base, unit = core, units.UNITS["rpm"]
-        elif suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
-            doubt = f"{suffix.suffix!r} does not go with {name}"
-        elif suffix is not None and name and suffix.dimension != "mass":
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass" and re.search(r"weight|mass", name, re.IGNORECASE):
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass":
-            doubt = f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
-        elif _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
-            base, unit = _PURE_NAMES.get(core, core), units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"\w+/[NAVWKCF]", core):
-            doubt = f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
-        elif "rotor convention" in text and core in ("CT", "CP", "CQ"):
-            base, unit = f"{core}_rotor", units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
-            base, unit = core, units.UNITS["rpm"]
+    if unit is None and not doubt:
+        base, unit, doubt = _without_brackets(core, text)
     word = _WORDS.get(base.lower().replace("_", " "))
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
-        unit, doubt = _GRAVITY, ""
+        unit, doubt = units.Unit("m_s2", "acceleration", units.G0), ""
     if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:
         base, unit = "rpm", units.UNITS["rpm"]  # U/min, 1/min
-    if unit is not None and (around := _of_the_air(base, unit)):
+    if unit is None:
+        return Heading(text, slug(text) or "column", None, doubt)
+    if around := _of_the_air(base, unit):
         if around == "qnh":
             return Heading(text, slug(text), None, _SEA_LEVEL)
         base, word = around, None
-    if unit is None:
-        return Heading(text, slug(text) or "column", None, doubt)
     if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
         unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
     if word and word[1] == unit.dimension:
@@ -518,8 +520,7 @@ def _heading(text: str) -> Heading:
     if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
         flat = re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE)
         flat = re.sub(r"^[A-Z][a-z]{2,}$", lambda word: word[0].lower(), flat)
-        if flat.lower() == "e":
-            flat = "electrical"
+        flat = "electrical" if flat.lower() == "e" else flat
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
     base = re.sub(r"\b[A-Z][a-z]{2,}", lambda word: word[0].lower(), base)
     return Heading(text, _channel(slug(base), unit), unit)

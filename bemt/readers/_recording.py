@@ -12,7 +12,6 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from bemt.readers import load_text
 from bemt.readers._columns import Channel, dataset
 from bemt.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
+from bemt.readers._samples import clock_seconds, spikes
 from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.readers._words import english, quantities
 
@@ -35,100 +35,9 @@ FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
 HOTTEST_AIR, MOST_AIR_VARIES, COLDEST_PART = 323.0, 20.0, 200.0
 """Temperature above which, and range over which, no air around a stand is; below which no part of it is. [K]"""
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
-BLOCK = 1 << 17
-"""Samples that are searched for spikes at once."""
-HALF, TIMES, SLIP = 3, 2.0, 0.02
-"""Neighbours on each side of a spike, and ranges of theirs that it leaves; share that a ratio is near a slip by."""
-MISREAD = 2.5
-"""Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
-_CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
-DAY = 86400.0
+SLIP = 0.02
+"""Share that a ratio is near a unit error by. [1]"""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
-
-
-def clock_seconds(cells: Sequence[str]) -> Array | None:
-    """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text, (N,)
-    [s].
-
-    >>> clock_seconds(["23:59:59.5", "", "00:00:01.0"]), clock_seconds(["1:2", "x"]) is None
-    (array([0. , nan, 1.5]), True)
-    """
-    out = np.full(len(cells), np.nan)
-    dated: set[bool] = set()
-    for i, cell in enumerate(cells):
-        if not cell:
-            continue
-        match = _CLOCK.fullmatch(cell)
-        if match is None:
-            return None
-        year, month, day, hour, minute, second = (int(part or 0) for part in match.groups()[:6])
-        dated.add(bool(match[1]))
-        try:
-            date = datetime(year, month, day) if match[1] else datetime(2000, 1, 1)
-        except ValueError:
-            return None
-        if hour > 23 or minute > 59 or second > 60:
-            return None
-        at = date - datetime(2000, 1, 1) + timedelta(hours=hour, minutes=minute, seconds=second)
-        out[i] = at.total_seconds() + float(f"0.{match[7] or 0}")
-    known = np.flatnonzero(np.isfinite(out))
-    if not known.size or len(dated) > 1:
-        return None
-    if not dated.pop():
-        out[known[1:]] += DAY * np.cumsum(np.diff(out[known]) < -0.5 * DAY)
-    out -= out[known[0]]
-    return out
-
-
-def spikes(values: Array) -> NDArray[np.bool_]:
-    """Single samples that jump away from all their neighbours and back, (N,).
-
-    A sample is a spike when it lies outside the range of its neighbours by more than `TIMES` that range and by more
-    than a quarter of the spread of the whole channel. At an end, one side has no neighbours; there the jump must exceed
-    the spread of the whole channel, since a start-up looks like one.
-
-    >>> spikes(np.array([1.0, 1.1, 1.2, 9.0, 1.4, 1.5, 1.6, 1.7])).nonzero()[0]
-    array([3])
-    """
-    out = np.zeros(values.shape, dtype=bool)
-    rows = np.flatnonzero(np.isfinite(values))
-    if len(rows) < 6:
-        return out
-    v = values if len(rows) == len(values) else values[rows]
-    low, high = np.percentile(v, [5.0, 95.0])
-    top = max(abs(float(np.min(v))), abs(float(np.max(v))))
-    spread = max(float(high - low), 1e-12 * top)
-    for a in range(0, len(v), BLOCK):
-        far = _far(v, a, min(a + BLOCK, len(v)), spread)
-        out[rows[a : a + BLOCK][far]] = True
-    return out
-
-
-def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
-    """Spikes among the samples from a to b."""
-    at = max(a - HALF, 0)
-    part = v[at : b + HALF]
-    lo, hi = np.full(len(part), np.nan), np.full(len(part), np.nan)
-    for k in range(1, HALF + 1):  # neighbours on either side, as far as there are any
-        for own, other in ((slice(k, None), slice(None, -k)), (slice(None, -k), slice(k, None))):
-            np.fmin(lo[own], part[other], out=lo[own])
-            np.fmax(hi[own], part[other], out=hi[own])
-    part, lo, hi = (x[a - at : b - at] for x in (part, lo, hi))
-    share = np.full(b - a, 0.25)
-    if a == 0:
-        share[0] = 1.0
-    if b == len(v):
-        share[-1] = 1.0
-    return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
-
-
-def against_load(speed: Array, load: Array) -> Array:
-    """Root of a load over its speed, relative to the median of the rows, (N,); a speed is misread far from 1.
-
-    Loads go with the square of the speed: outside 1 / `MISREAD` to `MISREAD` the two of one row do not belong together.
-    """
-    k = np.sqrt(load) / speed
-    return np.asarray(k / np.median(k))
 
 
 @dataclass
@@ -228,49 +137,25 @@ class Builder:
     def add(self, index: int, head: Heading, decimal: str = ".", sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
         values, bad, empty = self.table.numbers(index, decimal)
-        cells = {i: self.table.cell(i, index) for i in bad}
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
             self.warnings.append(f"column {label!r}: {errors} cells with an error of the spreadsheet are empty")
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
-        comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
-        if comma and decimal == ".":
-            where = f"{self.line(comma[0])}:{index + 1}"
-            got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
-            hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
-            if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
-                hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
-            self.fault(where, got, "a number with a decimal point", hint)
+        if decimal == "." and self._has_commas(index, label, bad):
             return ""
         if bad and (stated := self._one_unit(index, bad)):
             values, bad, _ = column_numbers([(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], decimal)
-            cells = {i: self.table.cell(i, index) for i in bad}
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
-        name = self.free(head.name)
         if len(bad) > MOST_ODD * (len(values) - empty):
-            column = self.table.cells(index)
-            seconds = clock_seconds(column)
-            if seconds is not None:
-                name = self.free(f"{slug(head.text) or head.name}_s")
-                self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
-                self.clocks.append(name)
-                self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
-                return name
-            name = self.free(slug(head.text) or head.name)
-            self.texts[name] = tuple(column)
-            if len(bad) < len(values) - empty:
-                self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
-            elif sum(bool(_WITH_UNIT.fullmatch(cells[i])) for i in bad) > len(bad) / 2:
-                self.warnings.append(f"column {label!r} has units in its cells ({cells[bad[0]][:20]!r}): kept as text")
-            else:
-                self.words.append(repr(label))
-            return ""
+            return self._add_text(index, head, label, bad, len(values) - empty)
+        name = self.free(head.name)
         if bad:
-            words = some((f"{cells[i][:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
+            cells = ((i, self.table.cell(i, index)[:20]) for i in bad)
+            words = some((f"{cell!r} at {self.line(i)}:{index + 1}" for i, cell in cells), 3)
             self.flag(bad, f"{name}: no number", f": {words}; NaN there")
         if head.told:
             self.warnings.append(head.told)
@@ -289,6 +174,36 @@ class Builder:
         self.channels[name] = Channel(values if sign == 1.0 else values * sign, head.unit_name)
         self.headings[name] = head.text
         return name
+
+    def _has_commas(self, index: int, label: str, bad: Sequence[int]) -> bool:
+        """Whether cells of a column have a comma for a point, which is a fault."""
+        cells = {i: self.table.cell(i, index) for i in bad}
+        comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
+        if comma:
+            got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
+            hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
+            if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
+                hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
+            self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
+        return bool(comma)
+
+    def _add_text(self, index: int, head: Heading, label: str, bad: Sequence[int], filled: int) -> str:
+        """Add a column of text, or of clock times; gives the name of the latter."""
+        column, base = self.table.cells(index), slug(head.text) or head.name
+        if (seconds := clock_seconds(column)) is not None:
+            name = self.free(f"{base}_s")
+            self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
+            self.clocks.append(name)
+            self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
+            return name
+        self.texts[self.free(base)] = tuple(column)
+        if len(bad) < filled:
+            self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
+        elif sum(bool(_WITH_UNIT.fullmatch(column[i])) for i in bad) > len(bad) / 2:
+            self.warnings.append(f"column {label!r} has units in its cells ({column[bad[0]][:20]!r}): kept as text")
+        else:
+            self.words.append(repr(label))
+        return ""
 
     def _one_unit(self, index: int, bad: Sequence[int]) -> str:
         """Unit that the cells of a column say, all of them the same; "" for any other column."""

@@ -110,11 +110,8 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if header is None:
         source.refuse("", "no header", "a header such as # Time total_x total_y total_z")
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
-        got, hint = (
-            "forces in bins along a direction",
-            "Their sum is in the forces (or force and moment) file in the same folder",
-        )
-        source.refuse("", got, "forces of the whole", hint)
+        hint = "Their sum is in the forces (or force and moment) file in the same folder"
+        source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
     notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
     if header.split()[0] == "patch":
         return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)

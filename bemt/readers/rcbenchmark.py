@@ -30,7 +30,8 @@ from bemt.base import units
 from bemt.dataset import Dataset
 from bemt.readers import head_text, number
 from bemt.readers._headings import heading
-from bemt.readers._recording import MISREAD, Array, Builder, against_load, slip, spikes
+from bemt.readers._recording import Array, Builder, slip
+from bemt.readers._samples import MISREAD, against_load, spikes
 from bemt.readers._split import SplitTable
 
 KIND = "rcbenchmark"

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._recording import MISREAD, against_load
+from bemt.readers._samples import MISREAD, against_load
 from bemt.recordings import plateaus
 from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stated
 
