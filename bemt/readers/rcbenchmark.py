@@ -30,6 +30,7 @@ from bemt.base import units
 from bemt.dataset import Dataset
 from bemt.readers import head_text, number
 from bemt.readers._headings import heading
+from bemt.readers._large import NumberTable
 from bemt.readers._recording import Array, Builder, slip
 from bemt.readers._samples import MISREAD, against_load, spikes
 from bemt.readers._split import SplitTable
@@ -98,11 +99,11 @@ def _side(text: str) -> tuple[str, str]:
     return text, ""
 
 
-def _turned(table: SplitTable, sides: Sequence[tuple[str, str]], side: str) -> bool:
+def _turned(table: SplitTable | NumberTable, sides: Sequence[tuple[str, str]], side: str) -> bool:
     """Whether a motor turned: its speed, or without one its thrust, was ever other than 0."""
     for words in ("speed", "thrust"):
         own = [k for k, (text, s) in enumerate(sides) if s == side and words in text.lower()]
-        values = [v for k in own for row in table.rows if (v := number(row[k])) is not None]
+        values = [v for k in own for cell in table.cells(k) if (v := number(cell)) is not None]
         if values:
             return any(v != 0.0 for v in values)
     return False
@@ -196,9 +197,11 @@ def _power(build: Builder) -> None:
     """Tell which speed the mechanical power was computed with, and whether the units agree."""
     power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
     volt, ampere, electric = build.at("voltage_V"), build.at("current_A"), build.at("electrical_power_W")
-    for name in (*_SPEEDS, "rpm") if power is not None and torque is not None else ():
+    for name in (*_SPEEDS, "rpm"):
         speed = build.at(name)
-        ratio = None if speed is None else _times(power, np.abs(torque) * speed * units.RPM)
+        if power is None or torque is None or speed is None:
+            continue
+        ratio = _times(power, np.abs(torque) * speed * units.RPM)
         if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
             build.warnings.append(f"mechanical_power_W is torque times {name}")
         elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
