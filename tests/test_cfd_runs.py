@@ -245,6 +245,14 @@ def test_zones_and_units_are_asked_for_with_the_speed(put: Callable[..., Path]) 
     assert {f.where for f in caught.value.faults} == {"rpm", "zones", "thrust(blade)"}
 
 
+def test_a_damaged_file_does_not_hide_what_another_lacks(put: Callable[..., Path]) -> None:
+    put("thrust.csv", '"Iteration","Thrust 1 Monitor: Thrust (N)"\n' + "1,x\n" * 9)
+    put("torque.csv", '"Iteration","Torque 1 Monitor: Moment"\n' + "".join(f"{k},{Q:.8g}\n" for k in range(1, 99)))
+    with pytest.raises(InputError) as caught:
+        assemble(RunToml.model_validate({"run": {"files": ("thrust.csv", "torque.csv"), "rpm": RPM}}))
+    assert {f.file for f in caught.value.faults} == {"thrust.csv", "torque.csv"}
+
+
 def test_unit_sign_and_sector_are_applied_once(put: Callable[..., Path]) -> None:
     files = fluent(put)
     plain = run_of(files, {"rpm": RPM}, **UNITS)

@@ -15,7 +15,7 @@ from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_averag
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 
-__all__ = ["FIELDS", "PROGRAMS", "Settled", "cfd_files", "clock_of", "one_base", "read_run", "settled", "zone_of"]
+__all__ = ["FIELDS", "PROGRAMS", "Settled", "cfd_files", "clock_of", "read_run", "settled", "zone_of"]
 
 Array = NDArray[np.float64]
 PROGRAMS: Mapping[str, str] = {
@@ -67,27 +67,30 @@ def zone_of(path: Path, form: str) -> str:
     return path.parent.parent.name if form == "openfoam_forces" else ""
 
 
-def read_run(paths: Sequence[Path]) -> list[tuple[str, Dataset]]:
-    """Files of a run, the parts of a restarted history put together."""
+def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fault]]:
+    """Files of a run, the parts of a restarted history put together, and the faults of those that cannot be read."""
     read: list[tuple[str, Dataset]] = []
     faults: list[Fault] = []
     for path in paths:
         try:
             found = readers.read(path)
-            if not isinstance(found, Dataset) or found.kind != "cfd":
-                got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
-                raise InputError(
-                    Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}")
-                )
-            read.append((str(path), found))
         except InputError as error:
             faults += error.faults
-    if faults:
-        raise InputError(faults)
-    return _joined(read)
+            continue
+        if isinstance(found, Dataset) and found.kind == "cfd":
+            read.append((str(path), found))
+        else:
+            got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
+            faults.append(Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}"))
+    wrong: list[Fault] = []
+    read = _joined(read, wrong)
+    wrong += _other_bases(read)
+    if wrong:
+        raise InputError(faults + wrong)
+    return read, faults
 
 
-def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
+def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[str, Dataset]]:
     out: list[tuple[str, Dataset]] = []
     for name, record in read:
         home = _home(name, record)
@@ -106,15 +109,14 @@ def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
         if how == "other clock":
             got = f"the same columns as {Path(file).name} on another clock"
             hint = "A restart with a clock of its own: give it alone"
-            raise InputError(Fault(name, "", got, "parts of one history", hint))
+            faults.append(Fault(name, "", got, "parts of one history", hint))
+            continue
         cut = now[0][0]
         kept = then[0] < cut
         values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
         note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
-        out[at] = (
-            file,
-            replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=(*before.notes, note)),
-        )
+        notes = (*before.notes, note)
+        out[at] = file, replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=notes)
     return out
 
 
@@ -132,19 +134,18 @@ def clock_of(record: Dataset) -> tuple[Array, Array]:
     return (record[names[0]] if names else times), times
 
 
-def one_base(read: Sequence[tuple[str, Dataset]]) -> None:
-    """Refuse histories that do not overlap: they are not one run."""
+def _other_bases(read: Sequence[tuple[str, Dataset]]) -> list[Fault]:
+    """Histories that do not overlap: they are not one run."""
+    faults = []
     for kind in ("time", "iteration"):
-        own = [
-            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := clock_of(r)[kind == "time"]).size > 1
-        ]
+        own = [(n, clock_of(r)[kind == "time"]) for n, r in read if r.provenance.get("clock") == kind]
+        own = [(n, clock) for n, clock in own if clock.size > 1]
         for (a, x), (b, y) in zip(own, own[1:], strict=False):
             shared = min(x[-1], y[-1]) - max(x[0], y[0])
             if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
                 got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
-                raise InputError(
-                    Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself")
-                )
+                faults.append(Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself"))
+    return faults
 
 
 def settled(

@@ -30,7 +30,6 @@ from bemt.recordings.cfd_files import (
     Settled,
     cfd_files,
     clock_of,
-    one_base,
     read_run,
     settled,
     zone_of,
@@ -157,6 +156,7 @@ class _Run:
     run: RunToml
     name: str
     columns: list[_Found]
+    complete: bool = True  # whether all its files could be read
     period: float = math.nan
     end: float = math.inf
     notes: list[str] = field(default_factory=list)
@@ -175,7 +175,7 @@ class _Run:
         told = self.fact(quantity).column
         if told is not None:
             hits = [c for c in self.columns if told in (c.name, c.stem)]
-            if not hits:
+            if not hits and self.complete:
                 known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             return hits
@@ -387,14 +387,17 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         With everything that has to be said first: units, zones, speed.
     """
     paths = [folder / f for f in run.run.files]
-    read = read_run(paths)
-    one_base(read)
+    read, faults = read_run(paths)
     homes = {
         zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
     }
     columns = [c for file, record in read for c in _columns(file, record, len(homes) > 1)]
-    work = _Run(run, name, columns)
+    work = _Run(run, name, columns, complete=not faults)
     work.notes += [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
+    if not work.complete:
+        work.faults += faults
+        _ask_all(work)
+        raise InputError(list(dict.fromkeys(work.faults)))
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
     times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
@@ -434,7 +437,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
 
 def _nothing(work: _Run) -> None:
     """Say that no column is a load, unless a fault says already what one needs."""
-    if any(f.where != "rpm" for f in work.faults):
+    if not work.complete or any(f.where != "rpm" for f in work.faults):
         return
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
     first = next((c.name for c in work.columns if not c.unit), "NAME")
