@@ -249,44 +249,50 @@ class Layout:
     commas: bool = True  # whether a decimal comma is possible
     hint: str = "Is the header damaged?"  # where a row comes before the headings
     finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
+    within: int = 1  # first lines that may be the header, for the sniffer
 
+    def sniff(self, head: bytes | str) -> bool:
+        """Tell whether one of the first lines is a header of this program."""
+        return any(self.header(line) is not None for line in head_lines(head, self.within))
 
-def read_history(path: str | os.PathLike[str], layout: Layout) -> Dataset:
-    """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
-    source = load_text(path)
-    names: list[str] = []
-    title, rows, repeated, early = "", list[ExportRow](), list[int](), False
-    for line, raw in enumerate(source.lines, 1):
-        text = raw.strip()
-        found = layout.header(text) if text else None
-        if found is not None:
-            if names and list(found) != names:
-                got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
-                source.add(line, got, expected, "Split the file there")
-                break
-            repeated += [line] if names else []
-            names = names or list(found)
-        elif not text or layout.skip(text):
-            title = title or text.strip('"# ')
-        elif names:
-            rows.append(ExportRow(line, layout.cells(text)))
-        elif not early:
-            early = True
-            source.add(line, repr(text[:60]), f"a header such as {layout.example}", layout.hint)
-    if not names and not early:
-        source.add("", "no header", f"a line such as {layout.example}")
-    if names and not rows:
-        source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
-    if not rows:
+    def read(self, path: str | os.PathLike[str]) -> Dataset:
+        """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
+        source = load_text(path)
+        names: list[str] = []
+        title, rows, repeated, early = "", list[ExportRow](), list[int](), False
+        for line, raw in enumerate(source.lines, 1):
+            text = raw.strip()
+            found = self.header(text) if text else None
+            if found is not None:
+                if names and list(found) != names:
+                    got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                    source.add(line, got, expected, "Split the file there")
+                    break
+                repeated += [line] if names else []
+                names = names or list(found)
+            elif not text or self.skip(text):
+                title = title or text.strip('"# ')
+            elif names:
+                rows.append(ExportRow(line, self.cells(text)))
+            elif not early:
+                early = True
+                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
+        if not names and not early:
+            source.add("", "no header", f"a line such as {self.example}")
+        if names and not rows:
+            source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
+        if not rows:
+            source.check()
+        columns = [self.column(name) for name in names]
+        table = numeric_table(source, columns, rows, self.commas)
         source.check()
-    columns = [layout.column(name) for name in names]
-    table = numeric_table(source, columns, rows, layout.commas)
-    source.check()
-    notes = [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
-    notes += layout.notes
-    if layout.finish is not None:
-        columns, table = layout.finish(columns, table, notes)
-    return history(layout.kind, source, columns, table, notes, {"title": title})
+        notes = (
+            [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
+        )
+        notes += self.notes
+        if self.finish is not None:
+            columns, table = self.finish(columns, table, notes)
+        return history(self.kind, source, columns, table, notes, {"title": title})
 
 
 def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:

@@ -16,6 +16,8 @@ HALF, TIMES = 3, 2.0
 """Neighbours on each side of a spike, and ranges of theirs that it leaves."""
 MISREAD = 2.5
 """Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
+MOST_RPM_PER_V = 8000.0
+"""Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 _CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
 DAY = 86400.0
 

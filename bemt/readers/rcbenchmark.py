@@ -32,12 +32,10 @@ from bemt.readers import head_text, number
 from bemt.readers._headings import heading
 from bemt.readers._large import NumberTable
 from bemt.readers._recording import Array, Builder, slip
-from bemt.readers._samples import MISREAD, against_load, spikes
+from bemt.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.readers._split import SplitTable
 
 KIND = "rcbenchmark"
-MOST_RPM_PER_V = 8000.0
-"""Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 _SPEEDS = ("electrical_rpm", "optical_rpm")
 _POWERTRAIN = re.compile(r"Powertrain (\d+) - (.+)")
 _LETTER = re.compile(r"((?:ESC|Torque|Thrust|Voltage|Current|Motor|Electrical|Mechanical|Propeller|Overall|Vibration)"
