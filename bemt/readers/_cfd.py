@@ -286,10 +286,8 @@ class Layout:
         columns = [self.column(name) for name in names]
         table = numeric_table(source, columns, rows, self.commas)
         source.check()
-        notes = (
-            [f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"] if repeated else []
-        )
-        notes += self.notes
+        again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
+        notes = [*([again] if repeated else []), *self.notes]
         if self.finish is not None:
             columns, table = self.finish(columns, table, notes)
         return history(self.kind, source, columns, table, notes, {"title": title})

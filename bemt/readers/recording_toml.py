@@ -20,9 +20,9 @@ from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.dataset import Dataset
+from bemt.dataset import Dataset, concat
 from bemt.readers import head_text, load_text
-from bemt.readers._columns import Channel, dataset
+from bemt.readers._columns import Channel
 from bemt.readers._headings import Heading, heading, known
 from bemt.readers._large import large_table
 from bemt.readers._recording import Builder
@@ -339,22 +339,22 @@ def _derive(build: Builder, pairs: int) -> None:
 
 
 def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
-    """Runs in their order; a channel that a run lacks is NaN there."""
+    """Runs in their order; a channel that a run lacks is NaN there, one in two units has none."""
     if len(runs) == 1:
         return runs[0]
-    names = list(dict.fromkeys(name for run in runs for name in run.values))
-    channels = {}
-    for name in names:
-        found = {run.unit(name) for run in runs if name in run}
-        parts = [run.values.get(name, np.full(len(run), np.nan)) for run in runs]
-        channels[name] = Channel(np.concatenate(parts), found.pop() if len(found) == 1 else "")
-    channels["run"] = Channel(np.concatenate([np.full(len(run), float(k)) for k, run in enumerate(runs, 1)]), "-")
+    whole = concat(runs, "+".join(files))
+    own = {name: {run.unit(name) for run in runs if name in run} for name in whole.values}
     texts = {
         name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
         for name in dict.fromkeys(n for run in runs for n in run.texts)
     }
-    warnings = [f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes]
-    said = {"file": "+".join(files), "sha256": "+".join(run.provenance["sha256"] for run in runs)}
-    return dataset(KIND, "bench", channels, warnings, said, flags=sum((run.flags for run in runs), ()),
-                   lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
-                   headings={k: v for run in runs for k, v in run.provenance.get("headings", {}).items()})  # fmt: skip
+    about = {
+        "file": whole.name, "sha256": "+".join(run.provenance["sha256"] for run in runs), "format": KIND,
+        "headings": {k: v for run in runs for k, v in run.provenance.get("headings", {}).items()},
+    }  # fmt: skip
+    return replace(
+        whole, values={**whole.values, "run": np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])},
+        units={**whole.units, **{name: "" for name, units_ in own.items() if len(units_) > 1}}, provenance=about,
+        lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
+        notes=tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes),
+    )  # fmt: skip
