@@ -86,7 +86,7 @@ _WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves
     "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
     "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
-_WEIGHTS = {
+WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
     "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
     "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
@@ -308,11 +308,11 @@ def heading(text: str) -> Heading:
         told = f"{text!r} is read as thousands of revolutions per minute"
         return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
+    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
     if (by_words := _by_words(text)) is not None:
         return by_words
-    unit = _WEIGHTS.get(parts[2]) if parts else None
+    unit = WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
         told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
@@ -361,7 +361,7 @@ def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
     found = unit_of(text)
     if not dimension:
         return (found, "") if isinstance(found, units.Unit) else None
-    if dimension == "force" and (weight := _WEIGHTS.get(unicodedata.normalize("NFKC", text))):
+    if dimension == "force" and (weight := WEIGHTS.get(unicodedata.normalize("NFKC", text))):
         return units.UNITS[weight], f"{_FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
     if dimension == "torque" and isinstance(found, str) and (weight := _weight(text)):
         made = unit_of(weight)
@@ -414,9 +414,9 @@ def _weight(text: str) -> str:
     words = re.split(r"[\s·⋅*.\-/]+", text.strip())
     if len(words) != 2:
         return ""
-    masses = [w for w in words if w in _WEIGHTS]
+    masses = [w for w in words if w in WEIGHTS]
     lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
-    unit = f"{_WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
+    unit = f"{WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 

@@ -21,6 +21,7 @@ import difflib
 import io
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -29,6 +30,7 @@ import numpy as np
 from bemt.base import units
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers._headings import WEIGHTS, unit_of
 
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")
@@ -51,13 +53,6 @@ CONDITIONS: dict[str, tuple[float, float, str]] = {
     "density_kg_m3": (0.01, 1100.0, "Is this in g/cm3?"),
 }
 """Optional column -> lowest, highest, hint."""
-
-_ALIASES = {
-    "N_m": "Nm", "mN_m": "mNm", "N_cm": "Ncm", "N_mm": "Nmm", "in_lbf": "lbf_in", "ft_lbf": "lbf_ft",
-    "in_ozf": "ozf_in", "RPM": "rpm", "rev_min": "rpm",
-    "1_min": "rpm", "kph": "km_h", "knots": "kt", "%": "pct", "1": "-",
-}  # fmt: skip
-_MASS = {"kg": "kgf", "g": "gf", "lb": "lbf", "oz": "ozf", "lbs": "lbf", "grams": "gf"}
 
 
 @dataclass(frozen=True)
@@ -106,22 +101,20 @@ def _near(word: str, known: Iterable[str]) -> str:
 
 def _unit_factor(quantity: str, written: str) -> tuple[float, tuple[str, str, str] | None]:
     """Factor to SI (to rpm for a rotational speed), or the fault (got, expected, hint)."""
-    dimension = QUANTITIES[quantity][0]
-    key = written.strip()
-    for sign in "/ -·*":
-        key = key if key in ("-", "1") else key.replace(sign, "_")
-    key = _ALIASES.get(key, key)
+    dimension, key = QUANTITIES[quantity][0], written.strip()
     known = units.suffixes(dimension) if dimension else ("-", "pct")
     if not key:
         return math.nan, ("no unit", f"one of {', '.join(known)}", "")
     if not dimension:
-        if key in ("-", "pct"):
-            return (0.01 if key == "pct" else 1.0), None
-        return math.nan, (f"unit {written!r}", "- (dimensionless)", "")
-    if key in known:
-        factor = units.UNITS[key].factor
-        return (factor / units.RPM if quantity == "rpm" else factor), None
-    hint = f"A mass is not a force: write {_MASS[key]}" if dimension == "force" and key in _MASS else _near(key, known)
+        factor = {"-": 1.0, "1": 1.0, "pct": 0.01, "%": 0.01}.get(key, math.nan)
+        return factor, (f"unit {written!r}", "- (dimensionless)", "") if math.isnan(factor) else None
+    parts = re.sub(r"[/ ·*-]", "_", key)
+    for form in (parts, parts.replace("_", " "), parts.replace("_", "/")):
+        unit = unit_of(form)
+        if isinstance(unit, units.Unit) and unit.dimension == dimension:
+            return (unit.factor / units.RPM if quantity == "rpm" else unit.factor), None
+    weight = WEIGHTS.get(key) if dimension == "force" else None
+    hint = f"A mass is not a force: write {weight}" if weight else _near(parts, known)
     return math.nan, (f"unit {written!r}", f"one of {', '.join(known)}", hint)
 
 
