@@ -34,10 +34,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.toml_text import Collector
 from bemt.readers._packed import MAX_BYTES, packed, unpacked
 
-__all__ = [
-    "HEAD_BYTES", "SourceText", "decode", "detect", "first_cells", "head_text", "importers", "load_bytes", "load_text",
-    "number", "read",
-]  # fmt: skip
+__all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
 HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""

@@ -234,6 +234,19 @@ class _Run:
             return None
         return force * length
 
+    def sign(self, quantity: str, values: Array, others: Mapping[str, float]) -> float:
+        """Sign of a load: as told, that of the whole for the duct's part, else the one that makes it positive."""
+        told = self.fact(quantity).sign
+        if told is not None:
+            return float(told)
+        if quantity == "duct_thrust":
+            return others.get("thrust", 1.0)
+        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
+        if middle < 0:
+            name = _CHANNEL[quantity]
+            self.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
+        return -1.0 if middle < 0 else 1.0
+
     def mean(self, quantity: str, c: _Found) -> Settled | None:
         """Settled value of one column."""
         values = self.si(quantity, c)
@@ -476,22 +489,11 @@ def _applied(
     u: dict[str, Array] = {}
     over: dict[str, str] = {}
     drift: dict[str, float] = {}
-    turned = 1.0
+    signs: dict[str, float] = {}
     for quantity, found in loads.items():
-        name, told = _CHANNEL[quantity], work.fact(quantity).sign
-        if quantity == "duct_thrust" and told is None:
-            sign = turned
-        elif told is None:
-            middle = np.nanmedian(found.values) if np.isfinite(found.values).any() else 0.0
-            sign = -1.0 if middle < 0 else 1.0
-            if sign < 0:
-                work.notes.append(
-                    f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
-                )
-        else:
-            sign = float(told)
-        turned = sign if quantity == "thrust" else turned
-        values[name] = sign * sector * found.values
+        name = _CHANNEL[quantity]
+        signs[quantity] = work.sign(quantity, found.values, signs)
+        values[name] = signs[quantity] * sector * found.values
         size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0) * sector
         u[name] = np.full(found.values.size, size)
         over[name] = found.over
