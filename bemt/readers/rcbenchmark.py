@@ -199,7 +199,7 @@ def _power(build: Builder) -> None:
         speed = build.at(name)
         if power is None or torque is None or speed is None:
             continue
-        ratio = _times(power, np.abs(torque) * speed * units.RPM)
+        ratio = _times(power, np.abs(torque) * speed * units.RPM, power > 0)
         if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
             build.warnings.append(f"mechanical_power_W is torque times {name}")
         elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
@@ -212,9 +212,9 @@ def _power(build: Builder) -> None:
             build.warnings.append(text + "; nothing was converted")
 
 
-def _times(power: Array, product: Array) -> float | None:
+def _times(power: Array, product: Array, used: np.ndarray | bool = True) -> float | None:
     """Median of a power over the product of its factors in the rows that carry load; None: fewer than three."""
-    good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & (power > 0)
+    good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & used
     return float(np.median(power[good] / product[good])) if np.count_nonzero(good) >= 3 else None
 
 
