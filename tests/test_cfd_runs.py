@@ -111,6 +111,14 @@ def post(put: Callable[..., Path]) -> list[str]:
     return ["chart.csv"]
 
 
+def expressions(put: Callable[..., Path]) -> list[str]:
+    put(
+        "values.csv",
+        f"Expression, Value\nThrust, {T:.7g} [kg m s^-2]\nShaft torque, {Q:.7g} [kg m^2 s^-2]\nrpm, {RPM:.7g} [rev min^-1]\n",
+    )
+    return ["values.csv"]
+
+
 def workbench(put: Callable[..., Path]) -> list[str]:
     head = "# 5/22/2017 3:33:44 PM\n# The parameters defined in the project are:\n# ,P1 - rpm [rev min^-1],P2 - thrust-op [N],P3 - torque-op [N m]\n#\n# The following header line defines the name of the columns by reference to the parameters.\nName,P1,P2,P3\n"
     rows = "".join(
@@ -143,10 +151,13 @@ RUNS: dict[str, tuple[Callable[..., list[str]], list[str]]] = {
     "Fluent, transient": (fluent, ["--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m"]),
     "Fluent force report": (force_report, ["--rpm", "8000", "--zones", "blade", "hub", "duct"]),
     "CFD-Post": (post, []),
+    "CFD-Post expressions": (expressions, []),
     "Workbench": (workbench, []),
     "STAR-CCM+ by iteration": (star, ["--rpm", "8000"]),
     "STAR-CCM+ by time": (lambda put: star(put, timed=True), ["--rpm", "8000"]),
     "OpenFOAM": (foam, ["--rpm", "8000"]),
+    "OpenFOAM postProcessing": (lambda put: foam(put) and ["postProcessing"], ["--rpm", "8000", "--sector", "1"]),
+    "OpenFOAM function object": (lambda put: foam(put) and ["postProcessing/forces"], ["--rpm", "8000"]),
     "SU2": (su2, ["--rpm", "8000", "--reference", f"length={LENGTH}"]),
     "Flow360": (flow360, ["--rpm", "8000", "--reference", REFERENCE]),
 }
@@ -212,6 +223,34 @@ def run_of(files: list[str], head: dict[str, Any], **more: Any) -> Any:
 
 
 UNITS = {"columns": {"thrust": {"unit": "N"}, "torque": {"unit": "N m"}}}
+
+
+def test_options_of_a_run_name_the_folder_that_holds_none(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("mine/notes.txt", "no numbers here\n")
+    assert main(["import", "mine", "--unit", "thrust=N", "--sector", "3"]) == 2
+    said = capsys.readouterr().err
+    assert "mine: " in said and "postProcessing" in said
+
+
+def test_zones_and_units_are_asked_for_with_the_speed(put: Callable[..., Path]) -> None:
+    rows = "".join(f"{k} {0.8 * T:.7g} {0.2 * T:.7g} {t:.7g}\n" for k, t in enumerate(times(), 1))
+    put(
+        "t.out",
+        f'"t-rfile"\n"Time Step" "thrust(blade) etc.."\n("Time Step" "thrust(blade)" "thrust(hub)" "flow-time")\n{rows}',
+    )
+    with pytest.raises(InputError) as caught:
+        assemble(RunToml.model_validate({"run": {"files": ("t.out",)}}))
+    assert {f.where for f in caught.value.faults} == {"rpm", "zones", "thrust(blade)"}
+
+
+def test_a_damaged_file_does_not_hide_what_another_lacks(put: Callable[..., Path]) -> None:
+    put("thrust.csv", '"Iteration","Thrust 1 Monitor: Thrust (N)"\n' + "1,x\n" * 9)
+    put("torque.csv", '"Iteration","Torque 1 Monitor: Moment"\n' + "".join(f"{k},{Q:.8g}\n" for k in range(1, 99)))
+    with pytest.raises(InputError) as caught:
+        assemble(RunToml.model_validate({"run": {"files": ("thrust.csv", "torque.csv"), "rpm": RPM}}))
+    assert {f.file for f in caught.value.faults} == {"thrust.csv", "torque.csv"}
 
 
 def test_unit_sign_and_sector_are_applied_once(put: Callable[..., Path]) -> None:

@@ -66,7 +66,7 @@ MAY: dict[str, set[str]] = {
     "bemt.readers|bemt.readers.*": {"files"},
     "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
-    "bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
+    "bemt.recordings.cfd_files|bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
     "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.points": {"files"},
     "bemt.sweep.batch": {"files", "environment"},
     "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},

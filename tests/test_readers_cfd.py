@@ -289,6 +289,24 @@ def test_dual_time_keeps_the_last_inner_iteration(put: Callable[..., Path]) -> N
     assert record.provenance["clock"] == "time"
 
 
+def test_a_history_says_all_its_faults(put: Callable[..., Path]) -> None:
+    head = '"Time_Iter","Outer_Iter","Inner_Iter","CD"'
+    rows = "0,0,1,0.2\n0,0,2,x\n0,0,3,y\n0,0,4,z\n0,0,5,0.3\n"
+    other = head.replace("CD", "CL")
+    with pytest.raises(InputError) as caught:
+        importers.read(put(f"{head}\n{rows}{other}\n0,0,6,0.1\n", "history.csv"), "su2_history")
+    assert [f.where for f in caught.value.faults] == ["7", "3:4", "4:4", "5:4"]
+
+
+def test_expressions_have_their_values_and_units(put: Callable[..., Path]) -> None:
+    path = put("Expression;Value\nThrust;-2.5 [kg m s^-2]\nyplus;31 []\nmassFlow = 0.5 [kg s^-1]\n", "e.csv")
+    record = importers.read(path)
+    assert record["thrust_N"] == -2.5 and record["yplus"] == 31.0 and record.unit("massFlow [kg s^-1]") == "kg s^-1"
+    with pytest.raises(InputError) as caught:
+        importers.read(put("Thrust = 2.5 [N]\na = force_z()@blade\nb = c\n", "f.csv"))
+    assert [f.where for f in caught.value.faults] == ["2", "3"]
+
+
 def test_other_dialects(put: Callable[..., Path]) -> None:
     rows = "".join(f"{k}, 0.1, 0.02, {k * 0.1:.1f}\n" for k in range(20))
     old = importers.read(put('"Iteration","CL","CD","Time(min)"\n' + rows))

@@ -23,8 +23,8 @@ from bemt.commands.cli import main
 from bemt.dataset import Dataset
 from bemt.recordings.channels import named
 from bemt.recordings.plateaus import Plateaus, find, standard_error
+from bemt.recordings.points import is_samples
 from bemt.recordings.reduce import reduce, reduction
-from bemt.recordings.rows import is_samples
 
 D = 0.254
 K_T, K_Q = 2.0e-7, 3.0e-9

@@ -6,9 +6,9 @@ import re
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from bemt.base.errors import Fault
+from bemt.base.errors import Fault, InputError
 from bemt.base.units import UNITS, convert, split_suffix
 
 
@@ -19,9 +19,23 @@ class Collector:
         self.file = file
         self.faults: list[Fault] = []
 
-    def add(self, where: str, got: str, expected: str, hint: str = "") -> None:
+    def fault(self, where: object, got: str, expected: str, hint: str = "") -> Fault:
+        """Make a fault of this file; `where` is a key, a line or "line:column"."""
+        return Fault(self.file, str(where), got, expected, hint)
+
+    def add(self, where: object, got: str, expected: str, hint: str = "") -> None:
         """Add one fault."""
-        self.faults.append(Fault(self.file, where, got, expected, hint))
+        self.faults.append(self.fault(where, got, expected, hint))
+
+    def check(self) -> None:
+        """Raise the faults so far, if any."""
+        if self.faults:
+            raise InputError(self.faults)
+
+    def refuse(self, where: object, got: str, expected: str, hint: str = "") -> NoReturn:
+        """Raise the faults so far, with this one as the last."""
+        self.add(where, got, expected, hint)
+        raise InputError(self.faults)
 
 
 def load_toml(path: str | Path, out: Collector) -> dict[str, Any] | None:

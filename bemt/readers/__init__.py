@@ -23,7 +23,7 @@ import pkgutil
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.toml_text import Collector
 from bemt.readers._packed import MAX_BYTES, packed, unpacked
 
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
@@ -41,9 +42,9 @@ HEAD_BYTES = 16384
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 
 
-@dataclass(frozen=True)
-class SourceText:
-    """Text of one input file, with its provenance.
+@dataclass(eq=False)
+class SourceText(Collector):
+    """Text of one input file, with its provenance and the faults found in it.
 
     Parameters
     ----------
@@ -59,10 +60,18 @@ class SourceText:
     text: str
     sha256: str
 
-    @property
+    def __post_init__(self) -> None:
+        Collector.__init__(self, self.name)
+
+    @cached_property
     def lines(self) -> list[str]:
         """Lines without line ends; line numbers in faults count from 1."""
         return self.text.splitlines()
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Provenance of what is read from it."""
+        return {"file": self.name, "sha256": self.sha256}
 
 
 WIDE = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
@@ -130,6 +139,15 @@ def _shown_code(head: bytes) -> str | None:
     return None
 
 
+def load_bytes(path: str | os.PathLike[str]) -> bytes:
+    """Bytes of a file, or `InputError` with what the system says."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        fault = Fault(os.fspath(path), "", error.strerror or str(error), "a readable file", "Check the path")
+        raise InputError(fault) from error
+
+
 def load_text(path: str | os.PathLike[str]) -> SourceText:
     """Read a whole file, unpacking gzip and workbooks; the hash is that of the file as stored.
 
@@ -149,10 +167,7 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
         If the file cannot be read, is damaged, larger than :data:`MAX_BYTES`, or binary (contains NUL bytes).
     """
     name = os.fspath(path)
-    try:
-        raw = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    raw = load_bytes(path)
     digest = hashlib.sha256(raw).hexdigest()
     raw = unpacked(raw, name)
     if len(raw) > MAX_BYTES:
@@ -183,6 +198,15 @@ def head_text(head: bytes | str) -> str:
     if isinstance(head, str):
         return head.removeprefix("\ufeff")
     return "" if _binary(head) else decode(head)
+
+
+def first_cells(head: bytes | str) -> set[str]:
+    r"""Cells of the first line of a comma-separated file, for sniffers.
+
+    >>> sorted(first_cells("rpm, thrust\n1,2"))
+    ['rpm', 'thrust']
+    """
+    return {cell.strip() for cell in head_text(head).partition("\n")[0].split(",")}
 
 
 def number(token: str) -> float | None:
@@ -257,42 +281,39 @@ def detect(path: str | os.PathLike[str]) -> str:
     InputError
         If it cannot be read, if no reader claims it, or if two or more do (then give ``format =``).
     """
-    name = os.fspath(path)
-    target = Path(path)
-    known = importers()
+    place, target, known = Collector(os.fspath(path)), Path(path), importers()
     if target.is_dir():
-        kinds = [k for k, m in known.items() if hasattr(m, "sniff_folder") and m.sniff_folder(target)]
+        whole = {k: m for k, m in known.items() if hasattr(m, "sniff_folder")}
+        kinds = [k for k, m in whole.items() if m.sniff_folder(target)]
+        if not kinds:
+            inside = target / "recording.toml"
+            hint = f"Give {inside.as_posix()}" if inside.is_file() else "Name the files in it"
+            place.refuse("", "a folder", f"a file, or a folder that a reader takes whole ({', '.join(whole)})", hint)
     else:
-        try:
-            with target.open("rb") as stream:
-                head = stream.read(HEAD_BYTES)
-                if packed(head):
-                    head = unpacked(head + stream.read(), name, HEAD_BYTES)
-        except OSError as error:
-            fault = Fault(name, "", error.strerror or str(error), "a readable file or folder", "Check the path")
-            raise InputError(fault) from error
+        head = _head(target, place)
         if not head.strip():
-            fault = Fault(name, "", "an empty file", "results as a table of text", "Did the export finish?")
-            raise InputError(fault)
+            place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
         kinds = [k for k, m in known.items() if m.sniff(head)]
-        particular = [k for k in kinds if not getattr(known[k], "FALLBACK", False)]
-        kinds = particular or kinds
-        if _binary(head) and not kinds:
-            fault = Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
-            raise InputError(fault)
-    if len(kinds) == 1:
-        return kinds[0]
-    if not kinds and target.is_dir():
-        whole = ", ".join(k for k, m in known.items() if hasattr(m, "sniff_folder"))
-        expected = f"a file, or a folder that a reader takes whole ({whole})"
-        inside = target / "recording.toml"
-        hint = f"Give {inside.as_posix()}" if inside.is_file() else "Name the files in it"
-        raise InputError(Fault(name, "", "a folder", expected, hint))
-    if not kinds:
-        hint = "Give --format (format = in a case) if its head is unusual"
-        raise InputError(Fault(name, "", "content of no known format", f"one of {', '.join(known)}", hint))
-    hint = " or ".join(f'format = "{kind}"' for kind in kinds)
-    raise InputError(Fault(name, "", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}"))
+        kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
+        if not kinds and _binary(head):
+            place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
+        if not kinds:
+            hint = "Give --format (format = in a case) if its head is unusual"
+            place.refuse("", "content of no known format", f"one of {', '.join(known)}", hint)
+    if len(kinds) > 1:
+        hint = " or ".join(f'format = "{kind}"' for kind in kinds)
+        place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")
+    return kinds[0]
+
+
+def _head(target: Path, place: Collector) -> bytes:
+    """First bytes of a file, unpacked."""
+    try:
+        with target.open("rb") as stream:
+            head = stream.read(HEAD_BYTES)
+            return unpacked(head + stream.read(), place.file, HEAD_BYTES) if packed(head) else head
+    except OSError as error:
+        place.refuse("", error.strerror or str(error), "a readable file or folder", "Check the path")
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file

@@ -7,12 +7,10 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, load_text, number
 from bemt.sections.parametric import QpropSection, XrotorSection
 from bemt.sections.polars import DEFAULT_RE, Polar
@@ -48,37 +46,22 @@ class BladeFile:
     duct: Mapping[str, float] | None = None  # Keys of a case's ``[duct]``; None: an open rotor
 
 
-class Cursor:
+class Cursor(SourceText):
     """Lines of numbers of a blade file, taken one after the other; faults are gathered.
 
     Lines are neither blank nor begin with one of the characters of `comment`.
     """
 
     def __init__(self, file: str | os.PathLike[str] | SourceText, comment: str) -> None:
-        self.source = file if isinstance(file, SourceText) else load_text(file)
-        lines = enumerate(self.source.lines, 1)
-        self.rows = [(i, t) for i, t in lines if t.strip() and t.lstrip()[0] not in comment]
-        self.faults: list[Fault] = []
+        source = file if isinstance(file, SourceText) else load_text(file)
+        super().__init__(source.name, source.text, source.sha256)
+        self.rows = [(i, t) for i, t in enumerate(self.lines, 1) if t.strip() and t.lstrip()[0] not in comment]
         self.at = 0
-
-    def fault(self, where: object, got: str, expected: str, hint: str = "") -> None:
-        """Note a fault; `where` is a line or a word."""
-        self.faults.append(Fault(self.source.name, str(where), got, expected, hint))
-
-    def check(self) -> None:
-        """Raise the faults so far, if any."""
-        if self.faults:
-            raise InputError(self.faults)
-
-    def refuse(self, where: object, got: str, expected: str, hint: str = "") -> NoReturn:
-        """Raise with this fault as the last."""
-        self.fault(where, got, expected, hint)
-        raise InputError(self.faults)
 
     def take(self, count: int, what: str, most: int | None = None) -> list[float]:
         """Numbers of the next line in list-directed form (blanks or commas); NaN and a fault for what is none."""
         if self.at >= len(self.rows):
-            self.refuse(len(self.source.lines), "the end of the file", what)
+            self.refuse(len(self.lines), "the end of the file", what)
         line, text = self.rows[self.at]
         self.at += 1
         words = [w for w in re.split(r"[\s,]+", text.split("!")[0].strip()) if w]
@@ -86,10 +69,10 @@ class Cursor:
         for k, word in enumerate(words[: most or count]):
             value = number(word)
             if value is None:
-                self.fault(f"{line}:{k + 1}", repr(word[:30]), f"a number for {what}")
+                self.add(f"{line}:{k + 1}", repr(word[:30]), f"a number for {what}")
             out.append(math.nan if value is None else value)
         if len(out) < count:
-            self.fault(line, f"{len(out)} numbers", f"{count} for {what}")
+            self.add(line, f"{len(out)} numbers", f"{count} for {what}")
             out += [math.nan] * (count - len(out))
         return out
 
@@ -103,21 +86,19 @@ class Cursor:
         r, c, b = blade.r_m, blade.chord_m, np.degrees(blade.beta_rad)
         steepest = np.abs(b).max() if b.size else 0.0
         if not 1 <= blade.blades <= 64:
-            self.fault("blades", f"{blade.blades}", "1 to 64")
+            self.add("blades", f"{blade.blades}", "1 to 64")
         if not 0.002 <= blade.R_m <= 50.0:
-            self.fault("radius", f"{blade.R_m:g} m", "0.002 to 50 m", "Other units?")
+            self.add("radius", f"{blade.R_m:g} m", "0.002 to 50 m", "Other units?")
         if r.size < 2 or np.any(np.diff(r) <= 0.0):
-            self.fault("stations", f"{r.size} radii that do not rise", "two or more rising radii")
+            self.add("stations", f"{r.size} radii that do not rise", "two or more rising radii")
         elif r[-1] > blade.R_m * (1.0 + 1e-6):
-            self.fault("stations", f"a radius of {r[-1]:g} m", f"radii up to R = {blade.R_m:g} m")
+            self.add("stations", f"a radius of {r[-1]:g} m", f"radii up to R = {blade.R_m:g} m")
         if np.any(c <= 0.0) or np.any(c > 2.0 * blade.R_m):
-            chords = f"chords from {np.min(c):g} to {np.max(c):g} m"
-            self.fault("stations", chords, "chords above 0, below the diameter")
+            self.add("stations", f"chords from {np.min(c):g} to {np.max(c):g} m", "chords above 0, below the diameter")
         if np.any(np.abs(b) > 90.0):
-            self.fault("stations", f"blade angles up to {steepest:g}", "within 90 degrees")
+            self.add("stations", f"blade angles up to {steepest:g}", "within 90 degrees")
         elif np.all(np.abs(b) < 1.6) and np.any(b != 0.0):
-            told = f"blade angles up to {steepest:g}"
-            self.fault("stations", told, "degrees", "Radians? They are not converted")
+            self.add("stations", f"blade angles up to {steepest:g}", "degrees", "Radians? They are not converted")
         self.check()
         return blade
 

@@ -71,25 +71,22 @@ _ALONE = {  # a heading that is the name of a unit
     "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
     "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
 }  # fmt: skip
-_WORDS = {  # heading in lower case -> name and dimension it must have
-    "time": ("time", "time"), "thrust": ("thrust", "force"), "torque": ("torque", "torque"),
-    "voltage": ("voltage", "voltage"), "current": ("current", "current"), "airspeed": ("airspeed", "speed"),
-    "electrical power": ("electrical_power", "power"), "mechanical power": ("mechanical_power", "power"),
-    "throttle": ("throttle", "fraction"), "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"),
-    "pwm": ("pulse_width", "time"),
+_WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves open -> name, dimension
+    "time": ("time", "time"), "airspeed": ("airspeed", "speed"), "throttle": ("throttle", "fraction"),
+    "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"), "pwm": ("pulse_width", "time"),
     "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
     "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
     "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
-    "power": ("power", "power"), "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
+    "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
     "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
     "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
     "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
     "torque mz (torque)": ("torque", "torque"), "electrical speed": ("electrical", "angular_speed"),
     "optical speed": ("optical", "angular_speed"), "vibration": ("vibration", "acceleration"),
-    "accx": ("acceleration_x", "acceleration"),
-    "accy": ("acceleration_y", "acceleration"), "accz": ("acceleration_z", "acceleration"),
+    "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
+    "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
-_WEIGHTS = {
+WEIGHTS = {
     "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
     "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
     "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
@@ -112,31 +109,17 @@ _QUALIFIED = re.compile(
     r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
 )
 """Words that a thrust or a torque goes with and that make no other quantity of it."""
-_PULSE = re.compile(r"(esc )?(throttle|signal|pwm|pulse( width)?|esc)( signal| input| command)?")
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
 _MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
 """UTF-8 that a program took for Latin-1 or its Windows form."""
 _SHAFT_LETTERS = {"n", "ω"}
-_SHAFT_WORDS = {
-    "speed",
-    "omega",
-    "rotation",
-    "rotational",
-    "rev",
-    "revs",
-    "revolution",
-    "revolutions",
-    "rps",
-    "rpm",
-    "krpm",
-}
+_SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
 _SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
 _OTHER_SPEEDS = {
     "air", "airspeed", "wind", "flow", "tip", "sound", "stream", "freestream", "tunnel", "flight", "ground", "vehicle",
     "climb", "err", "error", "u", "std", "sd",
 }  # fmt: skip
 """Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
-_GRAVITY = units.Unit("m_s2", "acceleration", units.G0)
 _THOUSANDS = re.compile(
     r"(?P<of>.*?)[\s_]*(?:[\[(]?\s*k[ -]?rpm\s*[\])]?"
     r"|rpm\s*(?:[\[(]\s*[x×*/]?|[x×*/])\s*(?:1000|1e3|10\^3|10³|k|thousands?)\s*[\])]?"
@@ -144,8 +127,6 @@ _THOUSANDS = re.compile(
     re.IGNORECASE,
 )
 """Speeds in thousands: ``kRPM``, ``RPM x1000``, ``rpm (k)``, ``Speed [1000 rpm]``."""
-_SHAFT_RPM = re.compile(r"(prop|propeller|rotor|shaft|fan|mechanical)[ _]?rpm", re.IGNORECASE)
-"""Headings that name the speed of the rotor and no other."""
 _TURNS = {
     "rotation", "rotational", "rev", "revs", "revolution", "revolutions", "shaft", "prop", "propeller", "rotor", "fan",
 }  # fmt: skip
@@ -220,6 +201,23 @@ def unit_of(text: str) -> units.Unit | str:
     return ""
 
 
+def known(text: str, base: str, unit: str) -> Heading:
+    """Heading of a column that a reader knows: its name without the unit, and the unit ("-": none).
+
+    >>> known("th", "thrust", "gf").name, known("Speed", "", "rpm").name, known("out", "throttle", "pct").name
+    ('thrust_N', 'rpm', 'throttle')
+    """
+    found = units.Unit("", "none", 1.0) if unit == "-" else unit_of(unit)
+    assert isinstance(found, units.Unit), unit
+    return Heading(text, _channel(base, found).lstrip("_"), found)
+
+
+def _channel(base: str, unit: units.Unit) -> str:
+    """Name of a channel with its unit in SI."""
+    si = _si_name(unit).replace("/", "_")
+    return base if si == "-" else f"{base}_{si}"
+
+
 def _tail(core: str) -> tuple[str, units.Unit | str] | None:
     """Name and unit of a heading that ends in its unit without brackets: ``Thrust - gf``, ``T/N``, ``torque Nm``.
 
@@ -254,6 +252,16 @@ def _spoken(text: str) -> tuple[str, set[str]]:
     """What stands before the unit of a heading, in plain English, and its words."""
     base = re.split(r"[(\[]", plain(text))[0].strip()
     return base, set(english(base))
+
+
+def meanings(text: str) -> list[str]:
+    """Quantities of a recording.toml that the words of a heading may mean.
+
+    >>> meanings("Schub"), meanings("speed"), meanings("wibble")
+    (['thrust'], ['rpm', 'airspeed'], [])
+    """
+    found = [name for name, _ in quantities(english(re.split(r"[(\[]", text)[0]))]
+    return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
 def may_be_shaft_speed(text: str) -> bool:
@@ -299,14 +307,12 @@ def heading(text: str) -> Heading:
         found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
         told = f"{text!r} is read as thousands of revolutions per minute"
         return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
-    if _SHAFT_RPM.fullmatch(text):
-        return Heading(text, "rpm", units.UNITS["rpm"])
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in _WEIGHTS:
+    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
     if (by_words := _by_words(text)) is not None:
         return by_words
-    unit = _WEIGHTS.get(parts[2]) if parts else None
+    unit = WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
         told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
@@ -355,7 +361,7 @@ def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
     found = unit_of(text)
     if not dimension:
         return (found, "") if isinstance(found, units.Unit) else None
-    if dimension == "force" and (weight := _WEIGHTS.get(unicodedata.normalize("NFKC", text))):
+    if dimension == "force" and (weight := WEIGHTS.get(unicodedata.normalize("NFKC", text))):
         return units.UNITS[weight], f"{_FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
     if dimension == "torque" and isinstance(found, str) and (weight := _weight(text)):
         made = unit_of(weight)
@@ -399,9 +405,7 @@ def _by_words(text: str) -> Heading | None:
                     return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
                 made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
                 return Heading(text, "rpm", made)
-            si = _si_name(made)
-            label = slug(name) + ("" if si == "-" else f"_{si}")
-            return Heading(text, label, made, told=f"{text!r} is read as {told}" if told else "")
+            return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
 
 
@@ -410,9 +414,9 @@ def _weight(text: str) -> str:
     words = re.split(r"[\s·⋅*.\-/]+", text.strip())
     if len(words) != 2:
         return ""
-    masses = [w for w in words if w in _WEIGHTS]
+    masses = [w for w in words if w in WEIGHTS]
     lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
-    unit = f"{_WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
+    unit = f"{WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
     return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
@@ -451,6 +455,35 @@ def _of_the_air(base: str, unit: units.Unit) -> str:
     return ""
 
 
+def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str]:
+    """Name, unit and doubt of a heading that has no unit in brackets."""
+    if alone := _ALONE.get(core.lower()):
+        return alone[0], units.UNITS[alone[1]], ""
+    if (ending := _tail(core)) is not None:
+        name, stated = ending
+        return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)
+    name, suffix = units.split_suffix(core)
+    goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
+    if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
+        return core, units.UNITS["rpm"], ""
+    if suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
+        return text, None, f"{suffix.suffix!r} does not go with {name}"
+    if suffix is not None and suffix.dimension == "mass" and not re.search(r"weight|mass", name, re.IGNORECASE):
+        return text, None, f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
+    if suffix is not None and (name or suffix.dimension == "mass"):
+        return name, suffix, ""
+    pure = units.Unit("", "none", 1.0)
+    if _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
+        return _PURE_NAMES.get(core, core), pure, ""
+    if re.fullmatch(r"\w+/[NAVWKCF]", core):
+        return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
+    if "rotor convention" in text and core in ("CT", "CP", "CQ"):
+        return f"{core}_rotor", pure, ""
+    if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
+        return core, units.UNITS["rpm"], ""
+    return text, None, ""
+
+
 def _heading(text: str) -> Heading:
     if either := _either(text):
         return Heading(text, slug(text), None, either)
@@ -465,47 +498,19 @@ def _heading(text: str) -> Heading:
     core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
     if found and (found[2].strip().lower() in ("erpm", "electrical") and "rpm" in text.lower()):
         return Heading(text, "electrical_rpm", units.UNITS["rpm"])
-    alone = _ALONE.get(core.lower())
-    ending = _tail(core) if unit is None and not doubt else None
-    if unit is None and not doubt and alone:
-        base, unit = alone[0], units.UNITS[alone[1]]
-    elif ending is not None:
-        base, stated = ending
-        unit, doubt = (stated, "") if isinstance(stated, units.Unit) else (None, stated)
-    elif unit is None and not doubt:
-        name, suffix = units.split_suffix(core)
-        goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
-        if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
-            base, unit = core, units.UNITS["rpm"]
-        elif suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
-            doubt = f"{suffix.suffix!r} does not go with {name}"
-        elif suffix is not None and name and suffix.dimension != "mass":
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass" and re.search(r"weight|mass", name, re.IGNORECASE):
-            base, unit = name, suffix
-        elif suffix is not None and suffix.dimension == "mass":
-            doubt = f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
-        elif _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
-            base, unit = _PURE_NAMES.get(core, core), units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"\w+/[NAVWKCF]", core):
-            doubt = f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
-        elif "rotor convention" in text and core in ("CT", "CP", "CQ"):
-            base, unit = f"{core}_rotor", units.Unit("", "none", 1.0)
-        elif re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
-            base, unit = core, units.UNITS["rpm"]
+    if unit is None and not doubt:
+        base, unit, doubt = _without_brackets(core, text)
     word = _WORDS.get(base.lower().replace("_", " "))
-    if unit is not None and unit.dimension == "time" and _PULSE.fullmatch(base.lower().replace("_", " ")):
-        word = ("pulse_width", "time")
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
-        unit, doubt = _GRAVITY, ""
+        unit, doubt = units.Unit("m_s2", "acceleration", units.G0), ""
     if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:
         base, unit = "rpm", units.UNITS["rpm"]  # U/min, 1/min
-    if unit is not None and (around := _of_the_air(base, unit)):
+    if unit is None:
+        return Heading(text, slug(text) or "column", None, doubt)
+    if around := _of_the_air(base, unit):
         if around == "qnh":
             return Heading(text, slug(text), None, _SEA_LEVEL)
         base, word = around, None
-    if unit is None:
-        return Heading(text, slug(text) or "column", None, doubt)
     if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
         unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
     if word and word[1] == unit.dimension:
@@ -515,10 +520,7 @@ def _heading(text: str) -> Heading:
     if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
         flat = re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE)
         flat = re.sub(r"^[A-Z][a-z]{2,}$", lambda word: word[0].lower(), flat)
-        if flat.lower() == "e":
-            flat = "electrical"
+        flat = "electrical" if flat.lower() == "e" else flat
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
-    si = _si_name(unit)
     base = re.sub(r"\b[A-Z][a-z]{2,}", lambda word: word[0].lower(), base)
-    tail = "" if si == "-" else "_" + {"N/W": "N_W", "m/s2": "m_s2"}.get(si, si)
-    return Heading(text, slug(base) + tail, unit)
+    return Heading(text, _channel(slug(base), unit), unit)

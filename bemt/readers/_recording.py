@@ -7,6 +7,7 @@ number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.r
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,11 +21,12 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers._clock import clock_seconds
+from bemt.readers import load_text
 from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, heading, may_be_shaft_speed, slug, surely_shaft_speed
+from bemt.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
 from bemt.readers._large import NumberTable
-from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, with_unit
+from bemt.readers._samples import clock_seconds, spikes
+from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.readers._words import english, quantities
 
 Array = NDArray[np.float64]
@@ -33,53 +35,9 @@ FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
 HOTTEST_AIR, MOST_AIR_VARIES, COLDEST_PART = 323.0, 20.0, 200.0
 """Temperature above which, and range over which, no air around a stand is; below which no part of it is. [K]"""
 _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
-BLOCK = 1 << 17
-"""Samples that are searched for spikes at once."""
-HALF, TIMES, SLIP = 3, 2.0, 0.02
-"""Neighbours on each side of a spike, and ranges of theirs that it leaves; share that a ratio is near a slip by."""
+SLIP = 0.02
+"""Share that a ratio is near a unit error by. [1]"""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
-
-
-def spikes(values: Array) -> NDArray[np.bool_]:
-    """Single samples that jump away from all their neighbours and back, (N,).
-
-    A sample is a spike when it lies outside the range of its neighbours by more than `TIMES` that range and by more
-    than a quarter of the spread of the whole channel. At an end, one side has no neighbours; there the jump must exceed
-    the spread of the whole channel, since a start-up looks like one.
-
-    >>> spikes(np.array([1.0, 1.1, 1.2, 9.0, 1.4, 1.5, 1.6, 1.7])).nonzero()[0]
-    array([3])
-    """
-    out = np.zeros(values.shape, dtype=bool)
-    rows = np.flatnonzero(np.isfinite(values))
-    if len(rows) < 6:
-        return out
-    v = values if len(rows) == len(values) else values[rows]
-    low, high = np.percentile(v, [5.0, 95.0])
-    top = max(abs(float(np.min(v))), abs(float(np.max(v))))
-    spread = max(float(high - low), 1e-12 * top)
-    for a in range(0, len(v), BLOCK):
-        far = _far(v, a, min(a + BLOCK, len(v)), spread)
-        out[rows[a : a + BLOCK][far]] = True
-    return out
-
-
-def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
-    """Spikes among the samples from a to b."""
-    at = max(a - HALF, 0)
-    part = v[at : b + HALF]
-    lo, hi = np.full(len(part), np.nan), np.full(len(part), np.nan)
-    for k in range(1, HALF + 1):  # neighbours on either side, as far as there are any
-        for own, other in ((slice(k, None), slice(None, -k)), (slice(None, -k), slice(k, None))):
-            np.fmin(lo[own], part[other], out=lo[own])
-            np.fmax(hi[own], part[other], out=hi[own])
-    part, lo, hi = (x[a - at : b - at] for x in (part, lo, hi))
-    share = np.full(b - a, 0.25)
-    if a == 0:
-        share[0] = 1.0
-    if b == len(v):
-        share[-1] = 1.0
-    return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
 
 
 @dataclass
@@ -108,6 +66,41 @@ class Builder:
             self.flag([self.table.cut], "line cut off at the end of the file")
         self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
 
+    @classmethod
+    def of_stand(cls, path: str | os.PathLike[str], format: str) -> Builder:  # noqa: A002
+        """Begin with the table of a stand, whose headings are known and stand once each."""
+        build = cls(split_table(load_text(path), header=True), format)
+        names = build.table.headings
+        for name in sorted({h for h in names if h and names.count(h) > 1}):
+            build.fault("1", f"a second column {name!r}", "each column once")
+        return build
+
+    def fault(self, where: object, got: str, expected: str, hint: str = "") -> None:
+        """Note a fault."""
+        self.faults.append(Fault(self.table.source.name, str(where), got, expected, hint))
+
+    def check(self) -> None:
+        """Raise the faults so far, if any."""
+        if self.faults:
+            raise InputError(self.faults)
+
+    def need(self, *names: str) -> None:
+        """Note channels that are not there."""
+        for name in names:
+            if name not in self.channels:
+                self.fault("1", f"no numbers for {name}", "a column of numbers")
+
+    def at(self, name: str) -> Array | None:
+        """Values of a channel, None without it."""
+        channel = self.channels.get(name)
+        return None if channel is None else channel.values
+
+    def rename(self, old: str, new: str) -> str:
+        """Give a channel another name, in its place; gives its heading."""
+        self.channels = {new if k == old else k: c for k, c in self.channels.items()}
+        self.headings[new] = self.headings.pop(old)
+        return self.headings[new]
+
     def line(self, row: int) -> int:
         """Line in the file of a row."""
         return self.table.lines[row]
@@ -121,6 +114,19 @@ class Builder:
             where = f"{len(hit)} row{'s' if len(hit) > 1 else ''} (line {some(map(self.line, hit))})"
             self.warnings.append(f"{what} in {where}: flagged{why}")
 
+    def flag_speeds(self, *names: str) -> None:
+        """Flag speeds of 0 and below, of those that are there."""
+        for name in names:
+            if (values := self.at(name)) is not None:
+                self.flag(np.flatnonzero(values == 0.0), f"{name} is 0")
+                self.flag(np.flatnonzero(values < 0.0), f"{name} is negative")
+
+    def flag_spikes(self, *names: str) -> None:
+        """Flag single samples that jump, in the channels of these that are there."""
+        for name in names:
+            if (values := self.at(name)) is not None:
+                self.flag(np.flatnonzero(spikes(values)), f"spike of {name}")
+
     def free(self, name: str) -> str:
         """Name that no channel or text has yet."""
         k, out = 2, name
@@ -131,49 +137,25 @@ class Builder:
     def add(self, index: int, head: Heading, decimal: str = ".", sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
         values, bad, empty = self.table.numbers(index, decimal)
-        cells = {i: self.table.cell(i, index) for i in bad}
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
             self.warnings.append(f"column {label!r}: {errors} cells with an error of the spreadsheet are empty")
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
-        comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
-        if comma and decimal == ".":
-            where = f"{self.line(comma[0])}:{index + 1}"
-            got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
-            hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
-            if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
-                hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
-            self.faults.append(Fault(self.table.source.name, where, got, "a number with a decimal point", hint))
+        if decimal == "." and self._has_commas(index, label, bad):
             return ""
         if bad and (stated := self._one_unit(index, bad)):
             values, bad, _ = column_numbers([(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], decimal)
-            cells = {i: self.table.cell(i, index) for i in bad}
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
-        name = self.free(head.name)
         if len(bad) > MOST_ODD * (len(values) - empty):
-            column = self.table.cells(index)
-            seconds = clock_seconds(column)
-            if seconds is not None:
-                name = self.free(f"{slug(head.text) or head.name}_s")
-                self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
-                self.clocks.append(name)
-                self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
-                return name
-            name = self.free(slug(head.text) or head.name)
-            self.texts[name] = tuple(column)
-            if len(bad) < len(values) - empty:
-                self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
-            elif sum(bool(_WITH_UNIT.fullmatch(cells[i])) for i in bad) > len(bad) / 2:
-                self.warnings.append(f"column {label!r} has units in its cells ({cells[bad[0]][:20]!r}): kept as text")
-            else:
-                self.words.append(repr(label))
-            return ""
+            return self._add_text(index, head, label, bad, len(values) - empty)
+        name = self.free(head.name)
         if bad:
-            words = some((f"{cells[i][:20]!r} at {self.line(i)}:{index + 1}" for i in bad), 3)
+            cells = ((i, self.table.cell(i, index)[:20]) for i in bad)
+            words = some((f"{cell!r} at {self.line(i)}:{index + 1}" for i, cell in cells), 3)
             self.flag(bad, f"{name}: no number", f": {words}; NaN there")
         if head.told:
             self.warnings.append(head.told)
@@ -192,6 +174,36 @@ class Builder:
         self.channels[name] = Channel(values if sign == 1.0 else values * sign, head.unit_name)
         self.headings[name] = head.text
         return name
+
+    def _has_commas(self, index: int, label: str, bad: Sequence[int]) -> bool:
+        """Whether cells of a column have a comma for a point, which is a fault."""
+        cells = {i: self.table.cell(i, index) for i in bad}
+        comma = [i for i in bad if re.fullmatch(r"[+-]?\d+,\d*|[+-]?\d{1,3}(,\d{3})*\.\d*", cells[i])]
+        if comma:
+            got = f"{cells[comma[0]]!r} ({len(comma)} such cells of {label!r})"
+            hint = 'State decimal = "," in a recording.toml in the same folder, or export with decimal points'
+            if all(_THOUSANDS.fullmatch(cells[i]) for i in comma):
+                hint = f"A comma between thousands? Export without. If not: {hint[0].lower()}{hint[1:]}"
+            self.fault(f"{self.line(comma[0])}:{index + 1}", got, "a number with a decimal point", hint)
+        return bool(comma)
+
+    def _add_text(self, index: int, head: Heading, label: str, bad: Sequence[int], filled: int) -> str:
+        """Add a column of text, or of clock times; gives the name of the latter."""
+        column, base = self.table.cells(index), slug(head.text) or head.name
+        if (seconds := clock_seconds(column)) is not None:
+            name = self.free(f"{base}_s")
+            self.channels[name], self.headings[name] = Channel(seconds, "s"), head.text
+            self.clocks.append(name)
+            self.warnings.append(f"column {label!r} is a clock: seconds since {column[0] or 'its first time'}")
+            return name
+        self.texts[self.free(base)] = tuple(column)
+        if len(bad) < filled:
+            self.warnings.append(f"column {label!r} mixes numbers and text: kept as text")
+        elif sum(bool(_WITH_UNIT.fullmatch(column[i])) for i in bad) > len(bad) / 2:
+            self.warnings.append(f"column {label!r} has units in its cells ({column[bad[0]][:20]!r}): kept as text")
+        else:
+            self.words.append(repr(label))
+        return ""
 
     def _one_unit(self, index: int, bad: Sequence[int]) -> str:
         """Unit that the cells of a column say, all of them the same; "" for any other column."""
@@ -215,22 +227,15 @@ class Builder:
     def check_air(self) -> None:
         """A temperature that only a part reaches is not that of the air, whatever its heading leaves open."""
         channel = self.channels.get("temperature_K")
-        stated = self.format == "recording" or set(english(self.headings.get("temperature_K", "air"))) & {
-            "ambient",
-            "air",
-        }
-        if channel is None or stated:
+        words = set(english(self.headings.get("temperature_K", "air")))
+        if channel is None or self.format == "recording" or words & {"ambient", "air"}:
             return
         v = channel.values[np.isfinite(channel.values)]
         slip = v.size and np.min(v) < COLDEST_PART  # degrees Celsius under a heading of kelvin, say
         if v.size and not slip and (np.max(v) > HOTTEST_AIR or np.ptp(v) > MOST_AIR_VARIES):
-            label = self.headings.pop("temperature_K")
-            name = self.free("part_temperature_K")
-            self.channels = {name if k == "temperature_K" else k: c for k, c in self.channels.items()}
-            self.headings[name] = label
-            told = (
-                f"{label!r} goes from {np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C: a part's, not the air's"
-            )
+            label = self.rename("temperature_K", self.free("part_temperature_K"))
+            span = f"{np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C"
+            told = f"{label!r} goes from {span}: a part's, not the air's"
             self.warnings.append(told + "; head that of the air Ambient temperature (C)")
 
     def check_magnitudes(self) -> None:
@@ -266,9 +271,7 @@ class Builder:
     def flag_time(self) -> None:
         """Flag rows where time does not advance; the only clock is the time of a file that has no other."""
         if "time_s" not in self.channels and len(self.clocks) == 1:
-            clock = self.clocks.pop()
-            self.channels = {"time_s" if k == clock else k: channel for k, channel in self.channels.items()}
-            self.headings["time_s"] = self.headings.pop(clock)
+            self.rename(self.clocks.pop(), "time_s")
         if "time_s" in self.channels:
             t = self.channels["time_s"].values
             rows = np.flatnonzero(np.isfinite(t))
@@ -276,19 +279,15 @@ class Builder:
             self.flag(rows[1:][step < 0.0], "time goes backwards")
             same = rows[1:][step == 0.0]
             if same.size:
-                self.warnings.append(
-                    f"{same.size} rows repeat the time of the row before (lines "
-                    f"{some(self.line(int(r)) for r in same)})"
-                )
+                where = some(self.line(int(r)) for r in same)
+                self.warnings.append(f"{same.size} rows repeat the time of the row before (lines {where})")
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""
         if not self.channels and not self.faults:
             columns = f"{len(self.texts)} columns of text" if self.texts else "empty columns"
-            expected = "one column of numbers or more"
-            self.faults.append(Fault(self.table.source.name, "", f"no column of numbers ({columns})", expected))
-        if self.faults:
-            raise InputError(self.faults)
+            self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
+        self.check()
         if self.empty:
             self.warnings.append(f"no values in {len(self.empty)} columns: {some(self.empty, 8)}")
         if self.words:
@@ -302,7 +301,7 @@ class Builder:
             out = shlex.quote(file.with_name("recording.toml").as_posix())
             step = f"bemt import {shlex.quote(file.as_posix())} {' '.join(asks)} --out {out}"
             self.warnings.append(f"in one step, with your units in place of UNIT: {step}" if "UNIT" in step else step)
-        said = {"file": self.table.source.name, "sha256": self.table.source.sha256, **(provenance or {})}
+        said = {**self.table.source.about, **(provenance or {})}
         flags: list[tuple[str, ...]] = [()] * len(self.table) if self.flags else []
         for row, words in self.flags.items():
             flags[row] = tuple(words)
@@ -340,9 +339,9 @@ def _asked(headings: Sequence[str], channels: Iterable[str]) -> list[str]:
     out: dict[str, str] = {}
     for label in headings:
         name = label[1:].rsplit("'", 1)[0].split("' (")[0]
-        found = {q.replace(" ", "_") for q, _ in quantities(english(re.split(r"[(\[]", name)[0]))}
+        found = set(meanings(name))
         found -= {"pulse_width"} if "throttle" in found else set()
-        quantity = "power" if found == {"mechanical_power"} else found.pop() if len(found) == 1 else ""
+        quantity = found.pop() if len(found) == 1 else ""
         if quantity and not any(k.startswith(f"{quantity}_") for k in channels):
             out.setdefault(quantity, f"--unit {shlex.quote(name)}=UNIT")
     return list(out.values())
@@ -377,20 +376,11 @@ def _nearest(headings: Sequence[str], channels: Iterable[str] = ()) -> str:
 
 
 _UNITS_MEANT = {
-    "rpm": "rpm, krpm, rev_s or rad_s",
-    "thrust": "N, kgf, gf, lbf or ozf",
-    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in",
-    "voltage": "V or mV",
-    "current": "A or mA",
-    "power": "W or kW",
-    "time": "s or ms",
-    "airspeed": "m_s, km_h, kt or mph",
-    "throttle": "pct",
-    "pressure": "Pa, hPa or mbar",
-    "temperature": "C, K or F",
-    "density": "kg_m3",
-    "humidity": "pct",
-}
+    "rpm": "rpm, krpm, rev_s or rad_s", "thrust": "N, kgf, gf, lbf or ozf", "voltage": "V or mV",
+    "torque": "Nm, mNm, kgf_cm, gf_cm or lbf_in", "current": "A or mA", "power": "W or kW", "time": "s or ms",
+    "airspeed": "m_s, km_h, kt or mph", "throttle": "pct", "pressure": "Pa, hPa or mbar", "temperature": "C, K or F",
+    "density": "kg_m3", "humidity": "pct",
+}  # fmt: skip
 """Units that a column of each meaning usually has; which, the file does not say."""
 
 

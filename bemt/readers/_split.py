@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault
 from bemt.readers import SourceText, number
 from bemt.readers._headings import unit_of
 from bemt.readers._words import english, quantities
@@ -315,87 +315,98 @@ def split_table(
     bare = [i for i, t in used if not t.strip(" \t;,|")]
     used = [(i, t) for i, t in used if t.strip(" \t;,|")]
     if not used:
-        raise InputError(Fault(source.name, "", "no data", "a heading line and rows of numbers"))
+        source.refuse("", "no data", "a heading line and rows of numbers")
     notes = [f"{comments} comment lines left out"] if comments else []
     notes += [f"{len(bare)} lines of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
-    stated = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
+    labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
     if start:
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
         notes += [] if _EXCEL.fullmatch(used[0][1]) else [f"{start} lines above the headings left out: {above}"]
         used = used[start:]
     if any(len(t) > 100_000 for _, t in used):
-        raise InputError(Fault(source.name, "", "a line of more than 100000 characters", "a table of short lines"))
+        source.refuse("", "a line of more than 100000 characters", "a table of short lines")
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
         notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
         notes.append(f"the headings are the comment in line {said[0]}")
-    first = split[0][1]
+    top, first = split[0]
     if header is None:
         header = not any(number(c) is not None for c in first)
-    if header and len(split) > 1 and split[0][0] == used[0][0]:
+    if header and len(split) > 1 and top == used[0][0]:
         first = heading_cells(used[0][1], mark, len(split[1][1]))
-    if stated:  # LabVIEW: of the channels, which stand behind the time
-        more = [*["s"][: len(first)], *stated[1:], *[""] * len(first)]
-        first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, more, strict=False)]
+    if labview:  # units of the channels, which stand behind the time
+        first = _with_units(first, [*["s"][: len(first)], *labview[1:]])
         first[0] = first[0].replace("X_Value", "Time")
+    closed = not lines[-1]
+    names, body = _below(first, split, closed, notes) if header else ([], split)
+    width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
+    rows, cut, misfits = _rows(source, body, width, top, closed, most_misfits)
+    return SplitTable(source, mark, tuple(names), rows, tuple(i for i, _ in body), tuple(notes), cut, top, misfits)
+
+
+def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:
+    """Headings with the units that another line has for them."""
+    filled = [*units_, *[""] * len(names)]
+    return [f"{name} ({unit})" if unit else name for name, unit in zip(names, filled, strict=False)]
+
+
+def _below(
+    first: list[str], split: list[tuple[int, list[str]]], closed: bool, notes: list[str]
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Headings, with what further lines of headings and units say, and the rows below them."""
     width = len(first)
-    while header and width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
+    while width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
         width -= 1
-    if not header:
-        width = max((len(c) for _, c in split[:2]), default=width)
-    while header and len(split) > 2:
-        below = split[1][1]
+    top, *body = split
+    while len(body) > 1:
+        line, below = body[0]
         if _is_units(below):
-            stated = [unit.strip("-()[]") for unit in [*below, *[""] * width]]
-            first = [f"{name} ({unit})" if unit else name for name, unit in zip(first, stated, strict=False)]
-            notes.append(f"line {split[1][0]} holds units")
+            first = _with_units(first, [unit.strip("-()[]") for unit in below])
+            notes.append(f"line {line} holds units")
         elif sum(a == b for a, b in zip(first, below, strict=False)) > 0.5 * width:
-            notes.append(f"1 lines left out: the headings again (line {split[1][0]})")
+            notes.append(f"1 lines left out: the headings again (line {line})")
         elif not any(map(_reads, below)) and sum(map(bool, below)) >= max(2.0, 0.6 * width) and _named(below) >= 0.5:
             first = [" ".join(filter(None, pair)) for pair in zip(first, [*below, *[""] * width], strict=False)]
-            notes.append(f"line {split[1][0]} holds more headings")
+            notes.append(f"line {line} holds more headings")
         else:
             break
-        del split[1]
-    if header:
-        last = [split.pop()] if lines[-1] and len(split) > 2 else []  # the end of the file cut it off: no remark
-        split = [split[0], *_without_ends(split[1:], split[0][1], notes), *last]
-        usual = {len(c) for _, c in split[1:]}
-        if len(usual) == 1 and (most := usual.pop()) < width and len(split) > 2:  # columns that no row fills
-            split = [split[0], *((i, [*c, *[""] * (width - most)]) for i, c in split[1:])]
+        del body[0]
+    last = [body.pop()] if not closed and len(body) > 1 else []  # the end of the file cut it off: no remark
+    body = [*_without_ends(body, top[1], notes), *last]
+    usual = {len(c) for _, c in body}
+    if len(usual) == 1 and (most := usual.pop()) < width and len(body) > 1:  # columns that no row fills
+        body = [(i, [*c, *[""] * (width - most)]) for i, c in body]
+    return first[:width], body
+
+
+def _rows(
+    source: SourceText, body: Sequence[tuple[int, list[str]]], width: int, top: int, closed: bool, most_misfits: float
+) -> tuple[tuple[tuple[str, ...], ...], int | None, tuple[int, ...]]:
+    """Rows of equal length, which of them the end of the file cut off, and those of another length, kept empty."""
     rows: list[tuple[str, ...]] = []
     faults: list[Fault] = []
     misfits: list[int] = []
     cut = None
-    body = split[1:] if header else split
     for k, (i, cells) in enumerate(body):
-        over = cells[width:]
-        if any(over):
-            got, hint = f"{len(cells)} cells", "A delimiter inside a value, or a decimal comma?"
-            faults.append(Fault(source.name, str(i), got, f"{width} as in line {split[0][0]}", hint))
-            misfits.append(len(rows))
-            rows.append(("",) * width)
-        elif len(cells) < width and k == len(body) - 1 and not lines[-1] == "" and k > 0:
+        short = len(cells) < width
+        if short and k == len(body) - 1 and not closed and k > 0:
             cut = k
-            rows.append(tuple(cells) + ("",) * (width - len(cells)))
-        elif len(cells) < width:
-            hint = "Was a line cut?"
-            faults.append(Fault(source.name, str(i), f"{len(cells)} cells", f"{width} as in line {split[0][0]}", hint))
-            misfits.append(len(rows))
+            rows.append((*cells, *[""] * (width - len(cells))))
+        elif short or any(cells[width:]):
+            hint = "Was a line cut?" if short else "A delimiter inside a value, or a decimal comma?"
+            faults.append(source.fault(i, f"{len(cells)} cells", f"{width} as in line {top}", hint))
+            misfits.append(k)
             rows.append(("",) * width)
         else:
             rows.append(tuple(cells[:width]))
     if len(faults) > most_misfits * len(body):
-        extra = len(faults) - MAX_FAULTS
-        faults = faults[:MAX_FAULTS]
-        if extra > 0:
-            faults.append(Fault(source.name, "", f"{extra} more lines of another length", f"{width} cells"))
-        raise InputError(faults)
+        source.faults += faults[:MAX_FAULTS]
+        if len(faults) > MAX_FAULTS:
+            source.add("", f"{len(faults) - MAX_FAULTS} more lines of another length", f"{width} cells")
+        source.check()
     if not rows:
-        raise InputError(Fault(source.name, "", "no rows", "a heading line and rows of numbers"))
-    names = tuple(first[:width]) if header else ()
-    return SplitTable(source, mark, names, tuple(rows), tuple(i for i, _ in (split[1:] if header else split)),
-                 tuple(notes), cut, split[0][0], tuple(misfits))  # fmt: skip
+        source.refuse("", "no rows", "a heading line and rows of numbers")
+    return tuple(rows), cut, tuple(misfits)

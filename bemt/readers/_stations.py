@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, load_text
 from bemt.readers._headings import unit_of
 from bemt.readers._split import decimal_mark, split_table
@@ -81,51 +80,45 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
     Cells are parted by commas, semicolons, tabs or blanks; decimal commas are read where they can be nothing else. A
     column of local pitch (``pitch_mm``, ``P/D``) stands for the angle, beta = arctan(pitch / 2 pi r).
     """
-    source = load_text(path)
-    file = path.as_posix()
-    bare = SourceText(source.name, "\n".join(line.split("#", 1)[0] for line in source.lines), source.sha256)
-    if not bare.text.strip():
-        raise InputError(Fault(file, "", "0 stations", "two or more"))
-    table = split_table(bare, header=True, most_misfits=1.0)
+    whole = load_text(path)
+    source = SourceText(path.as_posix(), "\n".join(line.split("#", 1)[0] for line in whole.lines), whole.sha256)
+    if not source.text.strip():
+        source.refuse("", "0 stations", "two or more")
+    table = split_table(source, header=True, most_misfits=1.0)
     top = table.headings_line
     found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
     by_name = {name: [c for c in found if c.name == name] for name in ("r", "chord", "beta", "pitch")}
-    angle = "beta" if by_name["beta"] or not by_name["pitch"] else "pitch"
-    if lacking := [name for name in ("r", "chord", angle) if not by_name[name]]:
-        header = bare.lines[top - 1].strip()
-        raise InputError(Fault(file, f"{top}", f"the header {header!r}", EXPECTED, _hint(table.headings, lacking)))
-    places = [by_name[name][0] for name in ("r", "chord", angle)]
-    faults = [
-        Fault(file, f"{top}", " and ".join(c.heading for c in by_name[name]), "one of them")
-        for name in ("r", "chord", angle) if len(by_name[name]) > 1
-    ]  # fmt: skip
-    width = f"{table.width}, as in line {top}"
-    faults += [Fault(file, f"{table.lines[i]}", "another number of cells", width) for i in table.misfits]
+    wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
+    if lacking := [name for name in wanted if not by_name[name]]:
+        header = source.lines[top - 1].strip()
+        source.refuse(top, f"the header {header!r}", EXPECTED, _hint(table.headings, lacking))
+    for name in wanted:
+        if len(by_name[name]) > 1:
+            source.add(top, " and ".join(c.heading for c in by_name[name]), "one of them")
+    for i in table.misfits:
+        source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
+    places = [by_name[name][0] for name in wanted]
     decimal = decimal_mark(table)
     columns = []
     for place in places:
-        values, bad, _ = table.numbers(place.at, decimal)
-        empty = [int(i) for i in np.flatnonzero(np.isnan(values)) if i not in (*bad, *table.misfits)]
-        faults += [
-            Fault(file, f"{table.lines[i]}:{place.at + 1}", repr(table.cell(i, place.at)), "a number")
-            for i in sorted([*bad, *empty])
-        ]
+        values = table.numbers(place.at, decimal)[0]
+        for i in np.flatnonzero(np.isnan(values)).tolist():
+            if i not in table.misfits:
+                source.add(f"{table.lines[i]}:{place.at + 1}", repr(table.cell(i, place.at)), "a number")
         columns.append(values * place.scale)
-    faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
-    if not faults and len(table) < 2:
-        faults.append(Fault(file, "", f"{len(table)} stations", "two or more"))
-    if faults:
-        raise InputError(faults)
+    source.faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
+    if not source.faults and len(table) < 2:
+        source.add("", f"{len(table)} stations", "two or more")
+    source.check()
     x, c, beta = columns
-    if angle == "pitch":
+    if wanted[2] == "pitch":
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
-    faults += _limits(file, places, (x, c, beta), R)
-    if faults:
-        raise InputError(faults)
+    _limits(source, places, (x, c, beta), R)
+    source.check()
     return np.minimum(x, 1.0), c, np.radians(beta)
 
 
-def _limits(file: str, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> list[Fault]:
+def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> None:
     """What no blade has, each with the likely reason."""
     x, c, beta = columns
     is_length = not places[0].share
@@ -133,13 +126,10 @@ def _limits(file: str, places: list[_Column], columns: tuple[Array, Array, Array
     radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
     chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D" if places[1].share else radius
     hints = (radius, chord if c.max() > WIDEST else "", "")
-    faults = []
     for place, (value, low, high), hint in zip(places, limits, hints, strict=True):
         if not low <= value <= high:
             expected = f"at most {high / place.scale:.4g}"
             expected = expected if value > high else f"{low / place.scale:.4g} or more at the outermost"
-            faults.append(Fault(file, place.heading, f"{value / place.scale:.4g}", expected, hint))
+            source.add(place.heading, f"{value / place.scale:.4g}", expected, hint)
     if places[2].name == "beta" and places[2].scale == 1.0 and np.abs(beta).max() < 1.6:
-        got = f"angles up to {np.abs(beta).max():g}"
-        faults.append(Fault(file, places[2].heading, got, "degrees", "Looks like radians"))
-    return faults
+        source.add(places[2].heading, f"angles up to {np.abs(beta).max():g}", "degrees", "Looks like radians")

@@ -140,12 +140,8 @@ def _size(token: str, family: str) -> dict[str, object]:
             found |= {"blades": int(match[3]), "blades_from": "name"}
         return found
     if match := re.fullmatch(r"(\d+)([tp])(\d)", token):
-        rotation = -1 if match[2] == "p" else 1
-        return {
-            "diameter_in": NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}"),
-            "rotation": rotation,
-            "specimen": int(match[3]),
-        }
+        named = NAMED_DIAMETERS_IN.get(f"{family}_{match[1]}")
+        return {"diameter_in": named, "rotation": -1 if match[2] == "p" else 1, "specimen": int(match[3])}
     if match := re.fullmatch(_N, token):
         value = float(token)
         return {"diameter_in": value / 25.4 if value > MM_ABOVE else value}
@@ -211,8 +207,6 @@ def parse_file_name(stem: str) -> UiucFile | None:
         at = lower.index("static")
         return UiucFile("static", _propeller(family, rest[:at]), "_".join(rest[at + 1 :]))
     if len(rest) >= 2 and re.fullmatch(r"\d{3,6}(\.\d+)?", last):
-        has_run = len(rest) >= 3 and _RUN.fullmatch(rest[-2]) is not None
-        return UiucFile(
-            "line", _propeller(family, rest[: -2 if has_run else -1]), rest[-2] if has_run else "", float(last)
-        )
+        run = rest[-2] if len(rest) >= 3 and _RUN.fullmatch(rest[-2]) else ""
+        return UiucFile("line", _propeller(family, rest[: -2 if run else -1]), run, float(last))
     return None

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._uiuc_names import parse_file_name
 
@@ -18,11 +17,9 @@ Array = NDArray[np.float64]
 NO_SPEED = "no rpm in the file name"
 """What is missing where a line over advance ratio has no name of the database."""
 _COLUMNS = {
-    "geom": ("r/R", "c/R", "beta"),
-    "static": ("RPM", "CT", "CP"),
-    "line": ("J", "CT", "CP", "eta"),
+    "geom": ("r/R", "c/R", "beta"), "static": ("RPM", "CT", "CP"), "line": ("J", "CT", "CP", "eta"),
     "thick": ("r/R", "t/c"),
-}
+}  # fmt: skip
 _RANGES: dict[str, tuple[float, float, str]] = {  # outside: a wrong column or unit, refused with this hint
     "r/R": (0.0, 1.05, "Is this a radius in mm or in?"),
     "c/R": (0.0, 1.5, "Is this a chord in mm or in?"),
@@ -86,12 +83,17 @@ class UiucThickness(_Table):
     t_c: Array
 
 
+def _plain(line: str) -> str:
+    """Header without units in brackets."""
+    return re.sub(r"\(.*?\)|\[.*?\]", " ", line)
+
+
 def _header(text: str) -> tuple[int, str | None]:
     """Line number of the header and the role it announces (None: not a table of this archive)."""
     for index, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
-        names = re.sub(r"\(.*?\)|\[.*?\]", " ", line).lower().split()
+        names = _plain(line).lower().split()
         for role, columns in _COLUMNS.items():
             wanted = [c.lower() for c in columns]
             if names == wanted or (role == "line" and names == wanted[:3]):
@@ -125,40 +127,30 @@ def _parse(source: SourceText, role: str) -> tuple[dict[str, Array], tuple[int, 
     if found != role:
         got = repr(source.lines[at - 1].strip()[:60]) if at else "no header"
         hint = f"This is a {found} table" if found else "Is the header line missing?"
-        raise InputError(Fault(source.name, str(at or 1), got, f"the header {' '.join(columns)}", hint))
-    header = re.sub(r"\(.*?\)|\[.*?\]", " ", source.lines[at - 1])
-    columns = columns[: len(header.split())]
-    faults: list[Fault] = []
-    values: list[list[float]] = []
-    rows: list[int] = []
+        source.refuse(at or 1, got, f"the header {' '.join(columns)}", hint)
+    columns = columns[: len(_plain(source.lines[at - 1]).split())]
+    rows: dict[int, list[float | None]] = {}
     for index, line in enumerate(source.lines[at:], at + 1):
         tokens = line.split()
         if not tokens or tokens[0].startswith("#"):
             continue
         if len(tokens) != len(columns):
             hint = "Remove the trailing text" if len(tokens) > len(columns) else "The row is cut short"
-            expected = f"{len(columns)} numbers ({' '.join(columns)})"
-            faults.append(Fault(source.name, str(index), repr(line.strip()[:60]), expected, hint))
+            source.add(index, repr(line.strip()[:60]), f"{len(columns)} numbers ({' '.join(columns)})", hint)
             continue
-        row = []
-        for column, (name, token) in enumerate(zip(columns, tokens, strict=True), 1):
-            value = number(token)
+        rows[index] = list(map(number, tokens))
+        for column, (name, token, value) in enumerate(zip(columns, tokens, rows[index], strict=True), 1):
             low, high, hint = _RANGES.get(name, (-1e9, 1e9, ""))
-            where = f"{index}:{column}"
+            expected = f"{name} from {low:g} to {high:g}"
             if value is None:
+                expected = "a finite number"
                 hint = "Use a decimal point" if "," in token else "Delete the row or repair the value"
-                faults.append(Fault(source.name, where, f"{name} = {token}", "a finite number", hint))
-            elif not low <= value <= high:
-                expected = f"{name} from {low:g} to {high:g}"
-                faults.append(Fault(source.name, where, f"{name} = {token}", expected, hint))
-            row.append(np.nan if value is None else value)
-        values.append(row)
-        rows.append(index)
-    if not values and not faults:
-        faults.append(Fault(source.name, "", "no rows", "one row or more"))
-    if faults:
-        raise InputError(faults)
-    data = np.array(values, dtype=float)
+            if value is None or not low <= value <= high:
+                source.add(f"{index}:{column}", f"{name} = {token}", expected, hint)
+    if not rows and not source.faults:
+        source.add("", "no rows", "one row or more")
+    source.check()
+    data = np.array([*rows.values()], dtype=float)
     return {name: data[:, i] for i, name in enumerate(columns)}, tuple(rows)
 
 
@@ -172,19 +164,16 @@ def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
     """Read one geometry file."""
     source = load_text(path)
     table, rows = _parse(source, "geom")
-    r_R, c_R, beta = table["r/R"], table["c/R"], table["beta"]
-    faults = [
-        Fault(source.name, f"{rows[i + 1]}:1", f"r/R = {r_R[i + 1]:g} after {r_R[i]:g}", "ascending r/R", "Sort rows")
-        for i in np.flatnonzero(np.diff(r_R) <= 0)
-    ]
+    r_R, c_R, beta = table.values()
+    for i in np.flatnonzero(np.diff(r_R) <= 0):
+        source.add(f"{rows[i + 1]}:1", f"r/R = {r_R[i + 1]:g} after {r_R[i]:g}", "ascending r/R", "Sort rows")
     if len(r_R) < 3 or r_R[-1] < 0.9:
         got = f"{len(r_R)} stations to r/R = {r_R[-1]:g}"
-        faults.append(Fault(source.name, "", got, "three stations or more up to r/R = 0.9", "Is the file cut off?"))
+        source.add("", got, "three stations or more up to r/R = 0.9", "Is the file cut off?")
     if np.max(np.abs(beta)) < 1.6:
         got = f"blade angles of at most {np.max(np.abs(beta)):g}"
-        faults.append(Fault(source.name, "", got, "blade angles in degrees", "Are these radians?"))
-    if faults:
-        raise InputError(faults)
+        source.add("", got, "blade angles in degrees", "Are these radians?")
+    source.check()
     return UiucGeometry(source.name, source.sha256, rows, ((),) * len(rows), r_R, c_R, beta)
 
 
@@ -193,8 +182,8 @@ def read_static(path: str | os.PathLike[str]) -> UiucStatic:
     source = load_text(path)
     table, rows = _parse(source, "static")
     name = parse_file_name(Path(path).stem)
-    flags = _order_flags(table["RPM"], "rpm")
     run = name.run if name and name.role == "static" else ""
+    flags = _order_flags(table["RPM"], "rpm")
     return UiucStatic(source.name, source.sha256, rows, flags, table["RPM"], table["CT"], table["CP"], run)
 
 
@@ -202,18 +191,13 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
     """Read one advance-ratio run (header ``J CT CP eta``)."""
     source = load_text(path)
     name = parse_file_name(Path(path).stem)
-    faults: list[Fault] = []
     speed = rpm if rpm is not None else (name.rpm if name and name.role == "line" else None)
     if speed is None or not 100.0 <= speed <= 200000.0:
         got = NO_SPEED if speed is None else f"rpm {speed:g}"
         hint = "Name the file <family>_<size>_<run>_<rpm>.txt"
-        faults.append(Fault(source.name, "", got, "rpm from 100 to 200000 as the last number of the name", hint))
-    try:
-        table, rows = _parse(source, "line")
-    except InputError as error:
-        raise InputError([*faults, *error.faults]) from None
-    if faults or speed is None:
-        raise InputError(faults)
+        source.add("", got, "rpm from 100 to 200000 as the last number of the name", hint)
+    table, rows = _parse(source, "line")
+    assert speed is not None  # told by _parse
     J, CT, CP = table["J"], table["CT"], table["CP"]
     with np.errstate(divide="ignore", invalid="ignore"):
         ideal = np.where(CP != 0, J * CT / CP, np.nan)
@@ -225,7 +209,7 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
     if len(bad) > max(2, len(J) // 4):
         got = f"eta = {eta[bad[0]]:g} where J CT/CP = {ideal[bad[0]]:.3g}"
         hint = f"{len(bad)} of {len(J)} rows disagree: are columns exchanged?"
-        raise InputError(Fault(source.name, str(rows[bad[0]]), got, "eta = J CT/CP", hint))
+        source.refuse(rows[bad[0]], got, "eta = J CT/CP", hint)
     order = _order_flags(J, "J")
     flags = tuple(f + (("eta is not J CT/CP",) if o else ()) for f, o in zip(order, odd, strict=True))
     run = name.run if name and name.role == "line" else ""
@@ -236,5 +220,4 @@ def read_thickness(path: str | os.PathLike[str]) -> UiucThickness:
     """Read one thickness file (header ``r/R t/c``)."""
     source = load_text(path)
     table, rows = _parse(source, "thick")
-    r_R = table["r/R"]
-    return UiucThickness(source.name, source.sha256, rows, _order_flags(r_R, "r/R"), r_R, table["t/c"])
+    return UiucThickness(source.name, source.sha256, rows, _order_flags(table["r/R"], "r/R"), *table.values())

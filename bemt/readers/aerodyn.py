@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
 from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.polars import Polar
@@ -27,6 +26,7 @@ KIND = "aerodyn"
 BLADE = True
 
 _DRIVER = re.compile(r"\bAeroDyn\b[^\n]*\bDriver\b|\bNumBlades(\(1\))?\b", re.I)
+_POINT = ("HWindSpeed", "RotSpeed", "FldDens")
 _PART = re.compile(r"\b(ADBlFile|NumBlNds)\b")
 
 
@@ -45,26 +45,25 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     driver = load_text(path)
     if not _DRIVER.search(driver.text):
         got = "a part of an AeroDyn model, without blade count and hub radius"
-        raise InputError(Fault(driver.name, "", got, "the driver file that names it", "It holds NumBlades and HubRad"))
-    faults: list[Fault] = []
-    count, hub = (_number(driver, key, faults) for key in ("NumBlades", "HubRad"))
-    primary = load_text(_file(driver, ("AeroFile", "AD_InputFile", "InputFile"), Path(path).parent, faults))
-    folder = Path(path).parent / Path(_text(driver, ("AeroFile", "AD_InputFile", "InputFile"))).parent
-    blade = load_text(_file(primary, ("ADBlFile(1)", "ADBlFile"), folder, faults))
-    polars = [_turned(polar_aerodyn.read(folder / name)) for name in _airfoils(primary, faults)]
-    rows = _nodes(blade, faults)
+        driver.refuse("", got, "the driver file that names it", "It holds NumBlades and HubRad")
+    count, hub = (_number(driver, key) for key in ("NumBlades", "HubRad"))
+    model = ("AeroFile", "AD_InputFile", "InputFile")
+    primary = _part(driver, model, Path(path).parent)
+    folder = Path(path).parent / Path(_text(driver, model)).parent
+    blade = _part(primary, ("ADBlFile(1)", "ADBlFile"), folder)
+    polars = [_turned(polar_aerodyn.read(folder / name)) for name in _airfoils(primary)]
+    rows = _nodes(blade)
     nodes = [rows.take(7, "a node", 7) for _ in rows.rows]
     ids = [whole(row[6]) for row in nodes]
     for bad in sorted({i for i in ids if not 1 <= i <= len(polars)}):
-        faults.append(Fault(blade.name, "BlAFID", f"{bad}", f"1 to {len(polars)}, as {primary.name} lists"))
-    if faults:
-        raise InputError(faults)
+        rows.add("BlAFID", f"{bad}", f"1 to {len(polars)}, as {primary.name} lists")
+    rows.check()
     span, chord, twist = (np.array([row[k] for row in nodes]) for k in (0, 5, 4))
     r = hub + span
     notes = ["sections are turned over for the propeller convention: braking the flow is negative thrust"]
     if any(abs(v) > 1e-9 for row in nodes for v in row[1:4]):
         notes.append("prebend, sweep and cant of the blade are left out")
-    V, rpm, rho = (_optional(driver, key) for key in ("HWindSpeed", "RotSpeed", "FldDens"))
+    V, rpm, rho = (None if (v := _value(driver, key)) is None else number(v[1]) for key in _POINT)
     found = BladeFile(
         Path(path).stem, "AeroDyn", whole(count), float(r[-1]), hub, r, chord, np.radians(twist),
         _anchors(r / r[-1], ids, polars), rpm, V, rho, tuple(notes),
@@ -75,59 +74,54 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
 def _value(source: SourceText, key: str) -> tuple[int, str] | None:
     """Line and text in front of a name; quoted texts may hold blanks."""
     name = re.compile(r'^\s*("[^"]*"|\S+)\s+' + re.escape(key) + r"(?:\(1\))?(?=\s|$)")
-    for i, line in enumerate(source.lines, 1):
-        if found := name.match(line):
-            return i, found[1].strip('"')
-    return None
+    found = ((i, name.match(line)) for i, line in enumerate(source.lines, 1))
+    return next(((i, m[1].strip('"')) for i, m in found if m), None)
 
 
-def _number(source: SourceText, key: str, faults: list[Fault]) -> float:
+def _number(source: SourceText, key: str) -> float:
     found = _value(source, key)
     value = None if found is None else number(found[1])
     if value is None:
-        got = "nothing" if found is None else repr(found[1])
-        faults.append(Fault(source.name, key if found is None else str(found[0]), got, f"a number for {key}"))
+        where, got = (key, "nothing") if found is None else (found[0], repr(found[1]))
+        source.add(where, got, f"a number for {key}")
     return math.nan if value is None else value
-
-
-def _optional(source: SourceText, key: str) -> float | None:
-    found = _value(source, key)
-    return None if found is None else number(found[1])
 
 
 def _text(source: SourceText, keys: Sequence[str]) -> str:
     return next((found[1] for key in keys if (found := _value(source, key))), "")
 
 
-def _file(source: SourceText, keys: Sequence[str], folder: Path, faults: list[Fault]) -> Path:
+def _part(source: SourceText, keys: Sequence[str], folder: Path) -> SourceText:
+    """The file that one of the names stands for; faults of the whole model are gathered in one list."""
     name = _text(source, keys)
     if not name:
-        raise InputError([*faults, Fault(source.name, keys[0], "nothing", "the name of a file")])
-    return folder / name
+        source.refuse(keys[0], "nothing", "the name of a file")
+    part = load_text(folder / name)
+    part.faults = source.faults
+    return part
 
 
-def _airfoils(source: SourceText, faults: list[Fault]) -> list[str]:
+def _airfoils(source: SourceText) -> list[str]:
     """Files of ``AFNames``: a quoted name on each of ``NumAFfiles`` lines."""
-    count = whole(_number(source, "NumAFfiles", faults))
+    count = whole(_number(source, "NumAFfiles"))
     first = next((i for i, line in enumerate(source.lines) if re.search(r'"\s+AFNames\b', line)), None)
     lines = [] if first is None else source.lines[first : first + count]
     names = [m[1] for line in lines if (m := re.match(r'\s*"([^"]+)"', line))]
     if len(names) < max(count, 1):
-        faults.append(Fault(source.name, "AFNames", f"{len(names)} files", f"{max(count, 1)} in quotes"))
+        source.add("AFNames", f"{len(names)} files", f"{max(count, 1)} in quotes")
     return names
 
 
-def _nodes(source: SourceText, faults: list[Fault]) -> Cursor:
+def _nodes(source: SourceText) -> Cursor:
     """Rows of span, three shapes of the axis, twist, chord and airfoil."""
-    count = whole(_number(source, "NumBlNds", faults))
+    count = whole(_number(source, "NumBlNds"))
     begin = (_value(source, "NumBlNds") or (0, ""))[0] + 2
-    rows = [(i + 1, source.lines[i]) for i in range(begin, min(begin + count, len(source.lines)))]
-    if len(rows) < max(count, 2):
-        faults.append(Fault(source.name, "NumBlNds", f"{len(rows)} nodes", f"{max(count, 2)}"))
-        raise InputError(faults)
-    cursor = Cursor(source, "")
-    cursor.rows, cursor.faults = rows, faults
-    return cursor
+    rows = Cursor(source, "")
+    rows.faults = source.faults
+    rows.rows = [(i + 1, source.lines[i]) for i in range(begin, min(begin + count, len(source.lines)))]
+    if len(rows.rows) < max(count, 2):
+        rows.refuse("NumBlNds", f"{len(rows.rows)} nodes", f"{max(count, 2)}")
+    return rows
 
 
 def _anchors(rR: np.ndarray, ids: Sequence[int], polars: Sequence[Polar]) -> list[tuple[float, Polar]]:

@@ -17,17 +17,69 @@ checked against the radius (PE0) or against D = V/(n J) of the rows (PER3).
 
 from __future__ import annotations
 
+import math
 import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from bemt.base.errors import Fault, InputError
-from bemt.readers import head_text, load_text
-from bemt.readers._apc_common import parse_designation
-from bemt.readers._apc_pe0 import ApcBlade, read_pe0
-from bemt.readers._apc_per3 import ApcPerformance, read_per3
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base import units
+from bemt.dataset import Dataset
+from bemt.readers import SourceText, head_text, load_text, number
 
 __all__ = ["KIND", "ApcBlade", "ApcPerformance", "parse_designation", "read", "read_pe0", "read_per3", "sniff"]
 
+Array = NDArray[np.float64]
 KIND = "apc"
+SOURCE = "APC Propellers (Landing Products), published data file"
+_PER3_COLUMNS = "v j pe ct cp pwr torque thrust pwr torque thrust thr/pwr mach reyn fom".split()
+_TOKEN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:NaN|Inf(?:inity)?)|\*+", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class ApcBlade:
+    """Blade of a PE0 file, in SI units and radians."""
+
+    # Designation (``10x5E``) and version line
+    name: str
+    version: str
+    # Nominal diameter and pitch, tip radius, radius of the hub transition [m]
+    diameter_m: float
+    pitch_m: float
+    radius_m: float
+    hub_radius_m: float
+    blades: int  # Number of blades
+    # (N,) stations ascending in radius [m], chord [m], twist between the LE and TE parting lines [rad]
+    r_m: Array
+    chord_m: Array
+    beta_rad: Array
+    t_c: Array  # (N,) thickness over chord
+    # (N,) leading edge ahead of the radial line; highest point of the upper surface [m]
+    sweep_m: Array
+    z_high_m: Array
+    # (N,) pitch as quoted, and as a gauge on the lower surface reads it [m]
+    pitch_quoted_m: Array
+    pitch_prather_m: Array
+    # Radius [m] where the transition from the first to the last section starts and ends, with the section names
+    airfoils: tuple[tuple[float, str], ...]
+    notes: tuple[str, ...]  # Remarks of the file, such as "APC12 airfoil is equivalent to NACA 4412"
+    provenance: Mapping[str, Any]  # source, file, sha256, remark
+
+
+@dataclass(frozen=True, eq=False)
+class ApcPerformance:
+    """Performance of a PER3 file."""
+
+    name: str  # Designation
+    # Nominal [m]
+    diameter_m: float
+    pitch_m: float
+    blades: int  # Number of blades
+    series: Dataset  # Kind ``vendor``; channels rpm, airspeed_m_s, J, eta, CT, CP, power_W, torque_Nm, thrust_N
 
 
 def sniff(head: bytes | str) -> bool:
@@ -51,5 +103,195 @@ def read(path: str | os.PathLike[str]) -> ApcBlade | ApcPerformance:
     form = _form(source.text)
     if form is None:
         expected = "AIRFOIL SUMMARY DATA (PE0) or PERFORMANCE DATA (PER3)"
-        raise InputError(Fault(source.name, "", "neither form of an APC file", expected, "Is it an APC file?"))
+        source.refuse("", "neither form of an APC file", expected, "Is it an APC file?")
     return read_pe0(path) if form == "pe0" else read_per3(path)
+
+
+def _readings(token: str, low: float, high: float) -> float | None:
+    """Largest reading of a size within limits; a printed decimal point is final."""
+    tries = [float(token)] if "." in token else [float(token) / 10**k for k in range(len(token))]
+    return next((value for value in tries if low <= value <= high), None)
+
+
+def parse_designation(text: str) -> tuple[float, float, int] | None:
+    """Read diameter, pitch and blade number from an APC designation.
+
+    >>> parse_designation("134x135-3"), parse_designation("10x47SF"), parse_designation("525x475")
+    ((13.4, 13.5, 3), (10.0, 4.7, 2), (5.25, 4.75, 2))
+    >>> parse_designation("propeller") is None
+    True
+    """
+    match = re.match(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)(.*)$", text.strip(), re.IGNORECASE)
+    diameter = _readings(match[1], 4.0, 28.0) if match else None
+    if match is None or diameter is None:
+        return None
+    pitch = _readings(match[2], 0.25 * diameter, 1.7 * diameter) or _readings(match[2], 0.25 * diameter, 2.5 * diameter)
+    blades = re.search(r"-B?([2-8])(?![0-9A-Za-z])", match[3])
+    return None if pitch is None else (diameter, pitch, int(blades[1]) if blades else 2)
+
+
+def _designation(source: SourceText) -> tuple[str, tuple[float, float, int]]:
+    """Name and sizes from the first line with text, which reads ``10x4.7SF   (10x47SF.dat)``."""
+    at, line = next(((i, s) for i, s in enumerate(source.lines, 1) if s.strip()), (1, ""))
+    name = re.split(r"\s{2,}|\(", line.strip())[0].strip()
+    for text in (name, *re.findall(r"\((.*?)\.dat\)", line)):
+        if sizes := parse_designation(text):
+            return name or text, sizes
+    hint = "The first line should name the propeller"
+    source.add(at, repr(line.strip()[:60]), "a designation such as 10x4.7SF", hint)
+    return name, (math.nan, math.nan, 2)
+
+
+def _pe0_columns(source: SourceText) -> tuple[int, list[str]]:
+    """Line number of the unit line and the column names, the three pitches told apart by it."""
+    for at, line in enumerate(source.lines, 1):
+        names = line.lower().split()
+        if names[:2] == ["station", "chord"]:
+            below = source.lines[at].lower() if at < len(source.lines) else ""
+            kinds = iter(re.findall(r"\((quoted|le-te|prather)\)", below))
+            return at + 1, [f"pitch {next(kinds, '?')}" if name == "pitch" else name for name in names]
+    source.refuse("", "no station table", "a header line that begins STATION CHORD", "Is this the PERF.PE0 file?")
+
+
+def _pe0_rows(source: SourceText, at: int, names: list[str]) -> dict[str, Array]:
+    """Station table up to the first blank line after it."""
+    rows: dict[int, list[float]] = {}
+    for index, line in enumerate(source.lines[at:], at + 1):
+        tokens = line.split()
+        if not tokens and rows:
+            break
+        values = [number(token) for token in tokens]
+        if None in values:
+            bad = values.index(None)
+            source.add(f"{index}:{bad + 1}", tokens[bad], "a finite number", "Repair or delete the row")
+        elif tokens and len(tokens) not in (len(names), len(names) + 1):
+            source.add(index, f"{len(tokens)} numbers", f"{len(names)} numbers ({' '.join(names)})")
+        elif tokens:
+            rows[index] = [v for v in values[: len(names)] if v is not None]
+    lines, data = list(rows), np.array([*rows.values()])
+    if len(rows) < 3:
+        if not source.faults:
+            source.add(at, f"{len(rows)} stations", "three or more", "Is the file cut off?")
+        return {}
+    table = {name: data[:, i] for i, name in enumerate(names)}
+    wanted = ("station", "chord", "pitch quoted", "pitch le-te", "sweep", "thickness", "twist", "max-thick")
+    if missing := [name for name in wanted if name not in table]:
+        source.add(at, f"no column {', '.join(missing)}", f"columns {', '.join(wanted)}")
+        return {}
+    r, chord = table["station"], table["chord"]
+    twist = np.degrees(np.arctan2(table["pitch le-te"], 2 * math.pi * r))
+    tests = [
+        (np.diff(r, prepend=0.0) <= 0, "radii that do not ascend", "ascending radii [in]"),
+        (chord <= 0, "a chord that is not positive", "positive chords [in]"),
+        (np.abs(table["thickness"] * chord - table["max-thick"]) > 0.002, "MAX-THICK", "thickness ratio x chord"),
+        (np.abs(twist - table["twist"]) > 0.5, "TWIST", "atan(LE-TE pitch/(2 pi r)) [deg]"),
+    ]
+    for bad_rows, got, expected in tests:
+        for i in np.flatnonzero(bad_rows)[:1]:
+            source.add(lines[i], got, expected, "Have columns shifted, or units changed?")
+    return table
+
+
+def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
+    """Read a blade geometry file."""
+    source = load_text(path)
+    name, (diameter_in, pitch_in, blades_named) = _designation(source)
+    at, names = _pe0_columns(source)
+    table = _pe0_rows(source, at, names)
+    tail: dict[str, float] = {}
+    for key, low, high in (("RADIUS", 1.0, 30.0), ("HUBTRA", 0.0, 15.0), ("BLADES", 2, 12)):
+        match = re.search(rf"^\s*{key}:\s*(\S+)", source.text, re.MULTILINE)
+        value = number(match[1]) if match else None
+        if value is None or not low <= value <= high:
+            got = f"{key}: {match[1]}" if match else f"no line {key}:"
+            source.add(key, got, f"a number from {low:g} to {high:g}", "Is the file cut off?")
+        tail[key] = math.nan if value is None else value
+    R = tail["RADIUS"]
+    if abs(2 * R - diameter_in) > 0.03 * diameter_in:
+        expected = f"the diameter of {name}, {diameter_in:g} in"
+        source.add("RADIUS", f"{2 * R:g} in", expected, "Do name and data belong together?")
+    if table and table["station"][-1] > 1.01 * R:
+        got = f"a station at {table['station'][-1]:g} in"
+        source.add("RADIUS", got, f"stations up to {R:g} in", "Have units changed?")
+    source.check()
+    inch, zero = units.INCH, np.zeros_like(table["station"])
+    version = re.search(r"^\s*(v\d{4}\S*)", source.text, re.MULTILINE)
+    sections = re.findall(r"^\s*AIRFOIL\d+:\s*([\d.]+)\s*,\s*(\S.*?)\s*(?:\(|$)", source.text, re.MULTILINE)
+    notes = tuple(re.findall(r"^\s*NOTE:\s*(.*?)\s*$", source.text, re.MULTILINE))
+    remark = f"{len(names)} columns; blade number by the name {blades_named}" if blades_named != tail["BLADES"] else ""
+    return ApcBlade(
+        name=name, version=version[1] if version else "", diameter_m=diameter_in * inch, pitch_m=pitch_in * inch,
+        radius_m=R * inch, hub_radius_m=tail["HUBTRA"] * inch, blades=int(tail["BLADES"]), r_m=table["station"] * inch,
+        chord_m=table["chord"] * inch, beta_rad=np.radians(table["twist"]), t_c=table["thickness"],
+        sweep_m=table["sweep"] * inch, z_high_m=table.get("zhigh", zero) * inch,
+        pitch_quoted_m=table["pitch quoted"] * inch, pitch_prather_m=table.get("pitch prather", zero * math.nan) * inch,
+        airfoils=tuple((float(r) * inch, section) for r, section in sections), notes=notes,
+        provenance={"source": SOURCE, **source.about, "remark": remark},
+    )  # fmt: skip
+
+
+def _per3_rows(source: SourceText) -> dict[int, tuple[float, ...]]:
+    """Rows as (rpm, columns...) by their line; NaN where the file says so."""
+    rpm: float | None = None
+    width = 0
+    rows: dict[int, tuple[float, ...]] = {}
+    for index, line in enumerate(source.lines, 1):
+        words = line.lower().split()
+        if match := re.search(r"PROP RPM\s*=\s*(\S+)", line):
+            rpm = number(match[1])
+            if rpm is None or rpm <= 0:
+                source.add(index, f"PROP RPM = {match[1]}", "a positive number")
+        elif words[:3] == _PER3_COLUMNS[:3]:
+            width = len(words)
+            if width not in (8, 15) or words != _PER3_COLUMNS[:width]:
+                expected = f"{' '.join(_PER3_COLUMNS[:8])}, or 15 columns"
+                source.add(index, " ".join(words), expected, "An unknown form of this file")
+        elif width and words and (words[0][0].isdigit() or words[0][0] in "+-.*"):
+            tokens, rest = _TOKEN.findall(line), _TOKEN.sub("", line).strip()
+            if len(tokens) == 2 and rpm is not None:  # V and J of a point at which the code failed
+                tokens, rest = tokens + ["NaN"] * (width - 2), ""
+            if len(tokens) != width or rest:
+                expected = f"{width} numbers ({' '.join(_PER3_COLUMNS[:width])})"
+                source.add(index, repr(line.strip()[:60]), expected, "Repair or delete the row")
+            elif rpm is None:
+                source.add(index, "a row before any rpm", "PROP RPM = ... above it")
+            else:
+                values = [math.nan if v is None else v for v in map(number, tokens)]
+                if math.isnan(values[0]) or math.isnan(values[1]):
+                    source.add(index, "no V or J", "numbers", "Repair or delete the row")
+                rows[index] = (rpm, *values)
+    if not rows and not source.faults:
+        source.add("", "no rows", "blocks under PROP RPM = ...", "Is the file cut off?")
+    return rows
+
+
+def read_per3(path: str | os.PathLike[str]) -> ApcPerformance:
+    """Read a performance file."""
+    source = load_text(path)
+    name, (diameter_in, pitch_in, blades) = _designation(source)
+    rows = _per3_rows(source)
+    source.check()
+    data = np.array([*rows.values()])
+    rpm, V, J, eta, CT, CP = data.T[:6]
+    if data.shape[1] > 9:
+        power, torque, thrust = data.T[9:12]
+    else:
+        power, torque, thrust = data[:, 6] * units.HP, data[:, 7] * units.LBF * units.INCH, data[:, 8] * units.LBF
+    V = V * units.MPH
+    fast = (np.abs(J) > 0.3) & (V > 5.0)  # where rounding (0.1 mph, 0.01 in J) is small
+    if np.any(fast):
+        implied = float(np.median(V[fast] / (rpm[fast] / 60 * J[fast]))) / units.INCH
+        if abs(implied - diameter_in) > 0.03 * diameter_in:
+            expected = f"the diameter of {name}, {diameter_in:g} in"
+            source.refuse("J", f"V/(n J) = {implied:.2f} in", expected, "Is a decimal point missing from the name?")
+    missing = np.isnan(data[:, 1:9]).any(axis=1)
+    flags = tuple(("NaN in the file",) if bad else () for bad in missing)
+    values = {
+        "rpm": rpm, "airspeed_m_s": V, "J": J, "eta": eta, "CT": CT, "CP": CP, "power_W": power, "torque_Nm": torque,
+        "thrust_N": thrust,
+    }  # fmt: skip
+    remark = "computed by APC's vortex code, not measured; dimensional columns are rounded (use CT, CP at low rpm)"
+    about = {"source": SOURCE, **source.about, "remark": remark}
+    labels = tuple(f"{os.path.basename(source.name)}:{line}" for line in rows)
+    series = Dataset("vendor", f"APC {name}", values, {}, flags, about, labels)
+    return ApcPerformance(name, diameter_in * units.INCH, pitch_in * units.INCH, blades, series)

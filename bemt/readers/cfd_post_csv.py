@@ -1,4 +1,4 @@
-r"""CSV of CFD-Post: blocks of ``[Name]`` and ``[Data]``, units in the headings.
+r"""CSV of CFD-Post: blocks of ``[Name]`` and ``[Data]``, units in the headings; or expressions with their values.
 
 ::
 
@@ -8,6 +8,11 @@ r"""CSV of CFD-Post: blocks of ``[Name]`` and ``[Data]``, units in the headings.
     [Data]
     X [ m ], Y [ m ], Z [ m ], Wall Shear [ Pa ]
     7.69e-02, 5.98e-02, 8.56e-02, 3.79
+
+A table of expressions (of CFD-Post and CFX) has one on each line, under a heading or none::
+
+    Expression, Value
+    Thrust, 2.61 [kg m s^-2]
 """
 
 from __future__ import annotations
@@ -16,11 +21,24 @@ import os
 import re
 from dataclasses import replace
 
-from bemt.base.errors import Fault, InputError
+import numpy as np
+
+from bemt.base.averaging import Mean
 from bemt.dataset import Dataset
-from bemt.readers import SourceText, load_text
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table, si_unit, slug
-from bemt.readers._cfd_record import fields, history
+from bemt.readers import SourceText, load_text, number
+from bemt.readers._cfd import (
+    Column,
+    ExportRow,
+    cells_of,
+    fields,
+    head_lines,
+    history,
+    no_units,
+    numeric_table,
+    si_unit,
+    slug,
+    unique,
+)
 from bemt.readers._columns import Channel, channels_of, dataset
 from bemt.readers._headings import may_be_shaft_speed
 
@@ -28,16 +46,28 @@ KIND = "cfd_post_csv"
 
 _SECTION = re.compile(r"\[(\w[\w ]*)\]")
 _HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
+_EXPRESSION = re.compile(
+    r'\s*"?([A-Za-z][^",;\t=]*?)"?\s*[,;\t=]\s*"?\s*([-+\d.][\d.eE+-]*)\s*\[([^\]]*)\]\s*"?[,;\s]*'
+)
+_VALUES = re.compile(r'\s*"?[\w ]+"?\s*[,;\t=]\s*"?values?"?[,;\s]*', re.IGNORECASE)
 
 
 def sniff(head: bytes | str) -> bool:
-    r"""Tell whether the file begins with the section Name or Data.
+    r"""Tell whether the file begins with the section Name or Data, or with an expression and its value.
 
     >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")
     (True, False)
+    >>> sniff("Expression, Value\nThrust, 2.61 [kg m s^-2]\n"), sniff("rpm,thrust [N]\n6000,2.61\n")
+    (True, False)
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
-    return bool(lines) and lines[0].rstrip(",;") in ("[Name]", "[Data]")
+    return bool(lines) and (lines[0].rstrip(",;") in ("[Name]", "[Data]") or _lists_expressions(lines[:2]))
+
+
+def _lists_expressions(lines: list[str]) -> bool:
+    """Whether lines begin as a table of expressions."""
+    body = lines[1:] if _VALUES.fullmatch(lines[0]) else lines[:1]
+    return any(_EXPRESSION.fullmatch(line) for line in body)
 
 
 def _heading(text: str) -> Column:
@@ -57,15 +87,16 @@ def _heading(text: str) -> Column:
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a CSV of CFD-Post."""
     source = load_text(path)
+    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
+    lines = [(k, text) for k, text in lines if not text.startswith("#")]
+    if lines and _lists_expressions([text for _, text in lines[:2]]):
+        return _expressions(source, lines)
     data: list[tuple[str, list[ExportRow]]] = []
     section, name = "", ""
     skipped: set[str] = set()
     mark = ","
-    for line, raw in enumerate(source.lines, 1):
-        text = raw.strip()
+    for line, text in lines:
         match = _SECTION.fullmatch(text.rstrip(",;"))
-        if not text or text.startswith("#"):
-            continue
         if match and match[1] in ("Name", "Data", "Lines", "Faces", "Spatial Fields", "Parameters"):
             section = match[1]
             if section == "Data":
@@ -79,9 +110,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         elif section:
             skipped.add(section)
         else:
-            raise InputError(Fault(source.name, str(line), repr(text[:60]), "[Name] or [Data]", "Is the head cut?"))
+            source.refuse(line, repr(text[:60]), "[Name] or [Data]", "Is the head cut?")
     if not any(rows for _, rows in data):
-        raise InputError(Fault(source.name, "", "no data", "a section [Data] with headings and rows"))
+        source.refuse("", "no data", "a section [Data] with headings and rows")
     notes = [f"section {', '.join(sorted(skipped))} not read"] if skipped else []
     records = [(block, _block(source, rows, mark != ",")) for block, rows in data if rows]
     if len(records) == 1:
@@ -92,20 +123,36 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         label = block if [b for b, _ in records].count(block) == 1 else f"{block} {k + 1}"
         channels |= {f"{key}({label})": channel for key, channel in channels_of(record).items()}
         notes += [f"{label}: {text}" for text in record.notes]
-    about = {"file": source.name, "sha256": source.sha256, "clock": "none"}
-    return dataset(KIND, "cfd", channels, notes, about)
+    return dataset(KIND, "cfd", channels, notes, {**source.about, "clock": "none"})
+
+
+def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
+    """Values of expressions, one a line."""
+    found: list[tuple[Column, float]] = []
+    for line, text in lines[1:] if _VALUES.fullmatch(lines[0][1]) else lines:
+        match = _EXPRESSION.fullmatch(text)
+        value = number(match[2]) if match else None
+        if match is None or value is None:
+            source.add(line, repr(text[:60]), "an expression, its value and unit, such as Thrust, 2.61 [N]")
+        else:
+            unit = si_unit(match[3]) or match[3].strip()
+            found.append((_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]), value))
+    source.check()
+    columns = [column for column, _ in found]
+    channels = {
+        name: Channel(np.array([value]), column.unit, Mean(value, "one value of an expression"))
+        for name, (column, value) in zip(unique([c.name for c in columns]), found, strict=True)
+    }
+    return dataset(KIND, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
 
 
 def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
     columns = [_heading(cell) for cell in rows[0].cells]
     if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
         got = f"numbers ({', '.join(rows[0].cells[:4])})"
-        raise InputError(Fault(source.name, str(rows[0].line), got, "headings such as X [ m ]", "Is the head cut?"))
+        source.refuse(rows[0].line, got, "headings such as X [ m ]", "Is the head cut?")
     body = [row for row in rows[1:] if row.cells != rows[0].cells]
     table = numeric_table(source, columns, body, commas=commas)
     notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
-    bare = [c.name for c in columns if not c.unit]
-    if bare:
-        notes.append(f"no unit stated for {', '.join(bare[:6])}")
     build = history if columns[0].role == "time" else fields
-    return build(KIND, source, columns, table, notes)
+    return build(KIND, source, columns, table, [*notes, *no_units(columns)])

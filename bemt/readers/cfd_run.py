@@ -6,27 +6,18 @@ returns the checked document; `bemt.recordings.cfd_run` makes the points of it.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from bemt.base.toml import Table, entry, read_model
 from bemt.readers import head_text
 from bemt.readers._cfd import unit_of
 
 __all__ = [
-    "KIND",
-    "QUANTITIES",
-    "ReferenceTable",
-    "RunColumn",
-    "RunColumns",
-    "RunHead",
-    "RunToml",
-    "SetupTable",
-    "toml_text",
-]
+    "KIND", "QUANTITIES", "ReferenceTable", "RunColumn", "RunColumns", "RunHead", "RunToml", "SetupTable", "toml_text",
+]  # fmt: skip
 
 KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {
@@ -70,12 +61,8 @@ class RunColumns(Table):
             dimension, usual = QUANTITIES[name]
             if unit is not None and unit.dimension != dimension:
                 hint = f"{unit.suffix} is a mass: write {unit.suffix}f" if unit.dimension == "mass" else ""
-                yield (
-                    f"{name}.unit",
-                    repr(column.unit),
-                    f"a unit of {dimension.replace('_', ' ')} such as {usual}",
-                    hint,
-                )
+                expected = f"a unit of {dimension.replace('_', ' ')} such as {usual}"
+                yield f"{name}.unit", repr(column.unit), expected, hint
 
 
 class RunHead(Table):
@@ -151,21 +138,11 @@ def toml_text(run: RunToml, comment: str = "") -> str:
     files = ["t.out"]
     rpm = 6000.0
     """
-    blocks = [f"# {line}" for line in comment.splitlines()]
-    for name, table in run.given().items():
-        lines = []
-        for key, value in table.given().items():
-            if isinstance(value, Table):
-                inner = ", ".join(f"{k} = {_value(v)}" for k, v in value.given().items() if v is not None)
-                lines.append(f"{key} = {{ {inner} }}")
-            elif value is not None:
-                lines.append(f"{key} = {_value(value)}")
-        if lines:
-            blocks += ["", f"[{name}]", *lines]
-    return "\n".join(blocks).lstrip("\n") + "\n"
+    import tomlkit
 
-
-def _value(value: Any) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool)) else repr(value)
+    head = "".join(f"# {line}\n" for line in comment.splitlines()) + ("\n" if comment else "")
+    tables = run.model_dump(exclude_unset=True, exclude_none=True)
+    for name, column in tables.get("columns", {}).items():
+        tables["columns"][name] = tomlkit.inline_table()
+        tables["columns"][name].update(column)
+    return head + tomlkit.dumps({name: table for name, table in tables.items() if table})

@@ -15,24 +15,18 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text
+from bemt.readers import first_cells
 from bemt.readers._columns import Channel
-from bemt.readers._headings import Heading
+from bemt.readers._headings import known
 from bemt.readers._recording import Builder
-from bemt.readers._split import split_table
 
 KIND = "coaxial_stand"
 _SIDES = ("left", "right")
 _COLUMNS = {
-    "PWM": ("pulse_width", "us"),
-    "Thrust": ("thrust", "gf"),
-    "Torque": ("torque", "Nm"),
-    "Voltage": ("voltage", "V"),
-    "Current": ("current", "A"),
-    "Speed": ("", "rpm"),
-}
+    "PWM": ("pulse_width", "us"), "Thrust": ("thrust", "gf"), "Torque": ("torque", "Nm"), "Voltage": ("voltage", "V"),
+    "Current": ("current", "A"), "Speed": ("", "rpm"),
+}  # fmt: skip
 _HEAD = re.compile(r"(PWM|Thrust|Torque|Voltage|Current|Speed) (Left|Right)(?: \[[^\]]*\])?")
 _DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
 
@@ -43,43 +37,32 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
     True
     """
-    text = head_text(head)
-    cells = [c.strip() for c in text.splitlines()[0].split(",")] if text.strip() else []
-    found = {m.groups() for c in cells if (m := _HEAD.fullmatch(c))}
+    found = {m.groups() for c in first_cells(head) if (m := _HEAD.fullmatch(c))}
     return {(what, side) for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")} <= found
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
-    source = load_text(path)
-    table = split_table(source, header=True)
-    build = Builder(table, KIND)
-    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
-    build.faults += [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
-    for k, text in enumerate(table.headings):
-        found = _HEAD.fullmatch(text.strip())
-        if found:
+    build = Builder.of_stand(path, KIND)
+    for k, text in enumerate(build.table.headings):
+        if found := _HEAD.fullmatch(text.strip()):
             name, unit = _COLUMNS[found[1]]
-            u = units.UNITS[unit]
-            end = "rpm" if unit == "rpm" else units.suffixes(u.dimension)[0]
-            parts = [name, found[2].lower(), end]
-            build.add(k, Heading(text, "_".join(p for p in parts if p), u))
+            build.add(k, known(text, f"{name}_{found[2].lower()}".lstrip("_"), unit))
         elif text.strip() == "Time [s]":
-            build.add(k, Heading(text, "time_s", units.UNITS["s"]))
+            build.add(k, known(text, "time", "s"))
     needed = [f"{k}_{side}_{unit}" for k, unit in (("pulse_width", "s"), ("thrust", "N")) for side in _SIDES]
-    empty = [name for name in (*needed, *(f"{side}_rpm" for side in _SIDES)) if name not in build.channels]
-    build.faults += [Fault(source.name, name, "an empty column", "numbers") for name in empty]
-    if build.faults:
-        raise InputError(build.faults)
+    for name in (*needed, *(f"{side}_rpm" for side in _SIDES)):
+        if name not in build.channels:
+            build.fault(name, "an empty column", "numbers")
+    build.check()
     _tare_row(build)
     for side in _SIDES:
         _turned_positive(build, side)
-    turned = [s for s in _SIDES if np.nan_to_num(build.channels[f"{s}_rpm"].values).max(initial=0.0) > 0.0]
+    left, right = (build.channels[f"{s}_rpm"].values for s in _SIDES)
+    turned = [s for s, v in zip(_SIDES, (left, right), strict=True) if np.nan_to_num(v).max(initial=0.0) > 0.0]
     if len(turned) == 2:
-        left, right = (build.channels[f"{s}_rpm"].values for s in _SIDES)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(left > 0.0, right / left, np.nan)
-        build.channels["speed_ratio"] = Channel(ratio, "-")
+            build.channels["speed_ratio"] = Channel(np.where(left > 0.0, right / left, np.nan), "-")
     if len(turned) == 1:
         _plain(build, turned[0])
         build.warnings.append(f"only the {turned[0]} rotor turned: its columns have the plain names")
@@ -88,7 +71,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     build.warnings.append("air density is not in the file")
     build.flag_time()
     build.check_magnitudes()
-    told = _DIAMETER.search(Path(source.name).name)
+    told = _DIAMETER.search(Path(build.table.source.name).name)
     constants = {"diameter_m": float(told[1]) * units.INCH} if told else None
     return build.finish({"stand": "New Dexterity coaxial platform"}, constants=constants)
 
@@ -98,7 +81,7 @@ def _tare_row(build: Builder) -> None:
     pulses = [build.channels[f"pulse_width_{s}_s"].values for s in _SIDES]
     if not all(p.size > 2 and p[0] <= 1.0005e-3 for p in pulses):
         return
-    for name, channel in list(build.channels.items()):
+    for name, channel in build.channels.items():
         if name.startswith(("thrust_", "torque_")) or name.endswith("_rpm"):
             values = channel.values.copy()
             values[0] = np.nan
@@ -109,9 +92,9 @@ def _tare_row(build: Builder) -> None:
 def _turned_positive(build: Builder, side: str) -> None:
     """Torque of the sense in which a rotor turned, positive."""
     name = f"torque_{side}_Nm"
-    channel = build.channels.get(name)
-    if channel is not None and np.nansum(channel.values) < 0.0:
-        build.channels[name] = Channel(-channel.values, channel.unit)
+    values = build.at(name)
+    if values is not None and np.nansum(values) < 0.0:
+        build.channels[name] = Channel(-values, build.channels[name].unit)
         build.warnings.append(f"{name}: the sign, which is the sense of rotation here, was turned")
 
 
@@ -121,10 +104,6 @@ def _plain(build: Builder, side: str) -> None:
     for name in list(build.channels):
         parts = name.split("_")
         if other in parts:
-            del build.channels[name]
-            build.headings.pop(name, None)
+            del build.channels[name], build.headings[name]
         elif side in parts:
-            new = "_".join(p for p in parts if p != side)
-            build.channels[new] = build.channels.pop(name)
-            if name in build.headings:
-                build.headings[new] = build.headings.pop(name)
+            build.rename(name, "_".join(p for p in parts if p != side))

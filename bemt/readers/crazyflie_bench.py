@@ -9,24 +9,26 @@ goes with the square.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text
+from bemt.readers import first_cells
 from bemt.readers._columns import Channel
-from bemt.readers._headings import Heading
+from bemt.readers._headings import known
 from bemt.readers._recording import Builder
-from bemt.readers._split import split_table
 
 KIND = "crazyflie_bench"
 FULL = 65535.0
 """Largest command. [counts]"""
-_LOADS = ("weight", "weight[g]", "thrust[g]")
-_SPEEDS = ("rpm1", "rpm2", "rpm3", "rpm4")
-_MORE = {"vbat[V]": ("voltage", "V"), "v[V]": ("supply_voltage", "V"), "i[A]": ("supply_current", "A")}
+_COLUMNS = {
+    "pwm": ("throttle", "-"), "vbat[V]": ("voltage", "V"), "v[V]": ("supply_voltage", "V"),
+    "i[A]": ("supply_current", "A"), "p[W]": ("supply_power", "W"), "weight": ("total_thrust", "gf"),
+    "weight[g]": ("total_thrust", "gf"), "thrust[g]": ("total_thrust", "gf"),
+} | {f"rpm{k}": (str(k), "rpm") for k in (1, 2, 3, 4)}  # fmt: skip
+_SPEEDS = ("1_rpm", "2_rpm", "3_rpm", "4_rpm")
 
 
 def sniff(head: bytes | str) -> bool:
@@ -35,43 +37,26 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n"), sniff("pwm,rpm,thrust[g]\n")
     (True, False)
     """
-    text = head_text(head)
-    cells = {c.strip() for c in text.splitlines()[0].split(",")} if text.strip() else set()
-    return {"pwm", *_SPEEDS} <= cells and bool(cells & set(_LOADS))
+    cells = first_cells(head)
+    return {"pwm", "rpm1", "rpm2", "rpm3", "rpm4"} <= cells and bool({"weight", "weight[g]", "thrust[g]"} & cells)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
-    source = load_text(path)
-    table = split_table(source, header=True)
-    build = Builder(table, KIND)
-    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
-    build.faults += [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
-    for k, text in enumerate(h.strip() for h in table.headings):
-        if text in _SPEEDS:
-            build.add(k, Heading(text, f"{text[-1]}_rpm", units.UNITS["rpm"]))
-        elif text in _LOADS:
-            build.add(k, Heading(text, "total_thrust_N", units.UNITS["gf"]))
-        elif text == "p[W]":
-            build.add(k, Heading(text, "supply_power_W", units.UNITS["W"]))
-        elif text in _MORE:
-            name, unit = _MORE[text]
-            build.add(k, Heading(text, f"{name}_{unit}", units.UNITS[unit]))
-        elif text == "pwm":
-            build.add(k, Heading(text, "throttle", units.Unit("", "none", 1.0 / FULL)))
-    missing = [n for n in ("total_thrust_N", "throttle", *(f"{k}_rpm" for k in "1234")) if n not in build.channels]
-    build.faults += [Fault(source.name, "1", f"no numbers for {n}", "a column of numbers") for n in missing]
-    if build.faults:
-        raise InputError(build.faults)
-    speeds = np.array([build.channels.pop(f"{k}_rpm").values for k in "1234"])
-    total = build.channels.pop("total_thrust_N").values
+    build = Builder.of_stand(path, KIND)
+    for k, text in enumerate(h.strip() for h in build.table.headings):
+        if text in _COLUMNS:
+            head = known(text, *_COLUMNS[text])
+            build.add(k, replace(head, unit=units.Unit("", "none", 1.0 / FULL)) if text == "pwm" else head)
+    build.need("total_thrust_N", "throttle", *_SPEEDS)
+    build.check()
+    speeds = np.array([build.channels.pop(name).values for name in _SPEEDS])
     build.channels["rpm"] = Channel(np.sqrt(np.mean(speeds**2, axis=0)), "rpm")
-    build.channels["thrust_N"] = Channel(total / 4.0, "N")
-    power = build.channels.pop("supply_power_W", None)
-    if power is not None:
+    build.channels["thrust_N"] = Channel(build.channels.pop("total_thrust_N").values / 4.0, "N")
+    if (power := build.channels.pop("supply_power_W", None)) is not None:
         build.channels["electrical_power_W"] = Channel(power.values / 4.0, "W")
     build.headings = {k: v for k, v in build.headings.items() if k in build.channels}
-    build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
+    build.flag_speeds("rpm")
     with np.errstate(invalid="ignore"):
         spread = np.ptp(speeds, axis=0) > 0.25 * np.maximum(speeds.max(axis=0), 1.0)
     build.flag(np.flatnonzero(spread), "speeds of the four propellers differ by more than a quarter")

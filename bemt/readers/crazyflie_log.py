@@ -13,14 +13,14 @@ import os
 import re
 import struct
 import zlib
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.toml_text import Collector
 from bemt.base.units import G0
 from bemt.dataset import Dataset
+from bemt.readers import load_bytes
 from bemt.readers._columns import Channel, dataset
 
 KIND = "crazyflie_log"
@@ -28,18 +28,12 @@ MAGIC = 0xBC
 _TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}
 _LETTERS = "bBhHiIlLqQefd"
 _UNITS = {
-    "stateEstimate.x": ("x_m", 1.0),
-    "stateEstimate.y": ("y_m", 1.0),
-    "stateEstimate.z": ("height_m", 1.0),
-    "stateEstimate.vx": ("velocity_x_m_s", 1.0),
-    "stateEstimate.vy": ("velocity_y_m_s", 1.0),
-    "stateEstimate.vz": ("velocity_z_m_s", 1.0),
-    "acc.x": ("acceleration_x_m_s2", G0),
-    "acc.y": ("acceleration_y_m_s2", G0),
-    "acc.z": ("acceleration_z_m_s2", G0),
-    "pm.vbatMV": ("voltage_V", 1e-3),
+    "stateEstimate.x": ("x_m", 1.0), "stateEstimate.y": ("y_m", 1.0), "stateEstimate.z": ("height_m", 1.0),
+    "stateEstimate.vx": ("velocity_x_m_s", 1.0), "stateEstimate.vy": ("velocity_y_m_s", 1.0),
+    "stateEstimate.vz": ("velocity_z_m_s", 1.0), "acc.x": ("acceleration_x_m_s2", G0),
+    "acc.y": ("acceleration_y_m_s2", G0), "acc.z": ("acceleration_z_m_s2", G0), "pm.vbatMV": ("voltage_V", 1e-3),
     "pm.vbat": ("voltage_V", 1.0),
-}
+}  # fmt: skip
 _SPEED, _COMMAND = re.compile(r"rpm\.m[1-4]"), re.compile(r"pwm\.m[1-4]_pwm|motor\.m[1-4]")
 
 
@@ -53,23 +47,19 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a log."""
-    name = os.fspath(path)
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(Fault(name, "", error.strerror or str(error), "a readable file", "Check the path")) from error
+    data, log = load_bytes(path), Collector(os.fspath(path))
     if not sniff(data):
-        raise InputError(Fault(name, "", "other first bytes", "a Crazyflie log, which begins with 0xBC"))
+        log.refuse("", "other first bytes", "a Crazyflie log, which begins with 0xBC")
     if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
-        raise InputError(Fault(name, "", "a wrong checksum", "the CRC32 of all bytes before it", "Copy the file again"))
+        log.refuse("", "a wrong checksum", "the CRC32 of all bytes before it", "Copy the file again")
     try:
         tables, _ = log_tables(data[:-4])
     except (struct.error, KeyError, ValueError, UnicodeDecodeError) as error:
-        raise InputError(Fault(name, "", f"a damaged log ({error})", "whole records", "Copy the file again")) from error
+        log.refuse("", f"a damaged log ({error})", "whole records", "Copy the file again")
     tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
     if not tables:
-        raise InputError(Fault(name, "", "no records", "two or more"))
-    return _made(name, hashlib.sha256(data).hexdigest(), tables)
+        log.refuse("", "no records", "two or more")
+    return _made(log.file, hashlib.sha256(data).hexdigest(), tables)
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:

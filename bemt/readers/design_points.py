@@ -16,10 +16,9 @@ from __future__ import annotations
 import os
 import re
 
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import load_text
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table, si_unit, unique
+from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, no_units, numeric_table, si_unit, unique
 from bemt.readers._columns import Channel, dataset
 
 KIND = "design_points"
@@ -49,9 +48,8 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
         if text.startswith("#"):
-            for part in text.lstrip("# ").split(","):
-                if match := _PARAMETER.fullmatch(part):
-                    told[match[1]] = (match[2], match[3] or "")
+            found = map(_PARAMETER.fullmatch, text.lstrip("# ").split(","))
+            told |= {m[1]: (m[2], m[3] or "") for m in found if m}
         elif text and not names:
             mark = ";" if ";" in text and "," not in text else ","
             names = cells_of(text, mark)[1:]
@@ -60,18 +58,12 @@ def read(path: str | os.PathLike[str]) -> Dataset:
             labels.append(label)
             rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
     if not names:
-        raise InputError(Fault(source.name, "", "no header", "a line such as Name,P1,P2"))
-    columns = []
-    for name in names:
-        words, unit = told.get(name, (name, ""))
-        columns.append(Column(words, si_unit(unit) or unit))
+        source.refuse("", "no header", "a line such as Name,P1,P2")
+    columns = [Column(words, si_unit(unit) or unit) for words, unit in (told.get(n, (n, "")) for n in names)]
     table = numeric_table(source, columns, rows, mark != ",")
     keys = unique([c.name for c in columns])
-    channels = {key: Channel(table.values[:, k], c.unit) for k, (key, c) in enumerate(zip(keys, columns, strict=True))}
-    notes = [*table.warnings]
-    bare = [c.name for c in columns if not c.unit]
-    if bare:
-        notes.append(f"no unit stated for {', '.join(bare[:6])}")
-    about = {"file": source.name, "sha256": source.sha256, "clock": "none"}
+    channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
     texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
+    about = {**source.about, "clock": "none"}
+    notes = (*table.warnings, *no_units(columns))
     return dataset(KIND, "cfd", channels, notes, about, lines=table.lines, texts=texts)

@@ -45,7 +45,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         rows.at = words.index("AERO") + 1
         sections = [read_section(rows) for _ in range(whole(rows.take(1, "#sections")[0]))]
     else:
-        rows.fault("AERO", "nothing", "sections of the blade")
+        rows.add("AERO", "nothing", "sections of the blade")
     rows.at = words.index("ROTOR") + 1
     if words.count("ROTOR") > 1:
         notes.append("the file has several rotors: the first is read")
@@ -53,7 +53,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     n = whole(rows.take(1, "#stations")[0])
     body = rows.table(n, 3, "r chord beta")
     if len(body) < n:
-        rows.fault("ROTOR", f"{len(body)} stations", f"{n}")
+        rows.add("ROTOR", f"{len(body)} stations", f"{n}")
     rows.check()
     r, c, b = body.T
     hub, tip, duct = _walls(rows, words, x_disk)

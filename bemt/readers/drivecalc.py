@@ -11,13 +11,13 @@ Motor points (``id,motor_id,motor,...,U_V,n_rpm,I_A,...``) name most units in th
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
-from bemt.base import units
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text
-from bemt.readers._headings import Heading, heading
+from bemt.readers import first_cells, load_text
+from bemt.readers._headings import heading, known
 from bemt.readers._recording import Builder
 from bemt.readers._split import split_table
 
@@ -25,10 +25,10 @@ KIND = "drivecalc"
 _PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}
 _POINTS = {"motor_id", "motor", "kV", "Rm", "U_V", "n_rpm", "I_A", "no_load"}
 _KNOWN = {
-    "Dia": ("diameter_m", "in"), "Pitch": ("pitch_m", "in"), "a": ("thrust_law_N", "gf"), "c": ("power_law_W", "W"),
-    "AltThr": ("thrust_altitude_m", "m"), "TmpThr": ("thrust_temperature_K", "C"), "MaxRPM": ("max_rpm", "rpm"),
-    "AltPwr": ("power_altitude_m", "m"), "TmpPwr": ("power_temperature_K", "C"), "n10N": ("at_10_N_rpm", "rpm"),
-    "n100W": ("at_100_W_rpm", "rpm"), "b": ("thrust_exponent", ""), "d": ("power_exponent", ""),
+    "Dia": ("diameter", "in"), "Pitch": ("pitch", "in"), "a": ("thrust_law", "gf"), "c": ("power_law", "W"),
+    "AltThr": ("thrust_altitude", "m"), "TmpThr": ("thrust_temperature", "C"), "MaxRPM": ("max", "rpm"),
+    "AltPwr": ("power_altitude", "m"), "TmpPwr": ("power_temperature", "C"), "n10N": ("at_10_N", "rpm"),
+    "n100W": ("at_100_W", "rpm"), "b": ("thrust_exponent", "-"), "d": ("power_exponent", "-"),
 }  # fmt: skip
 
 
@@ -38,34 +38,25 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff("Name,Dia,Pitch\n")
     (True, False)
     """
-    text = head_text(head)
-    cells = {c.strip() for c in text.splitlines()[0].split(",")} if text.strip() else set()
+    cells = first_cells(head)
     return cells >= _PROPELLERS or cells >= _POINTS
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one of the two tables."""
-    source = load_text(path)
-    table = split_table(source, header=True)
-    build = Builder(table, KIND, kind="table")
-    propellers = set(table.headings) >= _PROPELLERS
-    for k, text in enumerate(table.headings):
-        build.add(k, _heading(text) if propellers else heading(text))
+    build = Builder(split_table(load_text(path), header=True), KIND, kind="table")
+    propellers = set(build.table.headings) >= _PROPELLERS
+    for k, text in enumerate(build.table.headings):
+        own = known(text, *_KNOWN[text]) if text in _KNOWN else replace(heading(text), unit=None, doubt="", told="")
+        build.add(k, own if propellers else heading(text))
     if propellers and not build.faults:
         _check(build, "thrust_law_N", "thrust_exponent", "at_10_N_rpm", 10.0)
         _check(build, "power_law_W", "power_exponent", "at_100_W_rpm", 100.0)
         build.warnings.append("power laws fitted to measurements of others (columns srcThr, srcPwr), no measurements")
     elif not build.faults:
         build.warnings.append("kV [(rev/min)/V] and Rm [ohm] carry no unit in this table")
-        build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0) if "rpm" in build.channels else [], "rpm is 0")
+        build.flag_speeds("rpm")
     return build.finish({"program": "Drive Calculator", "form": "propellers" if propellers else "motor points"})
-
-
-def _heading(text: str) -> Heading:
-    if text not in _KNOWN:
-        return Heading(text, heading(text).name, None)
-    name, suffix = _KNOWN[text]
-    return Heading(text, name, units.UNITS[suffix] if suffix else units.Unit("", "none", 1.0))
 
 
 def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> None:

@@ -11,24 +11,11 @@ on the reference area, lengths and velocity of the case, which the file does not
 
 from __future__ import annotations
 
-import os
-
-from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, cells_of, head_lines
-from bemt.readers._cfd_record import Layout, outermost, read_history
+from bemt.readers._cfd import Column, Layout, cells_of, outermost
 
 KIND = "flow360_forces"
 
 _STEPS = ("physical_step", "pseudo_step")
-
-
-def sniff(head: bytes | str) -> bool:
-    r"""Tell whether the first line names physical and pseudo steps.
-
-    >>> sniff("physical_step, pseudo_step, CL, CD\n0, 0, 1, 2"), sniff("step,CL\n0,1")
-    (True, False)
-    """
-    return any(_names(line) is not None for line in head_lines(head, 1))
 
 
 def _names(line: str) -> tuple[str, ...] | None:
@@ -41,8 +28,4 @@ _LAYOUT = Layout(
     lambda name: Column(name or "unnamed", "", "counter" if name in _STEPS else "value"),
     notes=("coefficients rest on reference values that the file does not state",), commas=False, finish=outermost,
 )  # fmt: skip
-
-
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read a history."""
-    return read_history(path, _LAYOUT)
+sniff, read = _LAYOUT.sniff, _LAYOUT.read

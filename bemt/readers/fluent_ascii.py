@@ -12,13 +12,10 @@ are values at points, which carry no areas: forces cannot be summed from them.
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import load_text
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, numeric_table
-from bemt.readers._cfd_record import fields
+from bemt.readers._cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
 
 KIND = "fluent_ascii"
 
@@ -31,25 +28,22 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
     (True, False)
     """
-    lines = head_lines(head, 1)
-    return bool(lines) and lines[0].lower().lstrip('"').startswith(_FIRST)
+    return any(line.lower().lstrip('"').startswith(_FIRST) for line in head_lines(head, 1))
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read an ASCII export."""
     source = load_text(path)
     lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
-    if not lines or not lines[0][1].lower().lstrip('"').startswith(_FIRST):
+    if not lines or not sniff(lines[0][1]):
         got = repr(lines[0][1][:60]) if lines else "no text"
-        raise InputError(Fault(source.name, "1", got, "a header that begins with nodenumber or cellnumber"))
+        source.refuse(1, got, "a header that begins with nodenumber or cellnumber")
     mark = next((m for m in (",", ";") if m in lines[0][1]), None)
     names = cells_of(lines[0][1], mark)
-    columns = [Column(name or "unnamed") for name in names]
-    columns[0] = replace(columns[0], role="index")
+    columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
     rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
-    repeated = sum(row.cells == names for row in rows)
     body = [row for row in rows if row.cells != names]
     table = numeric_table(source, columns, body, commas=mark != ",")
+    repeated = len(rows) - len(body)
     notes = [f"header repeated {repeated} times: several surfaces in one file"] if repeated else []
-    notes.append("no units stated (Fluent exports SI)")
-    return fields(KIND, source, columns, table, notes)
+    return fields(KIND, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])

@@ -109,7 +109,7 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
             continue
         names = _names(match[1], match[2], lines[ahead[0] - 1] if ahead[0] - 1 > k else "", lines[ahead[0]])
         if isinstance(names, str):
-            yield k + 1, [], [], [Fault(source.name, str(ahead[0] + 1), names, "a header of a force report")]
+            yield k + 1, [], [], [source.fault(ahead[0] + 1, names, "a header of a force report")]
             k = ahead[0] + 1
             continue
         start, k = k, ahead[0] + 1
@@ -128,7 +128,7 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
                 shape = shape or (sizes if sizes in right else set())
                 if len(vectors) != len(names) or None in vectors or sizes not in right or sizes != shape or cut:
                     got = f"{len(vectors)} columns, or text among them" + (" (no line end: cut?)" if cut else "")
-                    faults.append(Fault(source.name, str(k + 1), got, f"a zone and {len(names)} numbers or vectors"))
+                    faults.append(source.fault(k + 1, got, f"a zone and {len(names)} numbers or vectors"))
                 else:
                     entries += _entries(cells[0], names, [v for v in vectors if v is not None])
             k += 1
@@ -195,9 +195,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         faults += bad
         zones |= {(line, entry.zone) for entry in found}
     if not entries or len(faults) > max(1, 0.1 * len(zones)):
-        raise InputError(faults[:6] or [Fault(source.name, "", "no table of zones", "a Fluent force report")])
+        raise InputError(faults[:6] or [source.fault("", "no table of zones", "a Fluent force report")])
     notes += [f"line {f.where}: got {f.got}; row left out" for f in faults]
     notes.append("choose the zones that count: Net holds all that were selected in the report")
     titles = [text.strip() for text in source.lines if _TITLE.fullmatch(text.strip())]
-    about = {"file": source.name, "sha256": source.sha256, "tables": "; ".join(titles), "clock": "none"}
+    about = {**source.about, "tables": "; ".join(titles), "clock": "none"}
     return dataset(KIND, "cfd", _channels(entries), notes, about)

@@ -9,12 +9,9 @@ r"""Old Fluent monitors (``cd-1-history``): a title, a line of quoted names, row
 
 from __future__ import annotations
 
-import os
 import re
 
-from bemt.dataset import Dataset
-from bemt.readers._cfd import head_lines
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Layout, head_lines
 from bemt.readers.fluent_report import column_of
 
 KIND = "fluent_monitor"
@@ -44,8 +41,4 @@ _LAYOUT = Layout(
     lambda line: tuple(line.split()), column_of, lambda line: _TITLE.fullmatch(line) is not None,
     ("monitors state no units, reference values, sector or sign convention: check them",),
 )  # fmt: skip
-
-
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read a monitor."""
-    return read_history(path, _LAYOUT)
+read = _LAYOUT.read

@@ -15,12 +15,9 @@ that of the file.
 
 from __future__ import annotations
 
-import os
 import re
 
-from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, ExportTable, head_lines, si_unit
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Column, ExportTable, Layout, head_lines, si_unit
 
 KIND = "fluent_report"
 
@@ -75,8 +72,4 @@ _LAYOUT = Layout(
     lambda line: tuple(line.split()), column_of, lambda line: line.startswith('"'),
     hint="Line 3 of a report file lists all names; line 2 is abbreviated", finish=_checked,
 )  # fmt: skip
-
-
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read a report file."""
-    return read_history(path, _LAYOUT)
+read = _LAYOUT.read

@@ -23,7 +23,6 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from bemt.base.averaging import Mean, keep_last
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text, number
 from bemt.readers._cfd import head_lines, si_unit, slug
@@ -156,9 +155,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         if max(values) != min(values):
             notes.append(f"{name}: computed {len(values)} times with different values; the last one holds")
     if not channels:
-        raise InputError(Fault(source.name, "", "no residuals, flow times or computed values", "a Fluent transcript"))
+        source.refuse("", "no residuals, flow times or computed values", "a Fluent transcript")
     notes += _remarks(source)
-    about = {"file": source.name, "sha256": source.sha256, "clock": "none"}
+    about = {**source.about, "clock": "none"}
     version = re.search(r"Welcome to (ANSYS Fluent[^\r\n]*)", source.text)
     cells = re.findall(r"^\s*(\d+)\s+(?:\w+ )?cells,", source.text, re.MULTILINE)
     if version:

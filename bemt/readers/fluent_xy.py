@@ -16,11 +16,9 @@ import os
 import re
 from dataclasses import replace
 
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text
-from bemt.readers._cfd import Column, ExportRow, head_lines, numeric_table, unique
-from bemt.readers._cfd_record import history
+from bemt.readers._cfd import Column, ExportRow, head_lines, history, numeric_table, unique
 from bemt.readers._columns import Channel, channels_of, dataset
 from bemt.readers.fluent_report import column_of
 
@@ -65,12 +63,12 @@ def read(path: str | os.PathLike[str]) -> Dataset:
             closed = True
         elif closed:
             expected = '(labels "x" "y") and lists that begin with ((xy/key/label "zone")'
-            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the file damaged?"))
+            source.refuse(line, repr(text[:60]), expected, "Is the file damaged?")
         else:
             zones[-1][1].append(ExportRow(line, tuple(text.split())))
     if not labels or not zones:
         got = "no (labels ...)" if not labels else "no list of points"
-        raise InputError(Fault(source.name, "", got, 'labels and a list ((xy/key/label "zone") ... )'))
+        source.refuse("", got, 'labels and a list ((xy/key/label "zone") ... )')
     return _record(source, title, labels, zones, closed)
 
 
@@ -109,10 +107,10 @@ def _record(
                 channels[f"{key}({name})"] = Channel(table.values[:, k], columns[k].unit)
         notes += [f"{name}: {text}" for text in (record.notes if counts else table.warnings)]
     if not channels:
-        raise InputError(Fault(source.name, "", "no points", "one pair of numbers or more"))
+        source.refuse("", "no points", "one pair of numbers or more")
     if not counts:
         notes.append("a curve over a position or frequency: no mean is taken")
-    about = {"file": source.name, "sha256": source.sha256, "title": title, "clock": "none"}
+    about = {**source.about, "title": title, "clock": "none"}
     if counts:
         about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
         if columns[0].role == "time" and len(clocks) == 1:

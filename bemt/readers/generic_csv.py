@@ -22,7 +22,7 @@ from bemt.dataset import Dataset
 from bemt.readers import head_text, load_text, number
 from bemt.readers._headings import Heading, heading, slug
 from bemt.readers._large import NumberTable, large_table
-from bemt.readers._recording import Builder, spikes
+from bemt.readers._recording import Builder
 from bemt.readers._split import SplitTable, decimal_mark, find_start, heading_cells, is_comment, split_line, split_table
 from bemt.readers._words import NEUTRAL, english
 
@@ -109,15 +109,11 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         build.warnings.append("decimal commas read as decimal points")
     build.flag_time()
     speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
-    for name in speeds:
-        build.flag(np.flatnonzero(build.channels[name].values == 0.0), f"{name} is 0")
-        build.flag(np.flatnonzero(build.channels[name].values < 0.0), f"{name} is negative")
+    build.flag_speeds(*speeds)
     if "rpm" in speeds and np.nanmax(build.channels["rpm"].values, initial=0.0) > DOUBTFUL_RPM:
         build.warnings.append("rpm: the file does not say whether mechanical or electrical; taken as written")
     if "time_s" in build.channels:
-        for name, channel in build.channels.items():
-            if name != "time_s" and channel.unit not in ("", "-"):
-                build.flag(np.flatnonzero(spikes(channel.values)), f"spike of {name}")
+        build.flag_spikes(*(k for k, c in build.channels.items() if k != "time_s" and c.unit not in ("", "-")))
     _only_ones(build)
     if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
@@ -157,10 +153,8 @@ _ONLY = {  # channel: words that the heading of the only column in its unit may 
 
 _SHORT = {
     "thrust_N": ("T_N", "F_N", "force_N", "pull_N", "load_N", "load_cell_N", "loadcell_N"),
-    "torque_Nm": ("Q_Nm", "M_Nm"),
-    "voltage_V": ("U_V",),
-    "current_A": ("I_A",),
-}
+    "torque_Nm": ("Q_Nm", "M_Nm"), "voltage_V": ("U_V",), "current_A": ("I_A",),
+}  # fmt: skip
 """Names that recordings know for the quantity."""
 
 
@@ -175,9 +169,7 @@ def _only_ones(build: Builder) -> None:
         if name in same or not ours or any(k in build.channels for k in _SHORT.get(name, ())):
             continue
         if len(same) == 1:
-            label = build.headings.pop(ours[0])
-            build.channels = {name if k == ours[0] else k: c for k, c in build.channels.items()}
-            build.headings[name] = label
+            label = build.rename(ours[0], name)
             build.warnings.append(f"{label!r} is taken for the {name.rsplit('_', 1)[0]}: the only column in {unit}")
         else:
             quantity = name.rsplit("_", 1)[0]
@@ -197,8 +189,7 @@ def _electrical(build: Builder) -> None:
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.abs(have[name].values / product - 1.0)[product > 0.0]
     if off.size and np.nanmedian(off) < 0.01 and np.nanmax(off) < 0.05:
-        build.channels = {("electrical_power_W" if n == name else n): c for n, c in have.items()}
-        build.headings = {("electrical_power_W" if n == name else n): t for n, t in build.headings.items()}
+        build.rename(name, "electrical_power_W")
         build.warnings.append(f"{name} is voltage times current: electrical power, not that of the shaft")
 
 

@@ -20,25 +20,22 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.base import units
-from bemt.base.errors import Fault
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text
-from bemt.readers._headings import Heading, heading
-from bemt.readers._recording import Builder, slip, spikes
-from bemt.readers._split import split_table
+from bemt.readers import first_cells
+from bemt.readers._headings import Heading, heading, known, slug
+from bemt.readers._recording import Builder, slip
 
 KIND = "jmajew"
-_TABLE = ("out", "th", "th_err", "tq", "tq_err", "rpm", "rpm_err", "v", "v_err", "a", "a_err", "pin", "theff")
-_UNITS = {
+_COLUMNS = {
     "out": ("throttle", "pct"), "th": ("thrust", "gf"), "tq": ("torque", "gf_cm"), "rpm": ("", "rpm"),
-    "v": ("voltage", "V"), "a": ("current", "A"), "pin": ("electrical_power", "W"),
+    "v": ("voltage", "V"), "a": ("current", "A"), "pin": ("electrical_power", "W"), "theff": ("efficacy", "gf/W"),
 }  # fmt: skip
 _RAW = {
     "Motor Output": ("pulse_width", "us"), "Motor Level [%]": ("throttle", "pct"), "Thrust [G]": ("thrust", "gf"),
     "Torque [G cm]": ("torque", "gf_cm"), "RPM [1/min]": ("", "rpm"), "VoltBatt [V]": ("voltage", "V"),
     "CurrBatt [A]": ("current", "A"), "Power In [W]": ("electrical_power", "W"),
     "Power Out [W]": ("mechanical_power", "W"), "Efficiency [%]": ("motor_efficiency", "pct"),
+    "Thrust Efficiency [G/W]": ("efficacy", "gf/W"),
 }  # fmt: skip
 _RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust [G]", "Torque [G cm]"}
 
@@ -49,26 +46,20 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff("th,tq,rpm\n")
     (True, False)
     """
-    text = head_text(head)
-    cells = {c.strip() for c in text.splitlines()[0].split(",")} if text.strip() else set()
+    cells = first_cells(head)
     return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or cells >= _RAW_KEYS
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table or a raw record. ["form"]"""
-    source = load_text(path)
-    table = split_table(source, header=True)
-    raw = set(table.headings) >= _RAW_KEYS
-    build = Builder(table, KIND)
-    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
-    build.faults += [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
-    for k, text in enumerate(table.headings):
+    build = Builder.of_stand(path, KIND)
+    raw = set(build.table.headings) >= _RAW_KEYS
+    for k, text in enumerate(build.table.headings):
         build.add(k, _raw_heading(text) if raw else _table_heading(text))
     if not build.faults:
-        for name in ("thrust_N", "torque_Nm", "rpm"):
-            if name not in build.channels:
-                build.faults.append(Fault(source.name, "1", f"no numbers for {name}", "a column of numbers"))
-    said = {"stand": "thrust_tool (J. Majewski)", "form": "raw" if raw else "table", **_name(Path(source.name).stem)}
+        build.need("thrust_N", "torque_Nm", "rpm")
+    form = "raw" if raw else "table"
+    said = {"stand": "thrust_tool (J. Majewski)", "form": form, **_name(Path(build.table.source.name).stem)}
     if not build.faults:
         with np.errstate(over="ignore", invalid="ignore"):  # damaged cells may hold any number
             (_check_raw if raw else _check_table)(build)
@@ -81,24 +72,16 @@ def read(path: str | os.PathLike[str]) -> Dataset:
 
 def _table_heading(text: str) -> Heading:
     base = text.removesuffix("_err")
-    if base == "theff":
-        return Heading(text, "efficacy_N_W", heading("x (gf/W)").unit)
-    if base not in _UNITS:
+    if base not in _COLUMNS:
         return heading(text)
-    name, suffix = _UNITS[base]
-    err = "err" if text.endswith("_err") else ""
-    si = heading(f"{name or 'rpm'}_{suffix}" if suffix != "rpm" else "rpm")
-    tail = si.name.removeprefix(name).lstrip("_") if name else "rpm"
-    return Heading(text, "_".join(part for part in (name, err, tail) if part), units.UNITS[suffix])
+    name, unit = _COLUMNS[base]
+    return known(text, f"{name}_err".lstrip("_") if base != text and base != "theff" else name, unit)
 
 
 def _raw_heading(text: str) -> Heading:
-    if text == "Thrust Efficiency [G/W]":
-        return Heading(text, "efficacy_N_W", heading("x (gf/W)").unit)
     if text in _RAW:
-        name, suffix = _RAW[text]
-        return Heading(text, heading(f"{name}_{suffix}").name if name else "rpm", units.UNITS[suffix])
-    return Heading(text, re.sub(r"\W+", "_", text).strip("_"), None, "counts of a converter or telemetry")
+        return known(text, *_RAW[text])
+    return Heading(text, slug(text), None, "counts of a converter or telemetry")
 
 
 def _name(stem: str) -> dict[str, str]:
@@ -165,6 +148,5 @@ def _check_raw(build: Builder) -> None:
                 whole = f" of electrical speed over {round(pairs)} pole pairs" if near else ""
                 build.warnings.append(text + whole + ", not a separate sensor")
     build.warnings.append("no time in a raw record: rows are in order of sampling")
-    for name in ("thrust_N", "torque_Nm", "rpm"):
-        build.flag(np.flatnonzero(spikes(c[name])), f"spike of {name}")
+    build.flag_spikes("thrust_N", "torque_Nm", "rpm")
     build.flag(np.flatnonzero(c["thrust_N"] < 0.0), "thrust_N is negative")

@@ -25,11 +25,9 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base.averaging import Mean
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text
-from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, numeric_table
-from bemt.readers._cfd_record import history
+from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table
 from bemt.readers._columns import Channel, dataset
 
 KIND = "openfoam_forces"
@@ -97,8 +95,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
             elif match and match[1].strip():
                 found = " ".join(match[1].split())
                 if header is not None and found != header:
-                    got = "another header"
-                    raise InputError(Fault(source.name, str(line), got, "the first one", "Split the file there"))
+                    source.refuse(line, "another header", "the first one", "Split the file there")
                 repeated += header is not None
                 header = found
             elif setting:
@@ -107,17 +104,14 @@ def read(path: str | os.PathLike[str]) -> Dataset:
                 title = text.strip("# \t")
         elif text and header is None:
             expected = "a header such as # Time total_x total_y total_z"
-            raise InputError(Fault(source.name, str(line), repr(text[:60]), expected, "Is the header damaged?"))
+            source.refuse(line, repr(text[:60]), expected, "Is the header damaged?")
         elif text:
             rows.append((line, text))
     if header is None:
-        raise InputError(Fault(source.name, "", "no header", "a header such as # Time total_x total_y total_z"))
+        source.refuse("", "no header", "a header such as # Time total_x total_y total_z")
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
-        got, hint = (
-            "forces in bins along a direction",
-            "Their sum is in the forces (or force and moment) file in the same folder",
-        )
-        raise InputError(Fault(source.name, "", got, "forces of the whole", hint))
+        hint = "Their sum is in the forces (or force and moment) file in the same folder"
+        source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
     notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
     if header.split()[0] == "patch":
         return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)
@@ -229,8 +223,8 @@ def _by_patch(
             mean = Mean(float(values[-1]), "last row") if np.isfinite(values[-1]) else None
             channels[f"{prefix}_{name}({patch})"] = Channel(values, "", mean)
     if not channels:
-        raise InputError(Fault(source.name, "", "no rows", "one patch or more"))
-    about = {"file": source.name, "sha256": source.sha256, **about, "clock": "none"}
+        source.refuse("", "no rows", "one patch or more")
+    about = {**source.about, **about, "clock": "none"}
     return dataset(KIND, "cfd", channels, notes, about)
 
 

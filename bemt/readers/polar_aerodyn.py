@@ -10,13 +10,11 @@ number and a text, its Reynolds number in millions (or a table id instead) and s
 
 from __future__ import annotations
 
-import math
 import os
 import re
 
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers.polar_csv import PolarRow, assemble
+from bemt.readers.polar_csv import PolarRow, assemble, row_of
 from bemt.sections.polars import Polar
 
 KIND = "polar_aerodyn"
@@ -39,52 +37,36 @@ def sniff(head: bytes | str) -> bool:
 def read(path: str | os.PathLike[str]) -> Polar:
     """Read an AeroDyn airfoil file with one or several Reynolds numbers."""
     source = load_text(path)
-    faults: list[Fault] = []
     if _V15.search(source.text):
-        rows, version = _read_v15(source, faults), "15"
+        rows, version = _read_v15(source), "15"
     elif _V13.search(source.text):
-        rows, version = _read_v13(source, faults), "13"
+        rows, version = _read_v13(source), "13"
     else:
-        expected = "'NumTabs' (version 15) or 'Number of airfoil tables' (version 13)"
-        raise InputError(Fault(source.name, "", "no number of tables", expected, ""))
-    return assemble(source, rows, faults, kind=f"AeroDyn {version}")
+        source.refuse("", "no number of tables", "'NumTabs' (version 15) or 'Number of airfoil tables' (version 13)")
+    return assemble(source, rows, kind=f"AeroDyn {version}")
 
 
-def _row(
-    source: SourceText, line: int, cells: list[str], reynolds: float | None, faults: list[Fault]
-) -> list[PolarRow]:
-    """One row of data as a list of one, or of none with a fault."""
-    values = [number(c) for c in cells[:3]]
-    bad = next((k for k, v in enumerate(values) if v is None), len(values))
-    if bad < 3:
-        got = repr(cells[bad]) if bad < len(cells) else "the end of the line"
-        faults.append(Fault(source.name, f"{line}:{bad + 1}", got, ("alpha", "cl", "cd")[bad] + " as a number", ""))
-        return []
-    alpha, cl, cd = (float(v or 0.0) for v in values)
-    return [PolarRow(line, math.radians(alpha), cl, cd, reynolds)]
-
-
-def _reynolds(source: SourceText, line: int, text: str, several: bool, faults: list[Fault]) -> float | None:
+def _reynolds(source: SourceText, line: int, text: str, several: bool) -> float | None:
     """Reynolds number from millions; None for 0, which many files write for "not stated"."""
     value = number(text)
     if value is None or value < 0.0 or value > 1e3:
         hint = "The format counts in millions" if value is not None and value > 1e3 else ""
-        faults.append(Fault(source.name, str(line), f"Re = {text}", "a Reynolds number in millions", hint))
+        source.add(line, f"Re = {text}", "a Reynolds number in millions", hint)
         return None
     if value == 0.0 and several:
-        faults.append(Fault(source.name, str(line), "Re = 0", "its own Reynolds number for each table", ""))
+        source.add(line, "Re = 0", "its own Reynolds number for each table")
     return value * _MILLION or None
 
 
-def _count(source: SourceText, line: int, text: str, name: str, faults: list[Fault]) -> int:
+def _count(source: SourceText, line: int, text: str, name: str) -> int:
     """Read a count of one or more; 0 with a fault otherwise."""
     if text.isdigit() and int(text) > 0:
         return int(text)
-    faults.append(Fault(source.name, str(line), f"{name} = {text}", "a whole number from 1", ""))
+    source.add(line, f"{name} = {text}", "a whole number from 1")
     return 0
 
 
-def _read_v15(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
+def _read_v15(source: SourceText) -> list[PolarRow]:
     """Rows of all tables of an AirfoilInfo file."""
     rows: list[PolarRow] = []
     tables = found = 0
@@ -98,32 +80,30 @@ def _read_v15(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
         at += 1
         key = cells[1].rstrip(":").split("_")[0] if len(cells) > 1 else ""
         if key == "NumTabs":
-            tables = _count(source, i, cells[0], key, faults)
+            tables = _count(source, i, cells[0], key)
         elif key == "Re":
-            reynolds = _reynolds(source, i, cells[0], tables > 1, faults)
+            reynolds = _reynolds(source, i, cells[0], tables > 1)
         elif key in ("UserProp", "Ctrl"):
             if reynolds in controls and controls[reynolds] != cells[0]:
                 got = f"{key} = {cells[0]} beside {controls[reynolds]} at one Re"
-                hint = "Keep the tables of one setting"
-                faults.append(Fault(source.name, str(i), got, "one control setting", hint))
+                source.add(i, got, "one control setting", "Keep the tables of one setting")
             controls.setdefault(reynolds, cells[0])
         elif key == "NumAlf":
             found += 1
-            count = _count(source, i, cells[0], key, faults)
+            count = _count(source, i, cells[0], key)
             block = lines[at : at + count]
             stop = next((k for k, (_, c) in enumerate(block) if len(c) > 1 and c[1][:1].isalpha()), len(block))
             if stop < count:
-                got = f"{stop} rows after NumAlf = {count}"
-                faults.append(Fault(source.name, str(i), got, f"{count} rows", "Correct NumAlf"))
+                source.add(i, f"{stop} rows after NumAlf = {count}", f"{count} rows", "Correct NumAlf")
             for j, row in block[:stop]:
-                rows += _row(source, j, row, reynolds, faults)
+                rows += row_of(source, j, row, reynolds)
             at += stop
     if tables and found != tables:
-        faults.append(Fault(source.name, "", f"{found} tables after NumTabs = {tables}", f"{tables} tables", ""))
+        source.add("", f"{found} tables after NumTabs = {tables}", f"{tables} tables")
     return rows
 
 
-def _read_v13(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
+def _read_v13(source: SourceText) -> list[PolarRow]:
     """Rows of all tables of a version 13 or 14 file."""
     rows: list[PolarRow] = []
     tables = found = 0
@@ -133,7 +113,7 @@ def _read_v13(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
         cells = text.split("!")[0].split()
         head = _V13.match(text)
         if head:
-            tables = _count(source, i, head.group(1), "Number of airfoil tables", faults)
+            tables = _count(source, i, head.group(1), "Number of airfoil tables")
         elif not tables or not cells:
             continue
         elif cells[0].upper() == "EOT":
@@ -144,15 +124,14 @@ def _read_v13(source: SourceText, faults: list[Fault]) -> list[PolarRow]:
                 inside = True
                 if tables > 1 and not stated:
                     hint = "Tables distinguished by an id are not supported"
-                    faults.append(Fault(source.name, str(i), "a table without Re", "Reynolds number in millions", hint))
+                    source.add(i, "a table without Re", "Reynolds number in millions", hint)
             if len(cells) > 5:
-                got = f"{len(cells)} columns"
-                faults.append(Fault(source.name, str(i), got, "alpha, cl, cd, cm", "Give several tables one by one"))
-            rows += _row(source, i, cells, reynolds, faults)
+                source.add(i, f"{len(cells)} columns", "alpha, cl, cd, cm", "Give several tables one by one")
+            rows += row_of(source, i, cells, reynolds)
         elif inside and len(cells) > 1 and not cells[1][:1].isalpha():
-            rows += _row(source, i, cells, reynolds, faults)
+            rows += row_of(source, i, cells, reynolds)
         elif "reynolds" in text.lower():
-            reynolds, stated, inside = _reynolds(source, i, cells[0], tables > 1, faults), True, False
+            reynolds, stated, inside = _reynolds(source, i, cells[0], tables > 1), True, False
     if tables and found != tables:
-        faults.append(Fault(source.name, "", f"{found} tables", f"{tables} as stated", "Is EOT missing?"))
+        source.add("", f"{found} tables", f"{tables} as stated", "Is EOT missing?")
     return rows

@@ -18,7 +18,6 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers.polar_csv import PolarRow, assemble
 from bemt.sections.polars import Polar
@@ -57,15 +56,13 @@ def read(path: str | os.PathLike[str]) -> Polar:
     counts = _counts(lines[0]) if lines else None
     if counts is None:
         got = repr(lines[0][30:42]) if lines else "an empty file"
-        raise InputError(Fault(source.name, "1:31", got, "six counts of two digits in columns 31 to 42", _HINT))
-    faults: list[Fault] = []
+        source.refuse("1:31", got, "six counts of two digits in columns 31 to 42", _HINT)
     at = 1
     tables = []
     for name, n_mach, n_alpha in (("lift", counts[0], counts[1]), ("drag", counts[2], counts[3])):
-        table, at = _table(source, name, at, n_mach, n_alpha, faults)
+        table, at = _table(source, name, at, n_mach, n_alpha)
         tables.append(table)
-    if faults:
-        raise InputError(faults)
+    source.check()
     (a_l, m_l, cl, rows_l), (a_d, m_d, cd, _) = tables
     mach = np.union1d(m_l, m_d)
     alpha = np.union1d(a_l, a_d)
@@ -78,7 +75,7 @@ def read(path: str | os.PathLike[str]) -> Polar:
         for i, a in enumerate(alpha.tolist())
     ]
     notes = [] if np.array_equal(a_l, a_d) and np.array_equal(m_l, m_d) else ["lift and drag interpolated to one grid"]
-    return assemble(source, rows, faults, name=lines[0][:30].strip(), kind="C81", notes=notes)
+    return assemble(source, rows, name=lines[0][:30].strip(), kind="C81", notes=notes)
 
 
 def _counts(line: str) -> tuple[int, ...] | None:
@@ -93,15 +90,13 @@ def _counts(line: str) -> tuple[int, ...] | None:
 _Table = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[int]]
 
 
-def _table(
-    source: SourceText, name: str, at: int, n_mach: int, n_alpha: int, faults: list[Fault]
-) -> tuple[_Table, int]:
+def _table(source: SourceText, name: str, at: int, n_mach: int, n_alpha: int) -> tuple[_Table, int]:
     """Angles, Mach numbers, values (Na, Nm) and line numbers of one table, and the index of the line behind it."""
-    mach, _, at = _record(source, name, at, n_mach, False, faults)
+    mach, _, at = _record(source, name, at, n_mach, False)
     alpha, values, numbers = [], [], []
     for _ in range(n_alpha):
         numbers.append(at + 1)
-        row, first, at = _record(source, name, at, n_mach, True, faults)
+        row, first, at = _record(source, name, at, n_mach, True)
         alpha.append(first)
         values.append(row)
     for axis, label in ((mach, "Mach numbers"), (alpha, "angles")):
@@ -110,38 +105,35 @@ def _table(
             k = int(np.flatnonzero(fresh <= 0.0)[0])
             got = f"{label} {axis[k]:g}, {axis[k + 1]:g}"
             where = str(numbers[k + 1] if label == "angles" else numbers[0] - 1)
-            faults.append(Fault(source.name, where, got, f"ascending {label} in the {name} table", ""))
+            source.add(where, got, f"ascending {label} in the {name} table")
     return (np.array(alpha), np.array(mach), np.array(values).reshape(n_alpha, n_mach), numbers), at
 
 
-def _record(
-    source: SourceText, name: str, at: int, count: int, leading: bool, faults: list[Fault]
-) -> tuple[list[float], float, int]:
+def _record(source: SourceText, name: str, at: int, count: int, leading: bool) -> tuple[list[float], float, int]:
     """Values of one record with its continuation lines, its first field, and the index of the next line."""
     values: list[float] = []
     first = math.nan
     lines = source.lines
     while len(values) < count:
         if at >= len(lines):
-            end = Fault(source.name, str(len(lines)), f"the end of the file in the {name} table", "more lines", _HINT)
-            if end not in faults:
-                faults.append(end)
+            end = source.fault(len(lines), f"the end of the file in the {name} table", "more lines", _HINT)
+            source.faults += [end] if end not in source.faults else []
             return values + [math.nan] * (count - len(values)), first, at
         line = lines[at]
         if leading and not values:
-            first = _field(source, at, line, 0, "an angle in degrees", faults)
+            first = _field(source, at, line, 0, "an angle in degrees")
         for k in range(1, min(_PER_LINE, count - len(values)) + 1):
-            values.append(_field(source, at, line, k, "a number", faults))
+            values.append(_field(source, at, line, k, "a number"))
         at += 1
     return values, first, at
 
 
-def _field(source: SourceText, at: int, line: str, k: int, expected: str, faults: list[Fault]) -> float:
+def _field(source: SourceText, at: int, line: str, k: int, expected: str) -> float:
     """One fixed-width number; NaN and a fault when it is none."""
     text = line[k * WIDTH : (k + 1) * WIDTH]
     value = number(text)
     if value is None:
-        faults.append(Fault(source.name, f"{at + 1}:{k * WIDTH + 1}", repr(text), expected, _HINT))
+        source.add(f"{at + 1}:{k * WIDTH + 1}", repr(text), expected, _HINT)
         return math.nan
     return value
 

@@ -23,14 +23,13 @@ Several such files make one polar with `read_many`.
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterable
 
 from bemt.base.errors import Fault, InputError
 from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers.polar_csv import PolarRow, assemble
+from bemt.readers.polar_csv import PolarRow, assemble, row_of
 from bemt.sections.polars import Polar
 
 KIND = "polar_xfoil"
@@ -61,23 +60,19 @@ def read(path: str | os.PathLike[str]) -> Polar:
 
 def read_many(paths: Iterable[str | os.PathLike[str]]) -> Polar:
     """Read XFOIL polar files of one section at several Reynolds numbers."""
-    rows: list[PolarRow] = []
-    faults: list[Fault] = []
-    notes: list[str] = []
-    names: list[str] = []
-    first: SourceText | None = None
-    for path in paths:
-        source = load_text(path)
-        first = first or source
-        name, more, said = _parse(source, faults)
-        if names and name != names[0]:
-            faults.append(Fault(source.name, "", f"section {name!r}", f"section {names[0]!r} as in the first file", ""))
+    sources = [load_text(path) for path in paths]
+    if not sources:
+        raise InputError(Fault("", "", "no files", "one XFOIL polar or more"))
+    first, rows, notes, names = sources[0], list[PolarRow](), list[str](), list[str]()
+    for source in sources:
+        source.faults = first.faults
+        name, more, said = _parse(source)
         names.append(name)
+        if name != names[0]:
+            source.add("", f"section {name!r}", f"section {names[0]!r} as in the first file")
         rows += more
         notes += said
-    if first is None:
-        raise InputError(Fault("", "", "no files", "one XFOIL polar or more", ""))
-    return assemble(first, rows, faults, name=names[0], kind="XFOIL polar", notes=tuple(dict.fromkeys(notes)))
+    return assemble(first, rows, name=names[0], kind="XFOIL polar", notes=tuple(dict.fromkeys(notes)))
 
 
 def _rewritten(text: str) -> str:
@@ -100,52 +95,43 @@ def _rewritten(text: str) -> str:
     )
 
 
-def _parse(source: SourceText, faults: list[Fault]) -> tuple[str, list[PolarRow], list[str]]:
-    """Name, rows and notes of one file; faults are added to the list."""
+def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
+    """Name, rows and notes of one file."""
     text = _rewritten(source.text)
     title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
     notes = []
     if title is None:
-        faults.append(Fault(source.name, "", "no line 'Calculated polar for:'", "an XFOIL polar save file", ""))
+        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
     if kind and (kind.group(1).lower() != "fixed" or kind.group(2).lower() != "fixed"):
         got = f"Reynolds number {kind.group(1)}, Mach number {kind.group(2)}"
         line = str(text.count("\n", 0, kind.end()) + 1)
-        faults.append(Fault(source.name, line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1"))
+        source.add(line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
     reynolds, mach = None, 0.0
     if state is None:
         got, hint = "no line 'Mach = ... Re = ... e 6 Ncrit = ...'", "Save the polar with viscous mode on"
-        faults.append(Fault(source.name, "", got, "the state of the run", hint))
+        source.add("", got, "the state of the run", hint)
     else:
         values = [number(state.group(k)) for k in (1, 2, 4)]
         line = str(text.count("\n", 0, state.start()) + 1)
         if any(v is None for v in values):
-            faults.append(Fault(source.name, line, repr(state.group(0)), "numbers for Mach, Re and Ncrit", ""))
+            source.add(line, repr(state.group(0)), "numbers for Mach, Re and Ncrit")
         else:
             mach, reynolds = float(values[0] or 0.0), float(values[1] or 0.0) * 10.0 ** int(state.group(3))
             notes.append(f"Ncrit {values[2]:g}")
             if reynolds == 0.0:
                 reynolds = None
                 hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
-                faults.append(Fault(source.name, line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint))
+                source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
     if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
         notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
-    rows = []
+    rows: list[PolarRow] = []
     lines = text.splitlines()
     start = next((i for i, line in enumerate(lines) if _HEADER.match(line)), len(lines))
     mark = re.search("[,;]", lines[start]) if start < len(lines) else None
     for i, line in enumerate(lines[start + 1 :], start + 2):
         cells = [c.strip() for c in line.split(mark[0])] if mark else line.split()
-        if not any(cells) or set(line.strip()) <= {"-", " "}:
-            continue
-        values = [number(c) for c in cells[:3]]
-        if len(values) < 3 or any(v is None for v in values):
-            bad = next((k for k, v in enumerate(values) if v is None), len(values))
-            got = repr(cells[bad]) if bad < len(cells) else "the end of the line"
-            expected = ("alpha", "CL", "CD")[min(bad, 2)] + " as a number"
-            faults.append(Fault(source.name, f"{i}:{bad + 1}", got, expected))
-            continue
-        alpha, cl, cd = (float(v or 0.0) for v in values)
-        rows.append(PolarRow(i, math.radians(alpha), cl, cd, reynolds, mach))
+        if any(cells) and not set(line.strip()) <= {"-", " "}:
+            rows += row_of(source, i, cells, reynolds, mach, ("alpha", "CL", "CD"))
     if not rows:
-        faults.append(Fault(source.name, "", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?"))
+        source.add("", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?")
     return (title.group(1) if title else ""), rows, notes

@@ -14,9 +14,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text, number
+from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._columns import Channel, dataset
 
 KIND = "pybemt_ini"
@@ -48,29 +47,26 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     try:
         parser.read_string(source.text)
     except configparser.Error as error:
-        text = " ".join(str(error).split())[:160]
-        raise InputError(Fault(source.name, "", text, "an ini file with sections and key = value")) from error
+        source.refuse("", " ".join(str(error).split())[:160], "an ini file with sections and key = value")
     tables = {name: dict(parser.items(name)) for name in parser.sections()}
-    faults: list[Fault] = []
     constants: dict[str, float] = {}
     warnings = ["the file states no units; those of pyBEMT are taken: m, degrees, rev/min, m/s, kg/m3"]
     rotors = [name for name in ("rotor", "rotor2") if name in tables]
     if "rotor" not in tables:
-        faults.append(Fault(source.name, "rotor", "nothing", "a section [rotor]"))
+        source.add("rotor", "nothing", "a section [rotor]")
     parts = []
     for k, name in enumerate(rotors, 1):
-        _scalars(source.name, name, tables[name], f"rotor{k}_" if k > 1 else "", constants, faults)
-        part = _stations(source.name, name, tables[name], faults)
+        _scalars(source, name, tables[name], f"rotor{k}_" if k > 1 else "", constants)
+        part = _stations(source, name, tables[name])
         if part is not None:
             parts.append((k, *part))
     for part_name in ("case", "fluid"):
-        _scalars(source.name, part_name, tables.get(part_name, {}), "", constants, faults)
+        _scalars(source, part_name, tables.get(part_name, {}), "", constants)
     for title, table in tables.items():
         used = {*_SCALARS.get(title.rstrip("2"), {}), "section", "coaxial"}
         used |= set(_LISTS) if title.startswith("rotor") else set()
         warnings += [f"[{title}] {key} is not used" for key in table if key not in used]
-    if faults:
-        raise InputError(faults)
+    source.check()
     index, columns, names = zip(*parts, strict=True)
     values = {key: np.concatenate([c[key] for c in columns]) for key in _LISTS}
     rotor = np.concatenate([np.full(len(c["radius"]), float(k)) for k, c in zip(index, columns, strict=True)])
@@ -81,34 +77,32 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     }
     if len(parts) > 1:
         channels["rotor"] = Channel(rotor, "-")
-    said_of = {"file": source.name, "sha256": source.sha256, "coaxial": tables.get("case", {}).get("coaxial", "False")}
+    said_of = {**source.about, "coaxial": tables.get("case", {}).get("coaxial", "False")}
     texts = {"section": sum(names, ())}
     return dataset(KIND, "geometry", channels, warnings, said_of, texts=texts, constants=constants)
 
 
-def _scalars(
-    file: str, name: str, table: Mapping[str, str], prefix: str, constants: dict[str, float], faults: list[Fault]
-) -> None:
+def _scalars(source: SourceText, name: str, table: Mapping[str, str], prefix: str, constants: dict[str, float]) -> None:
     """Numbers of one section, checked against their ranges."""
     for key, (constant, low, high) in _SCALARS[name.rstrip("2")].items():
         if key not in table:
             if name.startswith("rotor") and key != "radius_hub":
-                faults.append(Fault(file, f"{name}.{key}", "nothing", "a number"))
+                source.add(f"{name}.{key}", "nothing", "a number")
             continue
         value = number(table[key])
         if value is None or not low <= value <= high:
             expected = f"a number from {low:g} to {high:g}"
             hint = "pyBEMT's lengths are in metres" if constant.endswith("_m") else ""
-            faults.append(Fault(file, f"{name}.{key}", repr(table[key][:40]), expected, hint))
+            source.add(f"{name}.{key}", repr(table[key][:40]), expected, hint)
         else:
             constants[prefix + constant] = value
 
 
 def _stations(
-    file: str, name: str, table: Mapping[str, str], faults: list[Fault]
+    source: SourceText, name: str, table: Mapping[str, str]
 ) -> tuple[dict[str, np.ndarray], tuple[str, ...]] | None:
     """Stations of one rotor and its section names, or None with the faults added."""
-    before = len(faults)
+    before = len(source.faults)
     lists: dict[str, np.ndarray] = {}
     for key in _LISTS:
         words = table.get(key, "").split()
@@ -116,27 +110,27 @@ def _stations(
         bad = [word for word, value in zip(words, numbers, strict=True) if value is None]
         if not words or bad:
             got = f"{bad[0]!r}" if bad else "nothing"
-            faults.append(Fault(file, f"{name}.{key}", got, "numbers, one per station"))
+            source.add(f"{name}.{key}", got, "numbers, one per station")
         else:
             lists[key] = np.array(numbers, dtype=float)
     sections = tuple(table.get("section", "").split())
     lengths = {key: len(v) for key, v in lists.items()} | {"section": len(sections)}
-    if len(set(lengths.values())) > 1 and len(faults) == before:
-        faults.append(Fault(file, name, ", ".join(f"{n} of {key}" for key, n in lengths.items()), "equal numbers"))
-    if len(faults) > before:
+    if len(set(lengths.values())) > 1 and len(source.faults) == before:
+        source.add(name, ", ".join(f"{n} of {key}" for key, n in lengths.items()), "equal numbers")
+    if len(source.faults) > before:
         return None
     r, chord, pitch = (lists[key] for key in _LISTS)
     diameter = number(table.get("diameter", ""))
     if np.any(np.diff(r) <= 0):
-        faults.append(Fault(file, f"{name}.radius", "radii that do not rise", "radii from hub to tip"))
+        source.add(f"{name}.radius", "radii that do not rise", "radii from hub to tip")
     if diameter is not None and (np.any(r <= 0) or np.any(r > 0.5 * diameter * (1 + 1e-9))):
         got = f"radii from {r.min():g} to {r.max():g} at diameter {diameter:g}"
-        faults.append(Fault(file, f"{name}.radius", got, "radii above 0 and up to half the diameter", "Other units?"))
+        source.add(f"{name}.radius", got, "radii above 0 and up to half the diameter", "Other units?")
     if np.any(chord <= 0) or (diameter is not None and np.any(chord > diameter)):
-        faults.append(Fault(file, f"{name}.chord", f"chords {chord.min():g} to {chord.max():g}", "chords in metres"))
+        source.add(f"{name}.chord", f"chords {chord.min():g} to {chord.max():g}", "chords in metres")
     if np.any(np.abs(pitch) > 90.0):
-        faults.append(Fault(file, f"{name}.pitch", f"{np.abs(pitch).max():g}", "blade angles within 90 degrees"))
+        source.add(f"{name}.pitch", f"{np.abs(pitch).max():g}", "blade angles within 90 degrees")
     elif np.all(np.abs(pitch) < 1.6) and np.any(pitch != 0):
         got, hint = f"angles up to {np.abs(pitch).max():g}", "Radians? They are not converted"
-        faults.append(Fault(file, f"{name}.pitch", got, "blade angles in degrees", hint))
-    return None if len(faults) > before else (lists, sections)
+        source.add(f"{name}.pitch", got, "blade angles in degrees", hint)
+    return None if len(source.faults) > before else (lists, sections)

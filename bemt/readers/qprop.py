@@ -67,14 +67,14 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     for k, (_, s) in enumerate(sections):
         if not (0.5 <= s.cla <= 15.0 and s.reref > 0.0 and s.cd0 > 0.0 and s.clmin < s.clmax):
             told = f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}"
-            rows.fault(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
+            rows.add(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
     last = f"{r[-1]:g} m"
     if math.isfinite(R) and R > 1.5 * r[-1]:
-        rows.fault(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
+        rows.add(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
     if blades != whole(blades):
-        rows.fault(line, f"{blades:g} blades", "a whole number")
+        rows.add(line, f"{blades:g} blades", "a whole number")
     if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
-        rows.fault(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
+        rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
     name, beta = rows.rows[0][1].strip(), np.radians(b)
     return rows.finish(
         BladeFile(name, "QPROP", whole(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))

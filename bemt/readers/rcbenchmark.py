@@ -27,16 +27,15 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text, number
+from bemt.readers import head_text, number
 from bemt.readers._headings import heading
-from bemt.readers._recording import Array, Builder, slip, spikes
-from bemt.readers._split import SplitTable, split_table
+from bemt.readers._large import NumberTable
+from bemt.readers._recording import Array, Builder, slip
+from bemt.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
+from bemt.readers._split import SplitTable
 
 KIND = "rcbenchmark"
-MOST_RPM_PER_V = 8000.0
-"""Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 _SPEEDS = ("electrical_rpm", "optical_rpm")
 _POWERTRAIN = re.compile(r"Powertrain (\d+) - (.+)")
 _LETTER = re.compile(r"((?:ESC|Torque|Thrust|Voltage|Current|Motor|Electrical|Mechanical|Propeller|Overall|Vibration)"
@@ -61,36 +60,29 @@ def sniff(head: bytes | str) -> bool:
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read one log. ["mode"]"""
-    source = load_text(path)
-    table = split_table(source, header=True)
-    twice = sorted({h for h in table.headings if h and table.headings.count(h) > 1})
-    if twice:
-        faults = [Fault(source.name, "1", f"a second column {name!r}", "each column once") for name in twice]
-        raise InputError(faults)
-    build = Builder(table, KIND)
+    build = Builder.of_stand(path, KIND)
+    build.check()
+    table = build.table
     sides = [_side(text) for text in table.headings]
     turned = [side for side in dict.fromkeys(side for _, side in sides if side) if _turned(table, sides, side)]
     for k, (text, (plain, side)) in enumerate(zip(table.headings, sides, strict=True)):
         if text == "App message" or not text:
             _messages(build, k, text)
         else:
-            head = heading(plain if [side] == turned else text)
-            build.add(k, replace(head, text=text))
+            build.add(k, replace(heading(plain if [side] == turned else text), text=text))
     if len(turned) > 1:
         build.warnings.append(f"motors {' and '.join(turned)} turned: name the columns of one in a recording.toml")
     elif turned and len({side for _, side in sides if side}) > 1:
         build.warnings.append(f"only motor {turned[0]} turned: its columns have the plain names")
     if "time_s" not in build.channels and not build.faults:
-        build.faults.append(Fault(source.name, "1", "no numbers in Time (s)", "the time of every row"))
-    if build.faults:
-        raise InputError(build.faults)
+        build.fault("1", "no numbers in Time (s)", "the time of every row")
+    build.check()
     said = {"stand": "RCbenchmark / Tyto", "mode": _mode(build)}
     build.flag_time()
     _speeds(build)
     _power(build)
-    for name in ("thrust_N", "torque_Nm", "current_A", "voltage_V"):
-        if name in build.channels and said["mode"] == "continuous":
-            build.flag(np.flatnonzero(spikes(build.channels[name].values)), f"spike of {name}")
+    if said["mode"] == "continuous":
+        build.flag_spikes("thrust_N", "torque_Nm", "current_A", "voltage_V")
     build.check_magnitudes()
     _sign(build)
     return build.finish(said)
@@ -105,11 +97,11 @@ def _side(text: str) -> tuple[str, str]:
     return text, ""
 
 
-def _turned(table: SplitTable, sides: Sequence[tuple[str, str]], side: str) -> bool:
+def _turned(table: SplitTable | NumberTable, sides: Sequence[tuple[str, str]], side: str) -> bool:
     """Whether a motor turned: its speed, or without one its thrust, was ever other than 0."""
     for words in ("speed", "thrust"):
         own = [k for k, (text, s) in enumerate(sides) if s == side and words in text.lower()]
-        values = [v for k in own for row in table.rows if (v := number(row[k])) is not None]
+        values = [v for k in own for cell in table.cells(k) if (v := number(cell)) is not None]
         if values:
             return any(v != 0.0 for v in values)
     return False
@@ -125,29 +117,23 @@ def _messages(build: Builder, k: int, text: str) -> None:
 
 
 def _mode(build: Builder) -> str:
-    t = build.channels["time_s"].values
-    pulse = build.channels.get("pulse_width_s")
+    t, pulse = build.channels["time_s"].values, build.at("pulse_width_s")
     if len(t) < 2:
         return "steps"
     step = np.diff(t[np.isfinite(t)])
     slow = step.size > 0 and float(np.median(step)) > 0.5
     if pulse is None:
         return "steps" if slow else "continuous"
-    moved = np.diff(pulse.values[np.isfinite(pulse.values)]) != 0
+    moved = np.diff(pulse[np.isfinite(pulse)]) != 0
     return "steps" if slow and moved.size and float(np.mean(moved)) > 0.8 else "continuous"
-
-
-def _at(build: Builder, name: str) -> Array | None:
-    channel = build.channels.get(name)
-    return None if channel is None else channel.values
 
 
 def _speeds(build: Builder) -> None:
     """Flags of the two speeds, each for itself."""
-    load = _at(build, "thrust_N")
+    load = build.at("thrust_N")
     seen = 0
     for name in [n for n in build.channels if n.startswith(_SPEEDS) or n == "rpm"]:
-        v = _at(build, name)
+        v = build.at(name)
         assert v is not None
         if not np.any(v[np.isfinite(v)] != 0.0):
             build.warnings.append(f"{name} is 0 in every row: the sensor measured nothing; ignored")
@@ -162,25 +148,25 @@ def _speeds(build: Builder) -> None:
         build.flag(np.flatnonzero(v < 0.0), f"{name} is negative")
         moving = np.where(v > 0.0, v, np.nan)
         wild = spikes(moving) | _wild(moving, load)
-        volt = _at(build, "voltage_V")
+        volt = build.at("voltage_V")
         if volt is not None:
             wild |= moving > MOST_RPM_PER_V * np.where(volt > 0.5, volt, np.inf)
         build.flag(np.flatnonzero(wild), f"spike of {name}")
-    electrical = [n for n in build.channels if n.startswith("electrical_rpm")]
+    electrical = next((n for n in build.channels if n.startswith("electrical_rpm")), None)
     if electrical and seen:
         build.warnings.append(
-            f"{electrical[0]} is derived from the motor's phases with the number of poles set in the stand's software, "
+            f"{electrical} is derived from the motor's phases with the number of poles set in the stand's software, "
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
         )
     if "rpm" in build.channels and seen:
         build.warnings.append(
             "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
         )
-    both = [_at(build, n) for n in _SPEEDS]
-    if both[0] is not None and both[1] is not None:
-        good = (both[0] > 0) & (both[1] > 0)
+    electric, optical = (build.at(n) for n in _SPEEDS)
+    if electric is not None and optical is not None:
+        good = (electric > 0) & (optical > 0)
         if np.count_nonzero(good) >= 3:
-            ratio = float(np.median(both[0][good] / both[1][good]))
+            ratio = float(np.median(electric[good] / optical[good]))
             text = f"electrical over optical speed: median {ratio:.4g} in {np.count_nonzero(good)} rows"
             near = round(ratio) if ratio > 1 else 1
             whole = near > 1 and abs(ratio / near - 1) < 0.05
@@ -189,60 +175,51 @@ def _speeds(build: Builder) -> None:
 
 def _no_current(build: Builder) -> np.ndarray:
     """Rows in which the motor draws no current: a load there is the zero of the cell."""
-    ampere = _at(build, "current_A")
+    ampere = build.at("current_A")
     if ampere is None or not np.any(np.isfinite(ampere)):
         return np.zeros(len(build.table), dtype=bool)
     return np.asarray(np.abs(ampere) <= 0.005 * np.nanmax(np.abs(ampere)))
 
 
 def _wild(v: Array, load: Array | None) -> np.ndarray:
-    """Speeds far above what the thrust of the same row allows.
-
-    Thrust goes with the square of the speed; a speed more than 2.5 times what the rest of the file needs for that
-    thrust is a misreading, also at the start of a ramp where neighbours cannot tell.
-    """
+    """Speeds far above what the thrust of the same row allows, also at the start of a ramp."""
     out = np.zeros(len(v), dtype=bool)
-    if load is None:
-        return out
-    good = np.isfinite(v) & np.isfinite(load) & (load > 0.02 * np.nanmax(np.abs(np.append(load, 0.0))))
-    if np.count_nonzero(good) < 5:
-        return out
-    k = np.sqrt(load[good]) / v[good]
-    usual = float(np.median(k))
-    out[np.flatnonzero(good)[k < usual / 2.5]] = True
+    if load is not None:
+        good = np.isfinite(v) & np.isfinite(load) & (load > 0.02 * np.nanmax(np.abs(np.append(load, 0.0))))
+        if np.count_nonzero(good) >= 5:
+            out[good] = against_load(v[good], load[good]) < 1.0 / MISREAD
     return out
 
 
 def _power(build: Builder) -> None:
     """Tell which speed the mechanical power was computed with, and whether the units agree."""
-    power, torque = _at(build, "mechanical_power_W"), _at(build, "torque_Nm")
-    volt, ampere, electric = _at(build, "voltage_V"), _at(build, "current_A"), _at(build, "electrical_power_W")
-    if power is not None and torque is not None:
-        for name in (*_SPEEDS, "rpm"):
-            speed = _at(build, name)
-            if speed is None:
-                continue
-            shaft = np.abs(torque) * speed * units.RPM
-            good = (shaft > 0.05 * np.nanmax(np.append(shaft, 0.0))) & (power > 0)
-            if np.count_nonzero(good) >= 3:
-                ratio = float(np.median(power[good] / shaft[good]))
-                if math.isclose(ratio, 1.0, rel_tol=0.02):
-                    build.warnings.append(f"mechanical_power_W is torque times {name}")
-                elif name == "optical_rpm" or "optical_rpm" not in build.channels:
-                    text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
-                    build.warnings.append(text + "; nothing was converted")
+    power, torque = build.at("mechanical_power_W"), build.at("torque_Nm")
+    volt, ampere, electric = build.at("voltage_V"), build.at("current_A"), build.at("electrical_power_W")
+    for name in (*_SPEEDS, "rpm"):
+        speed = build.at(name)
+        if power is None or torque is None or speed is None:
+            continue
+        ratio = _times(power, np.abs(torque) * speed * units.RPM, power > 0)
+        if ratio is not None and math.isclose(ratio, 1.0, rel_tol=0.02):
+            build.warnings.append(f"mechanical_power_W is torque times {name}")
+        elif ratio is not None and (name == "optical_rpm" or "optical_rpm" not in build.channels):
+            text = f"mechanical_power_W is {ratio:.4g} times torque x {name}{slip(ratio)}"
+            build.warnings.append(text + "; nothing was converted")
     if volt is not None and ampere is not None and electric is not None:
-        product = volt * ampere
-        good = product > 0.05 * np.nanmax(np.append(product, 0.0))
-        if np.count_nonzero(good) >= 3:
-            ratio = float(np.median(electric[good] / product[good]))
-            if abs(ratio - 1.0) > 0.1:
-                text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
-                build.warnings.append(text + "; nothing was converted")
+        ratio = _times(electric, volt * ampere)
+        if ratio is not None and abs(ratio - 1.0) > 0.1:
+            text = f"electrical_power_W is {ratio:.4g} times voltage x current{slip(ratio)}"
+            build.warnings.append(text + "; nothing was converted")
+
+
+def _times(power: Array, product: Array, used: np.ndarray | bool = True) -> float | None:
+    """Median of a power over the product of its factors in the rows that carry load; None: fewer than three."""
+    good = (product > 0.05 * np.nanmax(np.append(product, 0.0))) & used
+    return float(np.median(power[good] / product[good])) if np.count_nonzero(good) >= 3 else None
 
 
 def _sign(build: Builder) -> None:
     for name in ("thrust_N", "torque_Nm"):
-        v = _at(build, name)
+        v = build.at(name)
         if v is not None and np.any(np.isfinite(v)) and -np.nanmin(v) > 2.0 * max(np.nanmax(v), 0.0):
             build.warnings.append(f"{name} is mostly negative: another sign convention? The sign was not changed")

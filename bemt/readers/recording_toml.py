@@ -20,12 +20,12 @@ from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.dataset import Dataset
+from bemt.dataset import Dataset, concat
 from bemt.readers import head_text, load_text
-from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, heading
+from bemt.readers._columns import Channel
+from bemt.readers._headings import Heading, heading, known
 from bemt.readers._large import large_table
-from bemt.readers._recording import Builder, spikes
+from bemt.readers._recording import Builder
 from bemt.readers._split import SplitTable, decimal_mark, some, split_table
 
 __all__ = ["KIND", "QUANTITIES", "RecordingToml", "read", "sniff"]
@@ -253,12 +253,9 @@ def _check_poles(out: Collector, document: Mapping[str, Any]) -> None:
         hint = "An outrunner with 14 magnets has 7; a stand that divided already gives rpm, not electrical_rpm"
         out.add("rotor.pole_pairs", "nothing", "the pole pairs of the motor, since electrical_rpm is given", hint)
     if poles and not electrical and isinstance(columns, Mapping):
-        out.add(
-            "rotor.pole_pairs",
-            shown(rotor["pole_pairs"]) if rotor else "",
-            "no pole_pairs without electrical_rpm",
-            "Name the column electrical_rpm if it counts electrical revolutions",
-        )
+        got = shown(rotor["pole_pairs"]) if rotor else ""
+        hint = "Name the column electrical_rpm if it counts electrical revolutions"
+        out.add("rotor.pole_pairs", got, "no pole_pairs without electrical_rpm", hint)
 
 
 def _instrument(columns: Any) -> dict[str, dict[str, float]]:
@@ -276,11 +273,11 @@ def _instrument(columns: Any) -> dict[str, dict[str, float]]:
 
 def _heading(name: str, unit: str, text: str) -> Heading:
     if unit == "-":
-        return Heading(text, name, units.Unit("", "none", 1.0))
+        return known(text, name, "-")
     if QUANTITIES[name] == "angular_speed":
         u = units.UNITS[unit]
         return Heading(text, name, u if unit == "rpm" else units.Unit("", "angular_speed", u.factor / units.RPM))
-    return Heading(text, heading(f"{name}_{unit}").name, units.UNITS[unit])
+    return known(text, name, unit)
 
 
 def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
@@ -330,41 +327,34 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
 
 def _derive(build: Builder, pairs: int) -> None:
     """Mechanical speed from the electrical one, and the flags."""
-    for name in ("rpm", "electrical_rpm", "optical_rpm"):
-        if name in build.channels:
-            values = build.channels[name].values
-            build.channels[name] = Channel(values, "rpm")
-            build.flag(np.flatnonzero(values == 0.0), f"{name} is 0")
-            build.flag(np.flatnonzero(values < 0.0), f"{name} is negative")
+    build.flag_speeds("rpm", "electrical_rpm", "optical_rpm")
     if "electrical_rpm" in build.channels:
         label = build.free("rpm") if "rpm" not in build.channels else "rpm_from_electrical_rpm"
         build.channels[label] = Channel(build.channels["electrical_rpm"].values / pairs, "rpm")
         build.warnings.append(f"{label} is electrical_rpm over {pairs} pole pairs, as the recording says")
     build.flag_time()
     if "time_s" in build.channels:
-        for name in ("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm"):
-            if name in build.channels:
-                build.flag(np.flatnonzero(spikes(build.channels[name].values)), f"spike of {name}")
+        build.flag_spikes("thrust_N", "torque_Nm", "rpm", "electrical_rpm", "optical_rpm")
     build.check_magnitudes()
 
 
 def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
-    """Runs in their order; a channel that a run lacks is NaN there."""
+    """Runs in their order; a channel that a run lacks is NaN there, one in two units has none."""
     if len(runs) == 1:
         return runs[0]
-    names = list(dict.fromkeys(name for run in runs for name in run.values))
-    channels = {}
-    for name in names:
-        found = {run.unit(name) for run in runs if name in run}
-        parts = [run.values.get(name, np.full(len(run), np.nan)) for run in runs]
-        channels[name] = Channel(np.concatenate(parts), found.pop() if len(found) == 1 else "")
-    channels["run"] = Channel(np.concatenate([np.full(len(run), float(k)) for k, run in enumerate(runs, 1)]), "-")
+    whole = concat(runs, "+".join(files))
+    own = {name: {run.unit(name) for run in runs if name in run} for name in whole.values}
     texts = {
         name: sum((run.texts.get(name, ("",) * len(run)) for run in runs), ())
         for name in dict.fromkeys(n for run in runs for n in run.texts)
     }
-    warnings = [f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes]
-    said = {"file": "+".join(files), "sha256": "+".join(run.provenance["sha256"] for run in runs)}
-    return dataset(KIND, "bench", channels, warnings, said, flags=sum((run.flags for run in runs), ()),
-                   lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
-                   headings={k: v for run in runs for k, v in run.provenance.get("headings", {}).items()})  # fmt: skip
+    about = {
+        "file": whole.name, "sha256": "+".join(run.provenance["sha256"] for run in runs), "format": KIND,
+        "headings": {k: v for run in runs for k, v in run.provenance.get("headings", {}).items()},
+    }  # fmt: skip
+    return replace(
+        whole, values={**whole.values, "run": np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])},
+        units={**whole.units, **{name: "" for name, units_ in own.items() if len(units_) > 1}}, provenance=about,
+        lines=sum((tuple(run.lines) for run in runs), ()), texts=texts,
+        notes=tuple(f"{file}: {text}" for file, run in zip(files, runs, strict=True) for text in run.notes),
+    )  # fmt: skip

@@ -21,37 +21,30 @@ import difflib
 import io
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text, number
+from bemt.readers import SourceText, head_text, load_text, number
+from bemt.readers._headings import WEIGHTS, unit_of
 
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")
 COLUMNS = ("quantity", "value", "unit", "uncertainty", "kind", "source", "remark")
 
 QUANTITIES: dict[str, tuple[str, str, float, float]] = {
-    "thrust": ("force", "thrust_N", 1e-3, 1e5),
-    "duct_thrust": ("force", "duct_thrust_N", 1e-3, 1e5),
-    "torque": ("torque", "torque_Nm", 1e-6, 1e4),
-    "power": ("power", "power_W", 1e-3, 1e6),
+    "thrust": ("force", "thrust_N", 1e-3, 1e5), "duct_thrust": ("force", "duct_thrust_N", 1e-3, 1e5),
+    "torque": ("torque", "torque_Nm", 1e-6, 1e4), "power": ("power", "power_W", 1e-3, 1e6),
     "electrical_power": ("power", "electrical_power_W", 1e-3, 1e6),
-    "exhaust_speed": ("speed", "exhaust_speed_m_s", 0.1, 500.0),
-    "airspeed": ("speed", "airspeed_m_s", -100.0, 400.0),
+    "exhaust_speed": ("speed", "exhaust_speed_m_s", 0.1, 500.0), "airspeed": ("speed", "airspeed_m_s", -100.0, 400.0),
     "rpm": ("angular_speed", "rpm", 10.0, 300000.0),
-    "CT": ("", "CT", -1.0, 2.0),
-    "CP": ("", "CP", -1.0, 2.0),
-    "CQ": ("", "CQ", -0.2, 0.4),
-    "J": ("", "J", -2.0, 5.0),
-    "eta": ("", "eta", -10.0, 1.0),
-    "FM": ("", "FM", 0.0, 1.5),
-    "duct_share": ("", "duct_share", -1.0, 1.0),
-}
+    "CT": ("", "CT", -1.0, 2.0), "CP": ("", "CP", -1.0, 2.0), "CQ": ("", "CQ", -0.2, 0.4), "J": ("", "J", -2.0, 5.0),
+    "eta": ("", "eta", -10.0, 1.0), "FM": ("", "FM", 0.0, 1.5), "duct_share": ("", "duct_share", -1.0, 1.0),
+}  # fmt: skip
 """Quantity -> dimension (empty: none), channel of a series, plausible range in SI (rpm for rpm)."""
 
 CONDITIONS: dict[str, tuple[float, float, str]] = {
@@ -60,13 +53,6 @@ CONDITIONS: dict[str, tuple[float, float, str]] = {
     "density_kg_m3": (0.01, 1100.0, "Is this in g/cm3?"),
 }
 """Optional column -> lowest, highest, hint."""
-
-_ALIASES = {
-    "N_m": "Nm", "mN_m": "mNm", "N_cm": "Ncm", "N_mm": "Nmm", "in_lbf": "lbf_in", "ft_lbf": "lbf_ft",
-    "in_ozf": "ozf_in", "RPM": "rpm", "rev_min": "rpm",
-    "1_min": "rpm", "kph": "km_h", "knots": "kt", "%": "pct", "1": "-",
-}  # fmt: skip
-_MASS = {"kg": "kgf", "g": "gf", "lb": "lbf", "oz": "ozf", "lbs": "lbf", "grams": "gf"}
 
 
 @dataclass(frozen=True)
@@ -115,58 +101,54 @@ def _near(word: str, known: Iterable[str]) -> str:
 
 def _unit_factor(quantity: str, written: str) -> tuple[float, tuple[str, str, str] | None]:
     """Factor to SI (to rpm for a rotational speed), or the fault (got, expected, hint)."""
-    dimension = QUANTITIES[quantity][0]
-    key = written.strip()
-    for sign in "/ -·*":
-        key = key if key in ("-", "1") else key.replace(sign, "_")
-    key = _ALIASES.get(key, key)
+    dimension, key = QUANTITIES[quantity][0], written.strip()
     known = units.suffixes(dimension) if dimension else ("-", "pct")
     if not key:
         return math.nan, ("no unit", f"one of {', '.join(known)}", "")
     if not dimension:
-        if key in ("-", "pct"):
-            return (0.01 if key == "pct" else 1.0), None
-        return math.nan, (f"unit {written!r}", "- (dimensionless)", "")
-    if key in known:
-        factor = units.UNITS[key].factor
-        return (factor / units.RPM if quantity == "rpm" else factor), None
-    hint = f"A mass is not a force: write {_MASS[key]}" if dimension == "force" and key in _MASS else _near(key, known)
+        factor = {"-": 1.0, "1": 1.0, "pct": 0.01, "%": 0.01}.get(key, math.nan)
+        return factor, (f"unit {written!r}", "- (dimensionless)", "") if math.isnan(factor) else None
+    parts = re.sub(r"[/ ·*-]", "_", key)
+    for form in (parts, parts.replace("_", " "), parts.replace("_", "/")):
+        unit = unit_of(form)
+        if isinstance(unit, units.Unit) and unit.dimension == dimension:
+            return (unit.factor / units.RPM if quantity == "rpm" else unit.factor), None
+    weight = WEIGHTS.get(key) if dimension == "force" else None
+    hint = f"A mass is not a force: write {weight}" if weight else _near(parts, known)
     return math.nan, (f"unit {written!r}", f"one of {', '.join(known)}", hint)
 
 
+@dataclass
 class _Row:
     """One line of the table: typed cells, faults with line and column."""
 
-    def __init__(self, file: str, line: int, header: list[str], cells: list[str], faults: list[Fault]) -> None:
-        self.file, self.line, self.header, self.faults = file, line, header, faults
-        self.cells = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+    source: SourceText
+    line: int
+    header: list[str]
+    cells: dict[str, str]
 
     def fault(self, column: str, got: str, expected: str, hint: str = "") -> None:
-        self.faults.append(Fault(self.file, f"{self.line}:{self.header.index(column) + 1}", got, expected, hint))
+        self.source.add(f"{self.line}:{self.header.index(column) + 1}", got, expected, hint)
 
     def number(self, column: str, expected: str) -> float:
         text = self.cells[column]
         value = number(text)
-        if value is None:
-            hint = ""
-            if "," in text:
-                hint = "Use a decimal point"
-            elif text and number(text.split()[0]) is not None:
-                hint = "Put the unit into its own column"
-            self.fault(column, f"{column} = {text or 'nothing'}", expected, hint)
-            return math.nan
-        return value
+        if value is not None:
+            return value
+        unit = bool(text) and number(text.split()[0]) is not None
+        hint = "Use a decimal point" if "," in text else "Put the unit into its own column" if unit else ""
+        self.fault(column, f"{column} = {text or 'nothing'}", expected, hint)
+        return math.nan
 
 
-def _reference(row: _Row, sha256: str) -> Reference | None:
+def _reference(row: _Row) -> Reference | None:
     """Read one row; None with faults appended when it cannot be used."""
-    before = len(row.faults)
+    before = len(row.source.faults)
     quantity, kind, source = row.cells["quantity"], row.cells["kind"], row.cells["source"]
     value = row.number("value", "a finite number")
     factor = math.nan
     if quantity not in QUANTITIES:
-        expected = f"one of {', '.join(QUANTITIES)}"
-        row.fault("quantity", f"quantity {quantity!r}", expected, _near(quantity, QUANTITIES))
+        row.fault("quantity", f"quantity {quantity!r}", f"one of {', '.join(QUANTITIES)}", _near(quantity, QUANTITIES))
     else:
         factor, fault = _unit_factor(quantity, row.cells["unit"])
         if fault:
@@ -179,8 +161,7 @@ def _reference(row: _Row, sha256: str) -> Reference | None:
     if row.cells["uncertainty"].lower() != "unknown":
         u = row.number("uncertainty", 'a standard uncertainty in the unit of the value, or "unknown"')
         if u <= 0:
-            hint = 'Write "unknown" if nobody stated it'
-            row.fault("uncertainty", f"uncertainty = {u:g}", "a positive number", hint)
+            row.fault("uncertainty", f"uncertainty = {u:g}", "a positive number", 'Write "unknown" if nobody stated it')
         elif abs(value) > 0 and u > abs(value):
             hint = "Is it in percent? Give it in the unit of the value"
             row.fault("uncertainty", f"uncertainty = {u:g}", f"less than the value, {abs(value):g}", hint)
@@ -194,76 +175,76 @@ def _reference(row: _Row, sha256: str) -> Reference | None:
             conditions[column] = row.number(column, f"a number from {low:g} to {high:g}, or an empty cell")
             if not math.isnan(conditions[column]) and not low <= conditions[column] <= high:
                 row.fault(column, f"{column} = {conditions[column]:g}", f"{low:g} to {high:g}", hint)
-    if len(row.faults) > before:
+    if len(row.source.faults) > before:
         return None
     return Reference(
         quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, row.cells["remark"],
-        f"{row.cells['value']} {row.cells['unit']}".removesuffix(" -"), where=f"{row.file}:{row.line}", sha256=sha256,
+        f"{row.cells['value']} {row.cells['unit']}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
+        sha256=row.source.sha256,
         **conditions,
     )  # fmt: skip
 
 
-def _pair_faults(file: str, references: list[Reference]) -> Iterable[Fault]:
-    """Compare rows of the same quantity and condition: repeats, and slips between kgf and N."""
+def _compare(source: SourceText, references: list[Reference]) -> None:
+    """Rows of the same quantity and condition: repeats, and slips between kgf and N."""
     for i, one in enumerate(references):
         for other in references[:i]:
             if (one.quantity, one.condition) != (other.quantity, other.condition):
                 continue
             line, earlier = (r.where.rsplit(":", 1)[1] for r in (one, other))
             if (one.kind, one.source, one.value) == (other.kind, other.source, other.value):
-                yield Fault(file, line, f"the row of line {earlier} again", "each value once", "Delete one of them")
+                source.add(line, f"the row of line {earlier} again", "each value once", "Delete one of them")
             elif QUANTITIES[one.quantity][0] == "force" and min(abs(one.value), abs(other.value)) > 0:
                 ratio = abs(one.value / other.value)
                 if abs(max(ratio, 1 / ratio) / units.KGF - 1) < 0.005:
                     got = f"{one.printed} where line {earlier} has {other.printed}"
-                    hint = "They differ by 9.81: is one kgf and one N?"
-                    yield Fault(file, line, got, "values in their own units", hint)
+                    source.add(line, got, "values in their own units", "They differ by 9.81: is one kgf and one N?")
+
+
+def _header(source: SourceText, line: int, cells: list[str]) -> list[str]:
+    """Names of the columns, all of them there and known."""
+    header = [cell.strip() for cell in cells]
+    known = (*COLUMNS, *CONDITIONS)
+    hint = "Separate columns by commas" if ";" in "".join(cells) or "\t" in "".join(cells) else ""
+    for name in COLUMNS:
+        if name not in header:
+            source.add(line, f"no column {name}", f"the columns {', '.join(COLUMNS)}", hint)
+    for index, name in enumerate(header):
+        twice = name in header[:index]
+        if name not in known or twice:
+            got, expected = f"column {name!r}" + (" twice" if twice else ""), f"one of {', '.join(known)}"
+            source.add(f"{line}:{index + 1}", got, expected, hint or _near(name, known))
+    source.check()
+    return header
 
 
 def read(path: str | os.PathLike[str]) -> list[Reference]:
     """Read a table of references."""
     source = load_text(path)
-    file = source.name
     if not source.text.strip():
-        raise InputError(Fault(file, "", "an empty file", f"a table with the columns {', '.join(COLUMNS)}", ""))
+        source.refuse("", "an empty file", f"a table with the columns {', '.join(COLUMNS)}")
     # comments become empty lines, so that line numbers stay those of the file
     text = "\n".join("" if line.startswith("#") else line for line in source.lines)
     reader = csv.reader(io.StringIO(text), skipinitialspace=True)
-    faults: list[Fault] = []
     references: list[Reference] = []
     header: list[str] = []
     for cells in reader:
+        line = reader.line_num
         if not any(cell.strip() for cell in cells):
             continue
         if not header:
-            header = [cell.strip() for cell in cells]
-            known = (*COLUMNS, *CONDITIONS)
-            hint = "Separate columns by commas" if ";" in "".join(cells) or "\t" in "".join(cells) else ""
-            for name in COLUMNS:
-                if name not in header:
-                    expected = f"the columns {', '.join(COLUMNS)}"
-                    faults.append(Fault(file, str(reader.line_num), f"no column {name}", expected, hint))
-            for index, name in enumerate(header):
-                if name not in known or name in header[:index]:
-                    got = f"column {name!r}" + (" twice" if name in header[:index] else "")
-                    where = f"{reader.line_num}:{index + 1}"
-                    faults.append(Fault(file, where, got, f"one of {', '.join(known)}", hint or _near(name, known)))
-            if faults:
-                raise InputError(faults)
-            continue
-        if len(cells) != len(header):
-            got = f"{len(cells)} cells"
+            header = _header(source, line, cells)
+        elif len(cells) != len(header):
             hint = "Quote cells that hold a comma" if len(cells) > len(header) else "Write empty cells too"
-            faults.append(Fault(file, str(reader.line_num), got, f"{len(header)} cells", hint))
-            continue
-        reference = _reference(_Row(file, reader.line_num, header, cells, faults), source.sha256)
-        if reference:
-            references.append(reference)
-    faults.extend(_pair_faults(file, references))
-    if not references and not faults:
-        faults.append(Fault(file, "", "no rows", "one recorded value or more", ""))
-    if faults:
-        raise InputError(faults)
+            source.add(line, f"{len(cells)} cells", f"{len(header)} cells", hint)
+        else:
+            row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+            if reference := _reference(_Row(source, line, header, row)):
+                references.append(reference)
+    _compare(source, references)
+    if not references and not source.faults:
+        source.add("", "no rows", "one recorded value or more")
+    source.check()
     return references
 
 
@@ -290,12 +271,8 @@ def to_series(references: Iterable[Reference], name: str) -> list[Dataset]:
             if column not in values and not np.all(np.isnan(condition)):
                 values[column] = condition
         remarks = dict.fromkeys(ref.remark for point in points for ref in point.values() if ref.remark)
-        provenance = {
-            "source": source,
-            "file": firsts[0].where.rsplit(":", 1)[0],
-            "sha256": firsts[0].sha256,
-            "remark": "; ".join(remarks),
-        }
+        file = firsts[0].where.rsplit(":", 1)[0]
+        provenance = {"source": source, "file": file, "sha256": firsts[0].sha256, "remark": "; ".join(remarks)}
         labels = tuple(first.where for first in firsts)
         out.append(Dataset(kind, name, values, u, (), provenance, labels))
     return out

@@ -11,12 +11,9 @@ what stands before " Monitor:".
 
 from __future__ import annotations
 
-import os
 import re
 
-from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, cells_of, head_lines, si_unit
-from bemt.readers._cfd_record import Layout, read_history
+from bemt.readers._cfd import Column, Layout, cells_of, si_unit
 
 KIND = "star_monitor"
 
@@ -24,18 +21,12 @@ _HEADING = re.compile(r"(?P<name>.*?)(?P<monitor> Monitor(: (?P<what>[^()]*?))?)
 _CLOCK = re.compile(r"(Physical )?Time(: Physical Time)?( \(s\))?|Time Step(: Time Step)?|Iteration(: Iteration)?")
 
 
-def sniff(head: bytes | str) -> bool:
-    r"""Tell whether the first line is headings of monitors under a clock of STAR-CCM+.
-
-    >>> sniff('"Iteration","Thrust 1 Monitor: Thrust (N)"\n1,12.5'), sniff('"Iteration","CL","CD"\n1,0.2,0.1')
-    (True, False)
-    >>> sniff("Physical Time: Physical Time (s),Q Monitor: Moment (N-m)\n1e-4,0.3")
-    True
-    """
-    return any(_names(line) is not None for line in head_lines(head, 1))
-
-
 def _names(line: str) -> tuple[str, ...] | None:
+    """Headings of monitors under a clock of STAR-CCM+.
+
+    >>> _names('"Iteration","Thrust 1 Monitor: Thrust (N)"'), _names('"Iteration","CL","CD"')
+    (('Iteration', 'Thrust 1 Monitor: Thrust (N)'), None)
+    """
     cells = cells_of(line, ",")
     own = line.startswith(("Physical Time: ", '"Physical Time: ')) or " Monitor" in line
     return cells if own and any(_CLOCK.fullmatch(cell) for cell in cells) else None
@@ -54,8 +45,4 @@ _LAYOUT = Layout(
     KIND, '"Iteration","Thrust 1 Monitor: Thrust (N)"', _names, lambda line: cells_of(line, ","), _column,
     notes=("monitors state neither sector nor sign convention",), commas=False,
 )  # fmt: skip
-
-
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read monitors."""
-    return read_history(path, _LAYOUT)
+sniff, read = _LAYOUT.sniff, _LAYOUT.read

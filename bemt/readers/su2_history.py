@@ -12,12 +12,9 @@ STAR-CCM+ does; their coefficients and residuals tell them apart.
 
 from __future__ import annotations
 
-import os
 import re
 
-from bemt.dataset import Dataset
-from bemt.readers._cfd import Column, cells_of, head_lines
-from bemt.readers._cfd_record import Layout, outermost, read_history
+from bemt.readers._cfd import Column, Layout, cells_of, outermost
 
 KIND = "su2_history"
 
@@ -28,18 +25,12 @@ _START = re.compile(
 )
 
 
-def sniff(head: bytes | str) -> bool:
-    r"""Tell whether one of the first lines is a list of quoted names that begins with an iteration.
-
-    >>> sniff('"Time_Iter","Inner_Iter", "CD"\n0,0,0.2'), sniff('"Iteration" "drag"')
-    (True, False)
-    >>> sniff('"Iteration","Thrust 1 Monitor: Thrust (N)"\n1,0.2'), sniff('"Iteration","CL","CD"\n1,0.2,0.1')
-    (False, True)
-    """
-    return any(_START.match(line) for line in head_lines(head, 4))
-
-
 def _names(line: str) -> tuple[str, ...] | None:
+    """Quoted names that begin with an iteration of SU2.
+
+    >>> _names('"Time_Iter","Inner_Iter", "CD"'), _names('"Iteration","Thrust 1 Monitor: Thrust (N)"')
+    (('Time_Iter', 'Inner_Iter', 'CD'), None)
+    """
     return cells_of(re.sub(r"^VARIABLES\s*=\s*", "", line), ",") if _START.match(line) else None
 
 
@@ -55,10 +46,6 @@ _LAYOUT = Layout(
     KIND, '"Time_Iter","Inner_Iter","CD"', _names, lambda line: cells_of(line, ","), _column,
     lambda line: re.match(r"(TITLE|ZONE)\b", line) is not None,
     ("coefficients rest on reference values that the history does not state",), commas=False,
-    finish=outermost,
+    finish=outermost, within=4,
 )  # fmt: skip
-
-
-def read(path: str | os.PathLike[str]) -> Dataset:
-    """Read a history."""
-    return read_history(path, _LAYOUT)
+sniff, read = _LAYOUT.sniff, _LAYOUT.read

@@ -84,10 +84,10 @@ class UiucPropeller:
     diameter_in: float
     pitch_in: float | None
     angle_deg: float | None  # Nominal blade angle at r/R = 0.75 [deg]
-    blades: int  # Number of blades, +1 tractor or -1 pusher, specimen
+    blades: int
     blades_from: str  # ``name``, ``family`` or ``default`` (2)
-    rotation: int  # Number of blades, +1 tractor or -1 pusher, specimen
-    specimen: int  # Number of blades, +1 tractor or -1 pusher, specimen
+    rotation: int  # +1 tractor or -1 pusher
+    specimen: int
     geometry: UiucGeometry | None  # Stations, from this or a related propeller (``geometry.origin``)
     thickness: UiucThickness | None  # Thickness of its family, if published
     # Static runs; advance-ratio runs ascending in rpm
@@ -105,15 +105,10 @@ class UiucPropeller:
         if len(self.statics) < 2:
             return self.statics[0] if self.statics else None
         tables = self.statics
-        return UiucStatic(
-            "+".join(t.file for t in tables),
-            "+".join(t.sha256 for t in tables),
-            sum((t.rows for t in tables), ()),
-            sum((t.flags for t in tables), ()),
-            np.concatenate([t.rpm for t in tables]),
-            np.concatenate([t.CT for t in tables]),
-            np.concatenate([t.CP for t in tables]),
-        )
+        rpm, CT, CP = (np.concatenate([getattr(t, name) for t in tables]) for name in ("rpm", "CT", "CP"))
+        file, sha256 = ("+".join(getattr(t, name) for t in tables) for name in ("file", "sha256"))
+        rows, flags = sum((t.rows for t in tables), ()), sum((t.flags for t in tables), ())
+        return UiucStatic(file, sha256, rows, flags, rpm, CT, CP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +188,7 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
     for key, name in sorted(names.items()):
         folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
         if name.faults:
-            where = f"{folder}/{key}_* ({counts[key]} files)"
-            faults.extend(Fault(where, "name", *fault) for fault in name.faults)
+            faults.extend(Fault(f"{folder}/{key}_* ({counts[key]} files)", "name", *fault) for fault in name.faults)
             continue
         if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
             continue
@@ -284,10 +278,6 @@ def to_series(propeller: UiucPropeller) -> Dataset:
         fault = Fault(propeller.folder, propeller.name, "geometry only", "a static or advance-ratio run")
         raise InputError(fault)
     values = {name: np.concatenate(arrays) for name, arrays in columns.items()}
-    provenance = {
-        "source": SOURCE,
-        "file": propeller.folder,
-        "sha256": hashes,
-        "remark": f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in",
-    }
+    remark = f"coefficients on the true diameter; nominal {propeller.diameter_in:g} in"
+    provenance = {"source": SOURCE, "file": propeller.folder, "sha256": hashes, "remark": remark}
     return Dataset("bench", propeller.name, values, {}, tuple(flags), provenance, tuple(labels))

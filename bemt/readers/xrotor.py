@@ -39,9 +39,9 @@ def read_section(rows: Cursor) -> tuple[float, XrotorSection]:
         rows.take(*what) for what in _SECTION
     )
     if not 0.5 <= slope <= 15.0:
-        rows.fault(line, f"a lift slope of {slope:g}", "0.5 to 15 per radian", "Per degree?")
+        rows.add(line, f"a lift slope of {slope:g}", "0.5 to 15 per radian", "Per degree?")
     if not (span > 0.0 and reref > 0.0 and least > 0.0):
-        rows.fault(line, f"dCLstall {span:g}, REref {reref:g}, CDmin {least:g}", "values above 0")
+        rows.add(line, f"dCLstall {span:g}, REref {reref:g}, CDmin {least:g}", "values above 0")
     numbers = (slope, top, bottom, stall, span, least, middle, bend, reref, reexp, cm, mcrit)
     return x, XrotorSection(math.radians(a0), *numbers)
 
@@ -49,8 +49,8 @@ def read_section(rows: Cursor) -> tuple[float, XrotorSection]:
 def read(path: str | os.PathLike[str]) -> BladeFile:
     """Read one saved rotor."""
     rows = Cursor(path, "!#")
-    if len(rows.rows) < 9 or not sniff(rows.source.text):
-        rows.refuse(1, repr(rows.source.text[:30]), "XROTOR VERSION, a title and the rotor")
+    if len(rows.rows) < 9 or not sniff(rows.text):
+        rows.refuse(1, repr(rows.text[:30]), "XROTOR VERSION, a title and the rotor")
     name, rows.at = rows.rows[1][1].strip(), 2
     rho, *_ = rows.take(4, "Rho Vso Rmu Alt")
     R, V, adv, rake = rows.take(4, "Rad Vel Adv Rake")
@@ -67,7 +67,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     n, blades = rows.take(2, "II Nblds")
     left = len(rows.rows) - rows.at
     if min(left, whole(n)) < n:
-        rows.fault(rows.rows[-1][0], f"{min(left, whole(n))} stations", f"{n:g}")
+        rows.add(rows.rows[-1][0], f"{min(left, whole(n))} stations", f"{n:g}")
     table = rows.table(whole(n), 4, "r/R C/R Beta0deg Ubody")
     rows.check()
     notes = ["compressibility: effects of the case instead of XROTOR's Mcrit"]
@@ -81,7 +81,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     air = rho if 0.01 < rho < 10.0 else None
     x = np.array([s[0] for s in sections])
     if np.any(np.diff(x) <= 0.0):
-        rows.fault("sections", f"r/R {x.tolist()}", "ascending")
+        rows.add("sections", f"r/R {x.tolist()}", "ascending")
     r, c, beta = table[:, 0] * R, table[:, 1] * R, np.radians(table[:, 2])
     point = (rpm, V if rpm else None, air)
     return rows.finish(BladeFile(name, "XROTOR", whole(blades), R, hub * R, r, c, beta, sections, *point, tuple(notes)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,46 +17,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import readers
-from bemt.base.averaging import MIN_ROWS, Mean, keep_last, relation, revolution_average, steady_average
+from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.dataset import Dataset
 from bemt.readers._cfd import unit_of
 from bemt.readers._headings import may_be_shaft_speed
 from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
+from bemt.recordings.cfd_files import (
+    FIELDS,
+    PROGRAMS,
+    Settled,
+    cfd_files,
+    clock_of,
+    read_run,
+    settled,
+    zone_of,
+)
 from bemt.recordings.cfd_setup import with_grid_floor
 from bemt.recordings.grid_study import COVERAGE
 
 __all__ = [
-    "DUCT",
-    "FIELDS",
-    "NO_LOAD",
-    "PROGRAMS",
-    "assemble",
-    "cfd_files",
-    "document",
-    "is_run",
-    "run_at",
-    "run_text",
-    "settled",
-]
+    "DUCT", "FIELDS", "NO_LOAD", "PROGRAMS", "assemble", "cfd_files", "clock_of", "document", "is_run", "run_at",
+    "run_text", "settled",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
-PROGRAMS: Mapping[str, str] = {
-    "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",
-    "fluent_xy": "Fluent", "fluent_ascii": "Fluent", "cfd_post_csv": "CFD-Post", "design_points": "Workbench",
-    "star_monitor": "STAR-CCM+", "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
-}  # fmt: skip
-"""Program by reader."""
-FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
-"""Readers whose files may hold values at points, and no loads."""
 NO_LOAD = "a thrust or a torque"
 MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
-SCATTERED = 0.02
-"""Spread of the means of single revolutions above which a load is not periodic. [1]"""
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
 """Name of a zone that is the duct."""
@@ -75,6 +66,7 @@ _WORDS: dict[str, str] = {
 """Heading of a quantity."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,30 +81,6 @@ class _Found:
     part: str  # force, moment, or "" where only the heading tells
     unit: str
     record: Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class _Settled:
-    """A load after averaging."""
-
-    values: Array  # (N,) SI, rpm in rev/min
-    drift: float  # change over the averaged part, in the unit of the values; NaN: nothing was averaged
-    scatter: float  # standard deviation over it
-    over: str
-
-
-def cfd_files(folder: Path) -> tuple[Path, ...]:
-    """Exports of a run in a folder: the files in it, or those below ``postProcessing``."""
-    post = folder / "postProcessing" if (folder / "postProcessing").is_dir() else None
-    files = sorted(post.glob("*/*/*.dat")) if post else sorted(p for p in folder.iterdir() if p.is_file())
-    out = []
-    for path in files:
-        try:
-            if readers.detect(path) in PROGRAMS:
-                out.append(path)
-        except InputError:
-            continue
-    return tuple(out)
 
 
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
@@ -153,18 +121,9 @@ def is_run(record: Dataset) -> bool:
     return record.provenance.get("format") == "cfd_run"
 
 
-def _zone_of(path: Path, form: str) -> str:
-    """Function object of a file of OpenFOAM, which writes name/time/file."""
-    try:
-        float(path.parent.name)
-    except ValueError:
-        return ""
-    return path.parent.parent.name if form == "openfoam_forces" else ""
-
-
 def _columns(file: str, record: Dataset, several: bool) -> list[_Found]:
     form = str(record.provenance["format"])
-    home = _zone_of(Path(file), form) if several else ""
+    home = zone_of(Path(file), form) if several else ""
     clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
     out = []
     for name in record.values:
@@ -184,125 +143,6 @@ def _columns(file: str, record: Dataset, several: bool) -> list[_Found]:
     return out
 
 
-def _read(paths: Sequence[Path]) -> list[tuple[str, Dataset]]:
-    """Files of a run, the parts of a restarted history put together."""
-    read: list[tuple[str, Dataset]] = []
-    faults: list[Fault] = []
-    for path in paths:
-        try:
-            found = readers.read(path)
-            if not isinstance(found, Dataset) or found.kind != "cfd":
-                got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
-                raise InputError(
-                    Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}")
-                )
-            read.append((str(path), found))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
-    return _joined(read)
-
-
-def _joined(read: list[tuple[str, Dataset]]) -> list[tuple[str, Dataset]]:
-    out: list[tuple[str, Dataset]] = []
-    for name, record in read:
-        home = _home(name, record)
-        at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
-        if at is None or record.provenance.get("clock") not in ("time", "iteration"):
-            out.append((name, record))
-            continue
-        file, before = out[at]
-        how = relation(_clock(before), _clock(record))
-        if home[0] == "openfoam_forces" and not _clock(record)[1].size and _clock(record)[0][0] > _clock(before)[0][0]:
-            how = "continues" if _clock(record)[0][0] > _clock(before)[0][-1] else "overlaps"  # one folder a start
-        if how == "other clock" and _clock(record)[0].size and _clock(record)[0][-1] < _clock(before)[0][0]:
-            before, record, how = record, before, relation(_clock(record), _clock(before))
-        if how == "other clock":
-            got = f"the same columns as {Path(file).name} on another clock"
-            raise InputError(
-                Fault(name, "", got, "parts of one history", "A restart with a clock of its own: give it alone")
-            )
-        cut = _clock(record)[0][0]
-        kept = _clock(before)[0] < cut
-        values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
-        note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
-        out[at] = (
-            file,
-            replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=(*before.notes, note)),
-        )
-    return out
-
-
-def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
-    """What the parts of one history have in common: format, function object, columns."""
-    form = str(record.provenance["format"])
-    return form, _zone_of(Path(name), form), tuple(record.values)
-
-
-def _clock(record: Dataset) -> tuple[Array, Array]:
-    time = str(record.provenance.get("time_channel", ""))
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
-    times = record[time] if time in record else np.empty(0)
-    return (record[names[0]] if names else times), times
-
-
-def _one_base(read: Sequence[tuple[str, Dataset]]) -> None:
-    """Refuse histories that do not overlap: they are not one run."""
-    for kind in ("time", "iteration"):
-        own = [
-            (n, c) for n, r in read if r.provenance.get("clock") == kind and (c := _clock(r)[kind == "time"]).size > 1
-        ]
-        for (a, x), (b, y) in zip(own, own[1:], strict=False):
-            shared = min(x[-1], y[-1]) - max(x[0], y[0])
-            if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
-                got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
-                raise InputError(
-                    Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself")
-                )
-
-
-def settled(
-    values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf
-) -> _Settled | str:
-    """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
-    clock = record.provenance.get("clock")
-    coarse = ""
-    if clock == "time":
-        time = record[record.provenance["time_channel"]]
-        index, _ = keep_last(time)
-        index = index[time[index] <= end * (1.0 + 1e-9)]
-        step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
-        if step > period / MIN_ROWS:
-            clock, coarse = (
-                "iteration",
-                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
-            )
-    if clock == "time":
-        found = revolution_average(time[index], values[index], period, revolutions)
-        if found.mean is None:
-            return found.problem
-        turns = np.array(found.per_revolution)
-        scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
-        word = f"{found.revolutions} revolution" + ("s" if found.revolutions > 1 else "")
-        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({found.rows} rows)"
-        wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
-        over += "; revolutions differ by more than 2 %" if wide else ""
-        return _Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)
-    if clock == "iteration":
-        found = steady_average(values)
-        if found.mean is None:
-            return found.problem
-        part = values[values.size - found.rows :]
-        over = f"last {found.rows} of {values.size} rows{coarse}"
-        return _Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
-    mean = record.provenance.get("means", {})
-    over = "as in the file"
-    if values.size > 1 and mean and record.provenance["format"] == "fluent_transcript":
-        values, over = values[np.isfinite(values)][-1:], "the last one computed"
-    return _Settled(np.array(values, dtype=float), math.nan, 0.0, over)
-
-
 def _recorded(found: list[_Found]) -> list[_Found]:
     """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
     written = [c for c in found if c.record.provenance["format"] != "fluent_transcript"]
@@ -316,13 +156,15 @@ class _Run:
     run: RunToml
     name: str
     columns: list[_Found]
+    complete: bool = True  # whether all its files could be read
     period: float = math.nan
     end: float = math.inf
-    notes: list[str] = None  # type: ignore[assignment]
-    faults: list[Fault] = None  # type: ignore[assignment]
+    notes: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.notes, self.faults = [], []
+    def fault(self, at: _Found | None, where: str, got: str, expected: str, hint: str = "") -> None:
+        """Note a fault of a column's file, or of the run."""
+        self.faults.append(Fault(self.name if at is None else at.file, where, got, expected, hint))
 
     def fact(self, quantity: str) -> RunColumn:
         """What the user said of a quantity."""
@@ -333,9 +175,9 @@ class _Run:
         told = self.fact(quantity).column
         if told is not None:
             hits = [c for c in self.columns if told in (c.name, c.stem)]
-            if not hits:
+            if not hits and self.complete:
                 known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
-                self.faults.append(Fault(self.name, f"columns.{quantity}.column", repr(told), f"one of {known}"))
+                self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             return hits
         dimension = QUANTITIES[quantity][0]
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
@@ -363,7 +205,7 @@ class _Run:
         stated = unit_of(c.unit)
         if told and stated is not None and unit is not None and stated.suffix != unit.suffix:
             got = f"{told}, where the file says {c.unit}"
-            self.faults.append(Fault(c.file, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=..."))
+            self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=...")
             return None
         if c.part and c.axis and not c.unit and not told:
             factor = self._reference(c)
@@ -373,7 +215,7 @@ class _Run:
             hint = f'--unit {quantity}="{usual}" if that is its unit; '
             hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
             got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
-            self.faults.append(Fault(c.file, c.name, got, f"the unit of the {quantity}", hint))
+            self.fault(c, c.name, got, f"the unit of the {quantity}", hint)
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
@@ -388,11 +230,24 @@ class _Run:
         length = 1.0 if c.part == "force" else ref.length_m
         if math.isnan(force) or length is None:
             hint = "--reference area=A,length=L,speed=V,density=RHO in m2, m, m/s, kg/m3, as set in the solver"
-            self.faults.append(Fault(c.file, c.name, "a coefficient", "the reference values it rests on", hint))
+            self.fault(c, c.name, "a coefficient", "the reference values it rests on", hint)
             return None
         return force * length
 
-    def mean(self, quantity: str, c: _Found) -> _Settled | None:
+    def sign(self, quantity: str, values: Array, others: Mapping[str, float]) -> float:
+        """Sign of a load: as told, that of the whole for the duct's part, else the one that makes it positive."""
+        told = self.fact(quantity).sign
+        if told is not None:
+            return float(told)
+        if quantity == "duct_thrust":
+            return others.get("thrust", 1.0)
+        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
+        if middle < 0:
+            name = _CHANNEL[quantity]
+            self.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
+        return -1.0 if middle < 0 else 1.0
+
+    def mean(self, quantity: str, c: _Found) -> Settled | None:
         """Settled value of one column."""
         values = self.si(quantity, c)
         if values is None:
@@ -400,7 +255,7 @@ class _Run:
         found = settled(values, c.record, self.period, self.run.run.revolutions, self.end)
         if isinstance(found, str):
             hint = "--revolutions N, or run on" if "revolution" in found else "Run on, or leave the file out"
-            self.faults.append(Fault(c.file, c.name, found, "a history with an average", hint))
+            self.fault(c, c.name, found, "a history with an average", hint)
             return None
         return found
 
@@ -418,7 +273,7 @@ class _Run:
                 v = np.unique(own[0].record[own[0].name])
                 got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
                 usual = '--unit rpm=rpm, or --unit rpm="rad/s", says its unit' if not stated else "Leave out --rpm"
-                self.faults.append(Fault(own[0].file, own[0].name, got, "one source of the speed", usual))
+                self.fault(own[0], own[0].name, got, "one source of the speed", usual)
         if own and head.rpm is None:
             values = self.si("rpm", own[0])
             if values is not None:
@@ -427,11 +282,10 @@ class _Run:
                     if own[0].record.provenance.get("clock") != "time"
                     else None
                 )
-                return np.abs(found.values if isinstance(found, _Settled) else values[-1:])
+                return np.abs(found.values if isinstance(found, Settled) else values[-1:])
             return np.array([math.nan])
         if head.rpm is None:
-            hint = "--rpm N; run.toml: [run] rpm = N"
-            self.faults.append(Fault(self.name, "rpm", "no speed of rotation", "rev/min of the run", hint))
+            self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
         return np.array([math.nan if head.rpm is None else head.rpm])
 
 
@@ -448,9 +302,7 @@ def _axis(run: _Run, forces: Sequence[_Found], moments: Sequence[_Found]) -> str
     side = max((v for a, v in size.items() if a != axis), default=0.0)
     if size[axis] < _ALONG * side:
         got = ", ".join(f"{a} {v:.4g}" for a, v in size.items())
-        run.faults.append(
-            Fault(lead[0].file, "axis", got, "one component that stands out", "Name the shaft's: --axis z")
-        )
+        run.fault(lead[0], "axis", got, "one component that stands out", "Name the shaft's: --axis z")
     return axis
 
 
@@ -480,7 +332,7 @@ def _pool(run: _Run, quantity: str) -> dict[str, _Found]:
         if label in out and twice == 1:
             got = f"{out[label].name} ({Path(out[label].file).name}) and {c.name} ({Path(c.file).name})"
             option = f"--column {quantity}=NAME" if out[label].name != c.name else "Give one of the files"
-            run.faults.append(Fault(c.file, quantity, got, "one column", option))
+            run.fault(c, quantity, got, "one column", option)
         out.setdefault(label, c)
     return out
 
@@ -493,15 +345,13 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     if head.zones is not None:
         known = [z for z in head.zones if z in pool]
         if "Net" in head.zones and len(head.zones) > 1:
-            run.faults.append(
-                Fault(run.name, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
-            )
+            run.fault(None, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
         if torque and not known and list(pool) == [""]:
             return [(1.0, "")], []
         if absent := [z for z in head.zones if z not in pool]:
             if not torque or not known:
                 hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
-                run.faults.append(Fault(run.name, "zones", ", ".join(absent), f"zones with a {quantity}", hint))
+                run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
             elif bare := [z for z in absent if not DUCT.search(z)]:
                 run.notes.append(f"torque: no column for {', '.join(bare)}")
         duct = [z for z in known if z in ducts]
@@ -515,13 +365,13 @@ def _counted(run: _Run, quantity: str, pool: Mapping[str, _Found]) -> tuple[list
     if len(pool) > 1:
         names = ",".join(pool)
         hint = f"--zones {names} (leave out what does not count)"
-        run.faults.append(Fault(run.name, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint))
+        run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
     return [(1.0, z) for z in pool], [z for z in ducts if len(pool) > 1]
 
 
-def _sum(parts: Sequence[tuple[float, _Settled]]) -> _Settled:
+def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
     over = parts[0][1].over + (f", {len(parts)} zones" if len(parts) > 1 else "")
-    return _Settled(
+    return Settled(
         np.sum([k * s.values for k, s in parts], axis=0), sum(k * s.drift for k, s in parts),
         math.hypot(*(s.scatter for _, s in parts)), over,
     )  # fmt: skip
@@ -550,24 +400,26 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         With everything that has to be said first: units, zones, speed.
     """
     paths = [folder / f for f in run.run.files]
-    read = _read(paths)
-    _one_base(read)
+    read, faults = read_run(paths)
     homes = {
-        _zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
+        zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
     }
     columns = [c for file, record in read for c in _columns(file, record, len(homes) > 1)]
-    work = _Run(run, name, columns)
+    work = _Run(run, name, columns, complete=not faults)
     work.notes += [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
+    if not work.complete:
+        work.faults += faults
+        _ask_all(work)
+        raise InputError(list(dict.fromkeys(work.faults)))
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
-    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := _clock(r))[1].size]
+    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
     work.end = float(min(times)) if times else math.inf
     if times and not math.isfinite(work.period):
         work.period = 1.0
-        times = []
         _ask_all(work)
-        raise InputError(work.faults)
-    loads: dict[str, _Settled] = {}
+        raise InputError(list(dict.fromkeys(work.faults)))
+    loads: dict[str, Settled] = {}
     for quantity in ("thrust", "torque", "power"):
         pool = _pool(work, quantity)
         if not pool:
@@ -598,26 +450,26 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
 
 def _nothing(work: _Run) -> None:
     """Say that no column is a load, unless a fault says already what one needs."""
-    if any(f.where != "rpm" for f in work.faults):
+    if not work.complete or any(f.where != "rpm" for f in work.faults):
         return
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
     first = next((c.name for c in work.columns if not c.unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
-    work.faults.append(Fault(work.name, "", f"columns {known}", NO_LOAD, hint))
+    work.fault(None, "", f"columns {known}", NO_LOAD, hint)
 
 
 def _ask_all(work: _Run) -> None:
-    """Say with a missing speed which units are missing too."""
-    pools = {quantity: _pool(work, quantity) for quantity in ("thrust", "torque")}
+    """Say with a missing speed which units, zones and reference values are missing too."""
+    pools = {quantity: pool for quantity in ("thrust", "torque", "power") if (pool := _pool(work, quantity))}
     for quantity, pool in pools.items():
-        for c in list(pool.values())[:1]:
-            work.si(quantity, c)
-    if not any(pools.values()):
+        _counted(work, quantity, pool)
+        work.si(quantity, next(iter(pool.values())))
+    if not pools:
         _nothing(work)
 
 
 def _applied(
-    work: _Run, rpm: Array, loads: Mapping[str, _Settled], read: Sequence[tuple[str, Dataset]]
+    work: _Run, rpm: Array, loads: Mapping[str, Settled], read: Sequence[tuple[str, Dataset]]
 ) -> tuple[dict[str, Array], dict[str, Array], dict[str, Any]]:
     """Sector and sign applied, the operating point beside the loads."""
     head = work.run.run
@@ -637,25 +489,11 @@ def _applied(
     u: dict[str, Array] = {}
     over: dict[str, str] = {}
     drift: dict[str, float] = {}
-    turned = 1.0
+    signs: dict[str, float] = {}
     for quantity, found in loads.items():
-        name = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}[
-            quantity
-        ]
-        told = work.fact(quantity).sign
-        if quantity == "duct_thrust" and told is None:
-            sign = turned
-        elif told is None:
-            middle = np.nanmedian(found.values) if np.isfinite(found.values).any() else 0.0
-            sign = -1.0 if middle < 0 else 1.0
-            if sign < 0:
-                work.notes.append(
-                    f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)"
-                )
-        else:
-            sign = float(told)
-        turned = sign if quantity == "thrust" else turned
-        values[name] = sign * sector * found.values
+        name = _CHANNEL[quantity]
+        signs[quantity] = work.sign(quantity, found.values, signs)
+        values[name] = signs[quantity] * sector * found.values
         size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0) * sector
         u[name] = np.full(found.values.size, size)
         over[name] = found.over
@@ -664,9 +502,7 @@ def _applied(
             drift[name] = found.drift / mean
             if abs(drift[name]) > LOST:
                 got = f"a mean that drifts by {drift[name]:+.0%}"
-                work.faults.append(
-                    Fault(work.name, quantity, got, "a run that has converged", "Run on, or start later")
-                )
+                work.fault(None, quantity, got, "a run that has converged", "Run on, or start later")
             elif abs(drift[name]) > MOVING:
                 work.notes.append(f"not settled: {quantity} drifts by {drift[name]:+.1%} over the averaged part; in u")
     if sector > 1:
@@ -683,7 +519,7 @@ def _coefficients(work: _Run, values: dict[str, Array], u: dict[str, Array], ove
     for c in work.columns:
         if c.name in _COEFFICIENTS and c.name not in values:
             found = settled(c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
-            if isinstance(found, _Settled):
+            if isinstance(found, Settled):
                 values[c.name], over[c.name] = found.values, found.over
                 if c.name != "J":
                     u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))

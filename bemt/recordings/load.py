@@ -36,7 +36,7 @@ from bemt.dataset import Dataset
 from bemt.dataset.channels import channel_fault
 from bemt.readers._uiuc_tables import NO_SPEED
 from bemt.readers.cfd_run import KIND as RUN
-from bemt.readers.cfd_run import RunToml
+from bemt.readers.cfd_run import RunHead, RunToml
 from bemt.recordings import cfd_run
 from bemt.recordings.adapt import adapt, damaged_export, recognised
 from bemt.recordings.choice import Choice, averaged
@@ -136,7 +136,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
         for other in _earlier(Path(path), paths, records):
             text = f"next to {other}: not joined"
             if other in records:
-                how = relation(_clock(records[other]), _clock(record))
+                how = relation(cfd_run.clock_of(records[other]), cfd_run.clock_of(record))
                 text = f"restart of {other} ({how}): not joined"
                 if how == "other clock":
                     text += "; the same steps mean other times"
@@ -167,28 +167,15 @@ def _before(name: str, start: float) -> bool:
         return False
 
 
-def _clock(record: Dataset) -> tuple[Any, Any]:
-    time = record.provenance.get("time_channel", "")
-    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
-    times = record[time] if time in record else np.empty(0)
-    return (record[names[0]] if names else times), times
-
-
 def document(
-    paths: Iterable[str | os.PathLike[str]],
-    format: str | None = None,
-    choice: Choice | None = None,  # noqa: A002
-    run: RunToml | None = None,
-    insist: bool = False,
-) -> dict[str, Any]:
+    paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
+    run: RunToml | None = None, insist: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Read files and give the document ``bemt.import/1``; with ``insist`` they must be the CFD run of ``run``."""
     names = [os.fspath(path) for path in paths]
     runs, to_do = _runs(names, run, insist)
-    names = (
-        [name for name in names if not Path(name).is_dir() or not cfd_run.cfd_files(Path(name))]
-        if runs or to_do
-        else names
-    )
+    if runs or to_do:
+        names = [name for name in names if not (Path(name).is_dir() and cfd_run.cfd_files(Path(name)))]
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -221,19 +208,16 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
             if insist:
                 raise
     if insist and not exports:
-        hint = "A run.toml has its own" if runs else ""
-        raise InputError(Fault("", "", "options of a CFD run", "exports of a CFD run", hint))
+        hint = "A run.toml has its own" if runs else "Name the files, or the folder that holds them (postProcessing)"
+        got = "no export of CFD, which options of a run are about"
+        raise InputError([Fault(name, "", got, "exports of a CFD run", hint) for name in names])
     if not exports:
         return runs, None
-    head = (run.run if run else RunToml.model_validate({"run": {"files": ()}}).run).model_copy(
-        update={"files": tuple(exports)}
-    )
+    head = (run.run if run else RunHead(files=())).model_copy(update={"files": tuple(exports)})
     whole = run.model_copy(update={"run": head}) if run else RunToml(run=head)
+    name = " + ".join(Path(e).name for e in exports[:3])
     try:
-        return [
-            *runs,
-            cfd_run.document(cfd_run.assemble(whole, Path(), " + ".join(Path(e).name for e in exports[:3]))),
-        ], None
+        return [*runs, cfd_run.document(cfd_run.assemble(whole, Path(), name))], None
     except Exception as error:
         if insist:
             raise
@@ -255,12 +239,8 @@ def _refusal(error: Exception) -> str:
 
 
 def _entry(
-    name: str,
-    record: Dataset | None,
-    format: str | None,
-    notes: Sequence[str],
-    error: str | None,  # noqa: A002
-) -> dict[str, Any]:
+    name: str, record: Dataset | None, format: str | None, notes: Sequence[str], error: str | None,  # noqa: A002
+) -> dict[str, Any]:  # fmt: skip
     reduced = _reduced(record)
     means = _means(record, reduced) if record else {}
     channels = {k: _shown(record.unit(k), means.get(k)) for k in record.values} if record else {}
@@ -341,17 +321,11 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
         steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
         lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
     if wrote or found["runs"]:
-        typed = shlex.quote(
-            wrote or (found["runs"][0]["name"] if found["runs"][0]["name"].endswith(".toml") else "run.toml")
-        )
-        lead = (
-            f"{wrote} written. "
-            if wrote
-            else ""
-            if typed.strip("'") == found["runs"][0]["name"]
-            else "With --out run.toml: "
-        )
-        return "\n".join([*lines, f"{lead}Next: bemt compare {typed} --case CASE   (a case: bemt new 10x5)\n"])
+        name = "" if wrote else str(found["runs"][0]["name"])
+        file = wrote or (name if name.endswith(".toml") else "run.toml")
+        lead = f"{wrote} written. " if wrote else "" if file == name else "With --out run.toml: "
+        step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+        return "\n".join([*lines, step])
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)

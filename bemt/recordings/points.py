@@ -1,6 +1,21 @@
 """From rows to points: plateaus of a record of samples, or the rows of a table of steady points.
 
-Every row ends in one point, in one stretch at rest, or in one entry of what was dropped, with the reason.
+Every row ends in one point, in one stretch at rest, or in one entry of what was dropped, with the reason. Is a table a
+record of samples, or a list of steady points? The rule, in this order:
+
+1. rows with their own uncertainty (``u_...`` columns, stated errors) are points: somebody has averaged already;
+2. fewer than twelve rows are points;
+3. rows that differ from their neighbours by more than 2 % of the range in every load and speed, where no command is
+   held, are points in any order (of fewer than 400 rows; a log has more);
+4. with time: a median step of 0.2 s or less makes samples; up to 2 s still, when the command is held for five rows or
+   more in most rows, or up to 0.5 s when there is no command; anything slower makes points, and so does a command that
+   changes from row to row (a slow ramp: quasi-steady);
+5. without time: a command that is held like that makes samples, else points;
+6. more than 50,000 rows are samples in any case: nobody has so many steady points.
+
+Rest is where nothing turns: the speed reads 0, or no sensor tells and the command is 0 %, and no more current flows
+than 0.5 % of the largest (1000 us and 0 % are rest by themselves). A speed of 0 while current flows is a sensor that
+failed.
 """
 
 from __future__ import annotations
@@ -14,21 +29,115 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
+from bemt.readers._samples import MISREAD, against_load
 from bemt.recordings import plateaus
 from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stated
-from bemt.recordings.rows import at_rest, command_of
-from bemt.recordings.tare import Rest
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
 """Channels that decide about steps, first one first."""
-WILD = 2.5
-"""Times that a speed may differ from what the load of the row needs, before it counts as misread."""
 SLOWEST = 1e-3
 """Speed below which a number is no reading. [rev/min]"""
+FEWEST = 12
+MOST_POINTS, UNLIKE = 400, 0.02
+LOG = 50_000
+FAST_S, MIDDLE_S, SLOW_S = 0.2, 0.5, 2.0
+HELD = 5
+IDLE_S = 1.0005e-3
 _SKIP = ("time_s", "run", "electrical_rpm", "optical_rpm")
 _COMMANDS = ("pwm_s", "throttle")
+
+
+def command_of(rec: Dataset) -> tuple[str, Array] | None:
+    """Find the command."""
+    for name in ("pwm_s", "throttle"):
+        v = rec.values.get(name)
+        if v is not None and np.any(np.isfinite(v)):
+            return name, v
+    return None
+
+
+def _held(command: Array) -> bool:
+    """Whether most rows belong to stretches of five or more with one command."""
+    edges = np.flatnonzero(np.diff(command) != 0.0) + 1
+    lengths = np.diff(np.concatenate([[0], edges, [len(command)]]))
+    return bool(lengths[lengths >= HELD].sum() > 0.5 * len(command))
+
+
+def _unlike(rec: Dataset) -> bool:
+    """Whether neighbouring rows differ in everything that was measured."""
+    steps = []
+    for name in ("rpm", "thrust_N", "torque_Nm", "power_W", "current_A"):
+        v = rec.values.get(name)
+        v = v[np.isfinite(v)] if v is not None else np.empty(0)
+        span = float(np.ptp(np.percentile(v, [5.0, 95.0]))) if v.size >= FEWEST else 0.0
+        if span > 0.0:
+            steps.append(float(np.median(np.abs(np.diff(v)))) / span)
+    return bool(steps) and min(steps) > UNLIKE
+
+
+def is_samples(rec: Dataset) -> tuple[bool, str]:
+    """Decide what the rows are."""
+    if stated(rec):
+        return False, "rows are points: they have their own uncertainties"
+    if len(rec) < FEWEST:
+        return False, f"rows are points: fewer than {FEWEST}"
+    found = command_of(rec)
+    held = found is not None and _held(found[1])
+    if len(rec) < MOST_POINTS and not held and _unlike(rec):
+        return False, "rows are points: neighbours differ in every load and speed"
+    t = rec.values.get("time_s")
+    t = t[np.isfinite(t)] if t is not None else None
+    if t is not None and len(t) > 0.5 * len(rec):
+        step = float(np.median(np.abs(np.diff(t))))
+        words = f"the median time step is {step:.3g} s"
+        if step <= (FAST_S if found is not None else MIDDLE_S):
+            return True, f"rows are samples: {words}"
+        if step <= SLOW_S and held:
+            return True, f"rows are samples: {words} and the command is held"
+        if len(rec) > LOG:
+            return True, f"rows are samples: more than {LOG}"
+        more = "" if found is None else ", and the command changes" if not held else ""
+        return False, f"rows are points: {words}{more}" + (" (a slow ramp: quasi-steady)" if step <= MIDDLE_S else "")
+    if held:
+        return True, "rows are samples: no time, but the command is held over many rows"
+    if len(rec) > LOG:
+        return True, f"rows are samples: more than {LOG}"
+    return False, "rows are points: no time, and no command that is held"
+
+
+def at_rest(rec: Dataset) -> NDArray[np.bool_]:
+    """Rows at which nothing turns, (N,)."""
+    n = len(rec)
+    found = command_of(rec)
+    idle = np.zeros(n, dtype=bool)
+    if found is not None:
+        idle = found[1] <= (IDLE_S if found[0] == "pwm_s" else 0.0)
+    speed = rec.values.get("rpm")
+    told = speed is not None and bool(np.any(np.abs(np.nan_to_num(speed)) > 0.0))
+    still = (speed == 0.0) if told and speed is not None else idle
+    current = rec.values.get("current_A")
+    if current is not None and np.any(np.isfinite(current)):
+        top = float(np.nanmax(np.abs(current)))
+        return np.asarray(still & ((np.abs(current) <= 0.005 * top) | idle))
+    if found is not None:
+        return np.asarray(still & idle)
+    quiet = np.zeros(n, dtype=bool)
+    for name in ("thrust_N", "torque_Nm"):
+        v = rec.values.get(name)
+        if v is not None and np.any(np.isfinite(v)):
+            quiet |= np.abs(v) > 0.02 * float(np.nanmax(np.abs(v)))
+    return np.asarray(still & ~quiet)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Means at rest: `when` (time or row), mean and standard error by channel."""
+
+    when: float
+    mean: Mapping[str, float]
+    u: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -228,8 +337,7 @@ def _close(
 def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: Found) -> None:
     """Leave out readings of a static table that the rest of their row contradicts.
 
-    Load goes with the square of the speed; a factor of more than 2.5 in speed against the rest of the table is a
-    misreading: of the one load where the other agrees with the speed, else of the speed.
+    The misreading is of the one load where the other agrees with the speed, else of the speed.
     """
     speed, v = data.get("rpm"), data.get("airspeed_m_s")
     loads = {k: np.abs(data[k]) for k in ("thrust_N", "torque_Nm") if k in data and _moves(data[k])}
@@ -241,9 +349,8 @@ def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: 
     if np.count_nonzero(good) < 6:
         return
     with np.errstate(all="ignore"):
-        each = {name: np.sqrt(size[good]) / speed[good] for name, size in loads.items()}
-        times = {name: k / float(np.median(k)) for name, k in each.items()}
-    wild = {name: (r > WILD) | (r < 1.0 / WILD) for name, r in times.items()}
+        times = {name: against_load(speed[good], size[good]) for name, size in loads.items()}
+    wild = {name: (r > MISREAD) | (r < 1.0 / MISREAD) for name, r in times.items()}
     every = np.logical_and.reduce(list(wild.values()))
     for name, odd in wild.items():
         for j in np.flatnonzero(odd & ~every):

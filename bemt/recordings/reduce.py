@@ -1,9 +1,9 @@
 """From a recording to an honest `Dataset`: steady points with uncertainties, and everything that was left out.
 
-In this order: the rows are told to be samples or points (``rows``); samples are cut into ``plateaus`` (start-up,
-settling, outliers); rows at rest give the zero that is subtracted (``tare``); the ``air``
-is found; coefficients follow where diameter and density are known; ``scatter`` comes from plateaus, stated errors,
-repeats.
+In this order: the rows are told to be samples or points (``points``); samples are cut into ``plateaus`` (start-up,
+settling, outliers); rows at rest give the zero that is subtracted, linear in time, whose uncertainty all points of a
+run share; the air is found (a density, else pressure and temperature; nothing is assumed); coefficients follow where
+diameter and density are known; ``scatter`` comes from plateaus, stated errors, repeats.
 
 The uncertainties of the series are the UNCORRELATED part, independent from point to point. What all points share is in
 `Reduction.correlated`: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1] (between runs of one condition).
@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
+from bemt.air import GAMMA, R_DRY, Air
 from bemt.base.errors import Fault, InputError
+from bemt.base.units import ZERO_CELSIUS
 from bemt.dataset import Dataset, concat
 from bemt.recordings.channels import (
     LOADS,
@@ -34,13 +36,12 @@ from bemt.recordings.channels import (
     shaft_power,
     stated,
 )
-from bemt.recordings.points import Found, Point, from_rows, from_samples
-from bemt.recordings.rows import command_of, is_samples
+from bemt.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
-from bemt.recordings.site_air import AirOfPoints, air_of
-from bemt.recordings.tare import TARED, TareZero, from_rest
 
 Array = NDArray[np.float64]
+TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
+"""Channels of load cells."""
 _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
 
@@ -377,3 +378,104 @@ def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: 
                     f"({loop.share:+.2%} of the largest, {loop.points} points)"
                 )
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class TareZero:
+    """What to subtract: (N,) by channel; its uncertainty, shared by the points; drift over the rests; notes."""
+
+    value: Mapping[str, Array]
+    u: Mapping[str, float]
+    drift: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> TareZero:
+    """Zero of every point from the stretches at rest, linear in time between them and held outside.
+
+    >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
+    >>> zero = from_rest(np.array([5.0, 20.0]), rests, {"thrust_N": 10.0})
+    >>> zero.value["thrust_N"].round(3).tolist(), round(zero.drift["thrust_N"], 3)
+    ([0.2, 0.3], 0.2)
+    """
+    value: dict[str, Array] = {}
+    u: dict[str, float] = {}
+    drift: dict[str, float] = {}
+    notes = []
+    order = sorted(rests, key=lambda r: r.when)
+    for name in TARED:
+        known = [r for r in order if math.isfinite(r.mean.get(name, math.nan))]
+        if not known:
+            continue
+        times, means = [r.when for r in known], [r.mean[name] for r in known]
+        value[name] = np.interp(when, times, means)
+        errors = [r.u.get(name, math.nan) for r in known]
+        good = [e for e in errors if math.isfinite(e)]
+        u[name] = math.sqrt(sum(e * e for e in good) / len(good)) if good else 0.0
+        top = full_scale.get(name, math.nan)
+        unit = name.rsplit("_", 1)[1]
+        share = f" ({abs(means[-1]) / top:.2%} of the largest)" if top > 0.0 else ""
+        if len(known) > 1:
+            drift[name] = means[-1] - means[0]
+            u[name] = math.hypot(u[name], (max(means) - min(means)) / math.sqrt(12.0))
+            part = f", {drift[name] / top:+.2%} of the largest" if top > 0.0 else ""
+            notes.append(
+                f"{name}: zero {means[0]:.4g} {unit} at first and {means[-1]:.4g} {unit} at last rest "
+                f"({len(known)} stretches): drift {drift[name]:+.3g} {unit}{part}; subtracted, linear in time"
+            )
+        else:
+            notes.append(f"{name}: zero {means[0]:.4g} {unit} at rest{share} subtracted; drift unknown (one rest only)")
+    return TareZero(value, u, drift, tuple(notes))
+
+
+@dataclass(frozen=True, eq=False)
+class AirOfPoints:
+    """Density [kg/m3] and speed of sound [m/s] of N points, NaN unknown; notes."""
+
+    rho: Array
+    a_sound: Array
+    notes: tuple[str, ...] = ()
+
+
+def air_of(values: Mapping[str, Array], n: int, constants: Mapping[str, float]) -> AirOfPoints:
+    """Find the air of every point."""
+    temperature = values.get("temperature_K", np.full(n, constants.get("temperature_K", np.nan)))
+    found = None
+    if "density_kg_m3" in values or "density_kg_m3" in constants:
+        rho = values.get("density_kg_m3", np.full(n, constants.get("density_kg_m3", np.nan)))
+        found = AirOfPoints(np.where(rho > 0.0, rho, np.nan), _sound(temperature))
+    elif "pressure_Pa" in values and np.any(np.isfinite(temperature)):
+        found = _moist(values, temperature)
+    if found is not None and np.any(np.isfinite(found.rho)):
+        return found
+    note = "no density: no coefficients; give pressure and temperature, or a density"
+    return AirOfPoints(np.full(n, np.nan), _sound(temperature), (*(found.notes if found else ()), note))
+
+
+def _sound(temperature: Array) -> Array:
+    """Speed of sound of dry air; NaN without a temperature that air of a laboratory can have."""
+    T = np.where((temperature > 200.0) & (temperature < 340.0), temperature, np.nan)
+    return np.asarray(np.sqrt(GAMMA * R_DRY * T))
+
+
+def _moist(values: Mapping[str, Array], temperature: Array) -> AirOfPoints:
+    n = len(temperature)
+    humidity = values.get("humidity", np.full(n, np.nan))
+    rho, a_sound = np.full((2, n), np.nan)
+    bad: list[str] = []
+    for i in range(n):
+        p, T, h = (float(x[i]) for x in (values["pressure_Pa"], temperature, humidity))
+        if not (np.isfinite(p) and np.isfinite(T)):
+            continue
+        try:
+            state = Air.from_state(p, T - ZERO_CELSIUS, 100.0 * h if np.isfinite(h) else 0.0)
+        except InputError as error:
+            bad.append(str(error.faults[0]))
+            continue
+        rho[i], a_sound[i] = state.rho, state.a_sound
+    notes = [
+        "density from pressure and temperature" + (" and humidity" if np.any(np.isfinite(humidity)) else ", dry air")
+    ]
+    if bad:
+        notes.append(f"no density in {len(bad)} points: {bad[0]}")
+    return AirOfPoints(rho, a_sound, tuple(notes))

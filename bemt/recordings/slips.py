@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import unit_errors
+from bemt.readers._samples import MOST_RPM_PER_V
 from bemt.recordings.findings import Facts, Finding, check_for
 from bemt.rotors import k1k2 as empirical
 
@@ -200,7 +201,7 @@ def relations(facts: Facts) -> list[Relation]:
     add("shaft power over electrical power", {"P": 1.0, **minus}, 1.0, (0.02, 1.05), (0.6, 1.5), any_row)
     add("tip Mach number", {"n": 1.0, "D": 1.0}, math.pi / 343.0, (0.02, 1.1), (0.3, 2.0), any_row)
     add("speed [rev/min]", {"n": 1.0}, 60.0, (150.0, 3e5), (8000.0, 3.0), any_row)
-    add("speed over voltage [rev/min/V]", {"n": 1.0, "U": -1.0}, 60.0, (20.0, 8000.0), (700.0, 3.0), any_row)
+    add("speed over voltage [rev/min/V]", {"n": 1.0, "U": -1.0}, 60.0, (20.0, MOST_RPM_PER_V), (700.0, 3.0), any_row)
     add("supply voltage [V]", {"U": 1.0}, 1.0, (0.5, 1000.0), (15.0, 3.0), any_row)
     if "p" in q and "D" in q and not duct:
         ratio = float(q["D"][0] / q["p"][0])

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
@@ -14,27 +13,16 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.readers import load_text
-from bemt.readers._headings import heading, unit_for
+from bemt.readers._headings import heading, meanings, unit_for
 from bemt.readers._split import decimal_mark, some, split_table
-from bemt.readers._words import english, quantities
 from bemt.readers.recording_toml import QUANTITIES, RecordingToml
 from bemt.recordings.cfd_options import pairs
 
-__all__ = ["meanings", "write_recording"]
+__all__ = ["write_recording"]
 
 _OF_DIMENSION = {"force": "thrust", "torque": "torque", "angular_speed": "rpm", "voltage": "voltage",
                  "current": "current", "speed": "airspeed", "density": "density", "pressure": "pressure"}  # fmt: skip
 """Quantity that a unit alone stands for."""
-
-
-def meanings(text: str) -> list[str]:
-    """Quantities of a recording.toml that the words of a heading may mean.
-
-    >>> meanings("Schub"), meanings("speed"), meanings("wibble")
-    (['thrust'], ['rpm', 'airspeed'], [])
-    """
-    found = [name for name, _ in quantities(english(re.split(r"[(\\[]", text)[0]))]
-    return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
 
 
 def _unit(quantity: str, text: str) -> str | None:
@@ -65,6 +53,8 @@ def write_recording(
     InputError
         On what is no column, unit or quantity, and where `out` exists.
     """
+    import tomlkit
+
     path = Path(out) if out.endswith(".toml") else Path(out) / "recording.toml"
     faults: list[Fault] = []
     if path.resolve().parent != Path(file).resolve().parent:
@@ -121,13 +111,12 @@ def write_recording(
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
     validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)
-    if out_faults.faults:
-        raise InputError(out_faults.faults)
-    lines = ["# Written by bemt import. Give this file in place of the table.", "[recording]"]
-    lines += [f"{key} = {json.dumps(value)}" for key, value in head.items()]
-    lines += ["", "[columns]"]
-    for quantity, entry in columns.items():
-        inside = ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in entry.items())
-        lines.append(f"{quantity} = {{ {inside} }}")
-    write_atomic(path, "\n".join(lines) + "\n")
+    out_faults.check()
+    document: dict[str, dict[str, Any]] = {
+        "recording": head,
+        "columns": {name: tomlkit.inline_table() for name in columns},
+    }
+    for name, entry in columns.items():
+        document["columns"][name].update(entry)
+    write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
     return path

@@ -1,0 +1,107 @@
+"""What the samples of one column say of themselves: clocks, single samples that jump, speeds that no load goes with."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+BLOCK = 1 << 17
+"""Samples that are searched for spikes at once."""
+HALF, TIMES = 3, 2.0
+"""Neighbours on each side of a spike, and ranges of theirs that it leaves."""
+MISREAD = 2.5
+"""Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
+MOST_RPM_PER_V = 8000.0
+"""Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
+_CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
+DAY = 86400.0
+
+
+def clock_seconds(cells: Sequence[str]) -> Array | None:
+    """Read ``12:30:05.25`` or ``2024-05-01T12:30:05``; other orders of day and month are ambiguous and stay text, (N,)
+    [s].
+
+    >>> clock_seconds(["23:59:59.5", "", "00:00:01.0"]), clock_seconds(["1:2", "x"]) is None
+    (array([0. , nan, 1.5]), True)
+    """
+    out = np.full(len(cells), np.nan)
+    dated: set[bool] = set()
+    for i, cell in enumerate(cells):
+        if not cell:
+            continue
+        match = _CLOCK.fullmatch(cell)
+        if match is None:
+            return None
+        year, month, day, hour, minute, second = (int(part or 0) for part in match.groups()[:6])
+        dated.add(bool(match[1]))
+        try:
+            date = datetime(year, month, day) if match[1] else datetime(2000, 1, 1)
+        except ValueError:
+            return None
+        if hour > 23 or minute > 59 or second > 60:
+            return None
+        at = date - datetime(2000, 1, 1) + timedelta(hours=hour, minutes=minute, seconds=second)
+        out[i] = at.total_seconds() + float(f"0.{match[7] or 0}")
+    known = np.flatnonzero(np.isfinite(out))
+    if not known.size or len(dated) > 1:
+        return None
+    if not dated.pop():
+        out[known[1:]] += DAY * np.cumsum(np.diff(out[known]) < -0.5 * DAY)
+    out -= out[known[0]]
+    return out
+
+
+def spikes(values: Array) -> NDArray[np.bool_]:
+    """Single samples that jump away from all their neighbours and back, (N,).
+
+    A sample is a spike when it lies outside the range of its neighbours by more than `TIMES` that range and by more
+    than a quarter of the spread of the whole channel. At an end, one side has no neighbours; there the jump must exceed
+    the spread of the whole channel, since a start-up looks like one.
+
+    >>> spikes(np.array([1.0, 1.1, 1.2, 9.0, 1.4, 1.5, 1.6, 1.7])).nonzero()[0]
+    array([3])
+    """
+    out = np.zeros(values.shape, dtype=bool)
+    rows = np.flatnonzero(np.isfinite(values))
+    if len(rows) < 6:
+        return out
+    v = values if len(rows) == len(values) else values[rows]
+    low, high = np.percentile(v, [5.0, 95.0])
+    top = max(abs(float(np.min(v))), abs(float(np.max(v))))
+    spread = max(float(high - low), 1e-12 * top)
+    for a in range(0, len(v), BLOCK):
+        far = _far(v, a, min(a + BLOCK, len(v)), spread)
+        out[rows[a : a + BLOCK][far]] = True
+    return out
+
+
+def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
+    """Spikes among the samples from a to b."""
+    at = max(a - HALF, 0)
+    part = v[at : b + HALF]
+    lo, hi = np.full(len(part), np.nan), np.full(len(part), np.nan)
+    for k in range(1, HALF + 1):  # neighbours on either side, as far as there are any
+        for own, other in ((slice(k, None), slice(None, -k)), (slice(None, -k), slice(k, None))):
+            np.fmin(lo[own], part[other], out=lo[own])
+            np.fmax(hi[own], part[other], out=hi[own])
+    part, lo, hi = (x[a - at : b - at] for x in (part, lo, hi))
+    share = np.full(b - a, 0.25)
+    if a == 0:
+        share[0] = 1.0
+    if b == len(v):
+        share[-1] = 1.0
+    return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
+
+
+def against_load(speed: Array, load: Array) -> Array:
+    """Root of a load over its speed, relative to the median of the rows, (N,); a speed is misread far from 1.
+
+    Loads go with the square of the speed: outside 1 / `MISREAD` to `MISREAD` the two of one row do not belong together.
+    """
+    k = np.sqrt(load) / speed
+    return np.asarray(k / np.median(k))

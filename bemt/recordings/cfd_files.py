@@ -1,0 +1,189 @@
+"""Files of a CFD run: found in folders, read, parts of a restarted history joined, the settled part averaged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt import readers
+from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
+from bemt.base.errors import Fault, InputError
+from bemt.dataset import Dataset
+
+__all__ = ["FIELDS", "PROGRAMS", "Settled", "cfd_files", "clock_of", "read_run", "settled", "zone_of"]
+
+Array = NDArray[np.float64]
+PROGRAMS: Mapping[str, str] = {
+    "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",
+    "fluent_xy": "Fluent", "fluent_ascii": "Fluent", "cfd_post_csv": "CFD-Post", "design_points": "Workbench",
+    "star_monitor": "STAR-CCM+", "openfoam_forces": "OpenFOAM", "su2_history": "SU2", "flow360_forces": "Flow360",
+}  # fmt: skip
+"""Program by reader."""
+FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
+"""Readers whose files may hold values at points, and no loads."""
+SCATTERED = 0.02
+"""Spread of the means of single revolutions above which a load is not periodic. [1]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A load after averaging."""
+
+    values: Array  # (N,) SI, rpm in rev/min
+    drift: float  # change over the averaged part, in the unit of the values; NaN: nothing was averaged
+    scatter: float  # standard deviation over it
+    over: str
+
+
+def cfd_files(folder: Path) -> tuple[Path, ...]:
+    """Exports of a run in a folder: the files in it, or those below ``postProcessing`` or one of its folders."""
+    post = folder / "postProcessing"
+    if post.is_dir() or folder.name == "postProcessing":
+        found = (post if post.is_dir() else folder).glob("*/*/*.dat")
+    else:
+        found = folder.glob("*/*.dat" if folder.parent.name == "postProcessing" else "*")
+    files = sorted(p for p in found if p.is_file())
+    out = []
+    for path in files:
+        try:
+            if readers.detect(path) in PROGRAMS:
+                out.append(path)
+        except InputError:
+            continue
+    return tuple(out)
+
+
+def zone_of(path: Path, form: str) -> str:
+    """Function object of a file of OpenFOAM, which writes name/time/file."""
+    try:
+        float(path.parent.name)
+    except ValueError:
+        return ""
+    return path.parent.parent.name if form == "openfoam_forces" else ""
+
+
+def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fault]]:
+    """Files of a run, the parts of a restarted history put together, and the faults of those that cannot be read."""
+    read: list[tuple[str, Dataset]] = []
+    faults: list[Fault] = []
+    for path in paths:
+        try:
+            found = readers.read(path)
+        except InputError as error:
+            faults += error.faults
+            continue
+        if isinstance(found, Dataset) and found.kind == "cfd":
+            read.append((str(path), found))
+        else:
+            got = f"a {found.kind if isinstance(found, Dataset) else type(found).__name__}, no export of CFD"
+            faults.append(Fault(str(path), "", got, f"an export of {', '.join(dict.fromkeys(PROGRAMS.values()))}"))
+    wrong: list[Fault] = []
+    read = _joined(read, wrong)
+    wrong += _other_bases(read)
+    if wrong:
+        raise InputError(faults + wrong)
+    return read, faults
+
+
+def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[str, Dataset]]:
+    out: list[tuple[str, Dataset]] = []
+    for name, record in read:
+        home = _home(name, record)
+        at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
+        if at is None or record.provenance.get("clock") not in ("time", "iteration"):
+            out.append((name, record))
+            continue
+        file, before = out[at]
+        then, now = clock_of(before), clock_of(record)
+        how = relation(then, now)
+        if home[0] == "openfoam_forces" and not now[1].size and now[0][0] > then[0][0]:  # one folder a start
+            how = "continues" if now[0][0] > then[0][-1] else "overlaps"
+        if how == "other clock" and now[0].size and now[0][-1] < then[0][0]:
+            before, record, then, now = record, before, now, then
+            how = relation(then, now)
+        if how == "other clock":
+            got = f"the same columns as {Path(file).name} on another clock"
+            hint = "A restart with a clock of its own: give it alone"
+            faults.append(Fault(name, "", got, "parts of one history", hint))
+            continue
+        cut = now[0][0]
+        kept = then[0] < cut
+        values = {k: np.concatenate([before[k][kept], record[k]]) for k in before.values}
+        note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
+        notes = (*before.notes, note)
+        out[at] = file, replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=notes)
+    return out
+
+
+def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
+    """What the parts of one history have in common: format, function object, columns."""
+    form = str(record.provenance["format"])
+    return form, zone_of(Path(name), form), tuple(record.values)
+
+
+def clock_of(record: Dataset) -> tuple[Array, Array]:
+    """Steps (times where none are counted) and times of a history; empty: none."""
+    time = str(record.provenance.get("time_channel", ""))
+    names = [n for n in record.provenance.get("clock_channels", "").split("\t") if n in record and n != time]
+    times = record[time] if time in record else np.empty(0)
+    return (record[names[0]] if names else times), times
+
+
+def _other_bases(read: Sequence[tuple[str, Dataset]]) -> list[Fault]:
+    """Histories that do not overlap: they are not one run."""
+    faults = []
+    for kind in ("time", "iteration"):
+        own = [(n, clock_of(r)[kind == "time"]) for n, r in read if r.provenance.get("clock") == kind]
+        own = [(n, clock) for n, clock in own if clock.size > 1]
+        for (a, x), (b, y) in zip(own, own[1:], strict=False):
+            shared = min(x[-1], y[-1]) - max(x[0], y[0])
+            if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
+                got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
+                faults.append(Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself"))
+    return faults
+
+
+def settled(
+    values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf
+) -> Settled | str:
+    """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
+    clock = record.provenance.get("clock")
+    coarse = ""
+    if clock == "time":
+        time = record[record.provenance["time_channel"]]
+        index, _ = keep_last(time)
+        index = index[time[index] <= end * (1.0 + 1e-9)]
+        step = float(np.median(np.diff(time[index]))) if index.size > 1 else 0.0
+        if step > period / MIN_ROWS:
+            clock, coarse = (
+                "iteration",
+                f"; {step:.3g} s a row, {period / step:.2g} rows a revolution: taken for iterations",
+            )
+    if clock == "time":
+        found = revolution_average(time[index], values[index], period, revolutions)
+        if found.mean is None:
+            return found.problem
+        turns = np.array(found.per_revolution)
+        scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
+        word = f"{found.revolutions} revolution" + ("s" if found.revolutions > 1 else "")
+        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({found.rows} rows)"
+        wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
+        over += "; revolutions differ by more than 2 %" if wide else ""
+        return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)
+    if clock == "iteration":
+        found = steady_average(values)
+        if found.mean is None:
+            return found.problem
+        part = values[values.size - found.rows :]
+        over = f"last {found.rows} of {values.size} rows{coarse}"
+        return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
+    mean = record.provenance.get("means", {})
+    over = "as in the file"
+    if values.size > 1 and mean and record.provenance["format"] == "fluent_transcript":
+        values, over = values[np.isfinite(values)][-1:], "the last one computed"
+    return Settled(np.array(values, dtype=float), math.nan, 0.0, over)
