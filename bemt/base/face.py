@@ -11,10 +11,20 @@ from typing import Any
 
 
 class CallableRoom(ModuleType):
-    """Package whose call and signature are those of the function of its name in ``bemt.library``.
+    """Package whose call, signature and help are those of the function of its name in ``bemt.library``.
 
-    So ``bemt.diagnose(...)`` and ``from bemt.diagnose import plan`` both work.
+    So ``bemt.diagnose(...)``, ``help(bemt.diagnose)`` and ``from bemt.diagnose import plan`` all work.
     """
+
+    def _help(self) -> str:
+        """Docstring of the function, then that of the package; examples are tested where the function is."""
+        name, function = self.__name__, inspect.getdoc(self._function()) or ""
+        lead, _, rest = function.partition("\n\n")
+        quoted = "\n".join(f"| {line}" if line.startswith((">>>", "...")) else line for line in rest.splitlines())
+        package = inspect.cleandoc(self.__dict__.get("__doc__") or "")
+        return f"{lead}\n\n{name}{self.__signature__}\n\n{quoted}\n\nThe package {name}: {package}\n"
+
+    __doc__ = property(_help)  # type: ignore[assignment]
 
     def __call__(self, *args: Any, **more: Any) -> Any:
         """Call the function of the public face."""

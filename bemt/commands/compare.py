@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.contrast import Contrast
 
 NAME = "compare"
-HELP = "say what changed between two recordings, or put one CFD run beside BEMT (RUN --case CASE)"
+HELP = "say what changed between two recordings, or compare one CFD run with BEMT (RUN --case CASE)"
 GROUP = "Recordings"
 EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 
@@ -21,7 +21,7 @@ EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("a", metavar="A", help="first recording (before, or without the change)")
-    second = "second recording (after, or with the change); without it A is one CFD run, shown beside BEMT of --case"
+    second = "second recording (after, or with the change); without it A is one CFD run, compared with BEMT of --case"
     parser.add_argument("b", metavar="B", nargs="?", help=second)
     known = "case of the rotor: diagnose B with A as its reference (default: causes that scale like the ratios)"
     parser.add_argument("--case", metavar="CASE", help=known)
@@ -74,7 +74,7 @@ def _one_run(args: argparse.Namespace) -> int:
 
     if not args.case:
         hint = "Two recordings, A B, need none"
-        raise InputError(Fault("--case", "", "no case and one recording", "the case to put it beside", hint))
+        raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
     with _terminal.progress(args.quiet or args.json) as say:
         document = one_run.compare_run(args.a, args.case, say)
     _draw_first(args, [args.a])
