@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
-    from bemt.compare import two_grids
+    from bemt.compare import two_grids, two_runs
     from bemt.compare.contrast_text import text
     from bemt.diagnose.contrast import compare
 
@@ -51,6 +51,9 @@ def run(args: argparse.Namespace) -> int:
     grids = two_grids.compare_grids(args.a, args.b, args.rows_a, args.rows_b)
     if grids is not None:
         return _show(args, grids, two_grids.text(grids), two_grids.text(grids))
+    runs = two_runs.compare_runs(args.a, args.b, args.rows_a, args.rows_b)
+    if runs is not None:
+        return _show(args, runs, two_runs.text(runs), two_runs.text(runs))
     with _terminal.progress(args.quiet or args.json) as say:
         answer = compare(
             args.a, args.b, args.case, label=args.label, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,

@@ -30,10 +30,12 @@ NOTE = (
     "data; own CFD: grid study). No bar: unknown. Reference: the first recorded CFD value, "
     "else bench, else vendor. A triangle at the edge points to a value beyond it."
 )
-NEEDS = (
-    "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at least that large. "
-    "“Inside the model's band”: they agree for any uncertainty of the recording."
-)
+NEEDS = {
+    "needs u_D": "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at least "
+    "that large.",
+    "inside the model's band": "“Inside the model's band”: they agree for any uncertainty of the recording.",
+}
+"""Explanations of badges, by how their words begin."""
 OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
 
 
@@ -110,8 +112,10 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
 def front_parts(book: Mapping[str, Any], ids: Sequence[str]) -> list[Part]:
     """Give the chart and the table of all cases."""
     plot = _comparison_plot(book)
+    badges = [page_verdict(page)[1] for page in book["cases"]]
+    told = [text for lead, text in NEEDS.items() if any(badge.startswith(lead) for badge in badges)]
     return [
-        ("words", NEEDS if plot else ""),
+        ("words", " ".join(told) if plot else ""),
         ("figures", [plot] if plot else []),
         ("words", OF_TABLE),
         ("table", _comparison_table(book, ids)),
