@@ -272,6 +272,27 @@ def test_a_file_for_a_folder_is_refused_before_any_work(
     assert begun
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["estimate", "10x5", "--rmp", "6000"], "Did you mean --rpm?"),
+        (["estimate", "10x5", "--rpm", "6k"], "--rpm: got 6k; expected a number, without its unit"),
+        (["new", "10x5", "--kv", "2300", "--cells", "33"], "--kv, --cells: got 2300 rev/min/V on 33 cells"),
+        (["estimate", "cases", "--rpm", "6000"], "bemt sweep cases"),
+    ],
+    ids=lambda a: " ".join(a) if isinstance(a, list) else "",
+)
+def test_a_slip_of_the_keyboard_is_named_as_it_was_typed(
+    arguments: list[str], words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    try:
+        code = cli.main(arguments)
+    except SystemExit as stopped:
+        code = int(stopped.code or 0)
+    assert code == 2 and words in " ".join(capsys.readouterr().err.split())
+
+
 @pytest.mark.parametrize("command", ["thrusters", "motor", "cfd"])
 def test_a_missing_file_is_not_called_a_case_file_where_none_is_wanted(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
