@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bemt.base.tables import number_text
-from bemt.report.verdicts import headline, verdict
+from bemt.report.diagnosis_block import diagnosis_verdict, page_verdict
+from bemt.report.verdicts import headline
 
 __all__ = ["plain_markdown", "summary"]
 
@@ -44,10 +45,10 @@ def summary(book: Mapping[str, Any]) -> str:
             first.setdefault(row["source"], row)
         cells = [_n(first.get("bemt", {}).get("thrust_N")), _n(first.get("bemt", {}).get("u"), 2)]
         cells += [_n(first.get(s, {}).get("thrust_N")) for s in ("k1k2", "cfd", "bench", "vendor")]
-        out.append("| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(verdict(r)[1])]) + " |")
+        out.append("| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(page_verdict(page)[1])]) + " |")
     for page in book["cases"]:
         r = page["result"]
-        out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(verdict(r)[2], 1500)]
+        out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(page_verdict(page)[2], 1500)]
         for audit in r.get("audit", []):
             for status in ("fault", "doubtful", "not stated"):
                 topics = [line["topic"] for line in audit["lines"] if line["status"] == status]
@@ -59,11 +60,10 @@ def summary(book: Mapping[str, Any]) -> str:
                     ]
         item = page.get("diagnosis")
         if item:
-            d = item["document"]
             out += [
                 "",
-                f"Diagnosis: {plain_markdown(d.get('verdict', 'unknown'), 40)}. "
-                f"{plain_markdown(d.get('explanation', ''), 800)}",
+                f"Diagnosis: {plain_markdown(diagnosis_verdict(item)[1], 80)}. "
+                f"{plain_markdown(diagnosis_verdict(item)[2], 800)}",
             ]
         out += [f"- {plain_markdown(fault)}" for fault in r.get("faults", [])[:20]]
         out += ["", *(f"Note: {plain_markdown(note)}" for note in page["problems"])] if page["problems"] else []
