@@ -239,7 +239,9 @@ def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     done = bemt("sweep", str(ROOT / "cases"), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert done.stderr.startswith(f"--out: got {tmp_path / 'out'}, a file; expected a folder. sweep writes files into it")
+    assert done.stderr.startswith(
+        f"--out: got {tmp_path / 'out'}, a file; expected a folder. sweep writes files into it"
+    )
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ class CallableRoom(ModuleType):
         package = inspect.cleandoc(self.__dict__.get("__doc__") or "")
         return f"{lead}\n\n{name}{self.__signature__}\n\n{quoted}\n\nThe package {name}: {package}\n"
 
-    __doc__ = property(_help)  # type: ignore[assignment]
+    __doc__ = property(_help)
 
     def __call__(self, *args: Any, **more: Any) -> Any:
         """Call the function of the public face."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt import __version__
 from bemt.base.errors import InputError
@@ -62,7 +63,9 @@ def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[st
         "rule": "one speed of rotation cannot tell causes apart", "points": points,
         "conditions": {k: list(v) for k, v in differ.items()}, "notes": list(dict.fromkeys(notes)),
         "told": [_sentence(points, first, second)],
-        "next_measurement": {"text": "Run both at two more speeds or airspeeds: one point fits any cause", "command": ""},
+        "next_measurement": {
+            "text": "Run both at two more speeds or airspeeds: one point fits any cause", "command": "",
+        },
     }  # fmt: skip
 
 
@@ -72,8 +75,9 @@ def _speeds(d: Dataset) -> int:
     return 0 if not known.size else 1 + int(np.sum(np.diff(np.log(known)) > _LIKE))
 
 
-def _airspeed(d: Dataset) -> np.ndarray:
-    return np.nan_to_num(np.asarray(d.values.get("airspeed_m_s", np.zeros(len(d))), dtype=float))
+def _airspeed(d: Dataset) -> NDArray[np.float64]:
+    known = d.values.get("airspeed_m_s", np.zeros(len(d)))
+    return np.asarray(np.nan_to_num(known), dtype=np.float64)
 
 
 def _pairs(a: Dataset, b: Dataset) -> list[tuple[int, int]]:

@@ -233,7 +233,9 @@ class Propeller:
         unknowns = [item for item in written.pop("assumptions", []) if not item["key"].startswith("second_rotor.")]
         table = {"second_rotor": {key: value for key, value in given.items() if value is not None}}
         text = tomlkit.dumps(written | table | ({"assumptions": unknowns} if unknowns else {}))
-        keys = {f"second_rotor.{key}": key for key in given} | {f"second_rotor.{k}": "second" for k in ("label", "case")}
+        keys = {f"second_rotor.{key}": key for key in given} | {
+            f"second_rotor.{k}": "second" for k in ("label", "case")
+        }
         keys["second_rotor"] = "coaxial"
         with in_words_of_the_library(keys, self.case.path.as_posix()):
             return Propeller(case_of(text, self.case.folder), text)

@@ -31,8 +31,8 @@ NOTE = (
     "else bench, else vendor. A triangle at the edge points to a value beyond it."
 )
 NEEDS = {
-    "needs u_D": "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at least "
-    "that large.",
+    "needs u_D": "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at "
+    "least that large.",
     "inside the model's band": "“Inside the model's band”: they agree for any uncertainty of the recording.",
 }
 """Explanations of badges, by how their words begin."""

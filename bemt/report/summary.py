@@ -45,7 +45,9 @@ def summary(book: Mapping[str, Any]) -> str:
             first.setdefault(row["source"], row)
         cells = [_n(first.get("bemt", {}).get("thrust_N")), _n(first.get("bemt", {}).get("u"), 2)]
         cells += [_n(first.get(s, {}).get("thrust_N")) for s in ("k1k2", "cfd", "bench", "vendor")]
-        out.append("| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(page_verdict(page)[1])]) + " |")
+        out.append(
+            "| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(page_verdict(page)[1])]) + " |"
+        )
     for page in book["cases"]:
         r = page["result"]
         out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(page_verdict(page)[2], 1500)]
