@@ -258,7 +258,8 @@ def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:
     import pandas as pd
 
     frame = pd.DataFrame({"rpm": [4000.0, 6000.0, 8000.0], "airspeed_m_s": [0.0, 4.0, 8.0]})
-    frame.to_csv(tmp_path / "plan.csv", index=False)
+    stand = frame.rename(columns={"rpm": "Motor Optical Speed (RPM)"})  # as the log of a stand calls it
+    stand.to_csv(tmp_path / "plan.csv", index=False)
     one, other = bemt.plan(frame, "10x5"), bemt.plan(tmp_path / "plan.csv", "10x5")
     assert one.detectable == other.detectable and one.to_dict()["size"] == pytest.approx(other.to_dict()["size"])
 
