@@ -28,21 +28,7 @@ __all__ = ["build_parser", "commands", "main"]
 EXIT_INTERRUPTED = 130
 GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
 """Groups of the help in order; other groups come after them."""
-FILE_ENDINGS = (
-    ".csv",
-    ".json",
-    ".toml",
-    ".txt",
-    ".md",
-    ".html",
-    ".png",
-    ".pdf",
-    ".stl",
-    ".step",
-    ".stp",
-    ".obj",
-    ".3mf",
-)
+FILE_ENDINGS = tuple(".csv .json .toml .txt .md .html .png .pdf .stl .step .stp .obj .3mf".split())
 """Endings of a name that was meant for a file, where a folder is asked for."""
 CODES = "Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal."
 

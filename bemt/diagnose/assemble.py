@@ -214,11 +214,9 @@ def _with_noise(problem: Problem) -> Problem:
     sigma, known, notes = np.where(np.isfinite(stated), stated, usual), np.isfinite(stated), list(problem.notes)
     X, rows = problem.covariates, np.arange(problem.y.size)
     owner = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
-    lengths = (
-        [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X]
-        + [np.exp(X[k]) for k in ("sideslip_rad",) if k in X]
-        + [100.0 + X[k] for k in ("second_rotor_rad_s",) if k in X]
-    )
+    lengths = [X[k] for k in ("tip_gap_m", "wall_distance_m") if k in X] + [
+        np.exp(X[k]) for k in ("sideslip_rad",) if k in X
+    ] + [100.0 + X[k] for k in ("second_rotor_rad_s",) if k in X]
     label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
     label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
     run, place = in_time(X)
