@@ -45,6 +45,10 @@ __all__ = ["__version__", *_NAMES]
 
 def __getattr__(name: str) -> Any:
     """Load a name of the public API on first use."""
+    if name == "library":  # the home of most names, as their help says
+        import bemt.library
+
+        return bemt.library
     if name not in _NAMES:
         raise AttributeError(f"module 'bemt' has no attribute {name!r}; it offers {', '.join(_NAMES)}")
     import importlib

@@ -73,7 +73,7 @@ def thrusts(ax: Any) -> dict[str, float]:
     ax.set_ylim(-0.6, len(order) - 0.4)
     ax.set_xlim(*LIMITS)
     ax.set_xlabel("thrust / recorded CFD thrust [-]; bars: one standard uncertainty")
-    ax.set_title("Static thrust, five cases (BEMT value beside the name)", fontsize=10)
+    ax.set_title("Static thrust, five cases (BEMT value under the name)", fontsize=10)
     handles = [Line2D([], [], ls="none", **look) for look in LOOK.values()]
     ax.legend(handles, [LABEL[k] for k in LOOK], fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncol=3,
               frameon=False, columnspacing=1.2, handletextpad=0.3)  # fmt: skip

@@ -414,6 +414,26 @@ def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: 
     assert found["ratios"]["thrust_N"]["ratio"] == pytest.approx(1.0)
 
 
+def test_two_runs_of_one_point_are_compared_with_both_errors_and_name_nothing(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = fluent(put)
+    for name, rpm in (("a", "8000"), ("b", "8010"), ("c", "9000")):
+        units = ["--unit", "thrust=N", "--unit", "torque=N m"]
+        assert main(["import", *files, "--rpm", rpm, *units, "--out", f"{name}.toml"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "a.toml", "b.toml", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["verdict"], found["effects"]) == ("insufficient", [])
+    load = found["points"][0]["loads"]["thrust_N"]
+    assert load["A"] > 0.0 and load["difference"] == pytest.approx(load["B"] - load["A"])
+    assert load["u_both"] == pytest.approx(math.hypot(load["u_A"], load["u_B"])) and load["u_A"] > 0.0
+    assert main(["compare", "a.toml", "c.toml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["points"] == [], "another speed is another point"
+    assert main(["compare", "a.toml", "a.toml"]) == 2
+    assert "twice" in capsys.readouterr().err
+
+
 def test_two_grids_of_an_own_campaign_are_named(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(project / "reports/cfd/prop_8x5_rest/recording.csv")
     assert main(["compare", path, path, "--rows-a", "level=5", "--rows-b", "level=6", "--json"]) == 0

@@ -239,7 +239,9 @@ def test_folder_of_results_that_is_a_file_is_2(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     done = bemt("sweep", str(ROOT / "cases"), "--out", str(tmp_path / "out"))
     assert done.returncode == 2
-    assert done.stderr == f"--out: got {tmp_path / 'out'}, a file; expected a folder.\n"
+    assert done.stderr.startswith(
+        f"--out: got {tmp_path / 'out'}, a file; expected a folder. sweep writes files into it"
+    )
 
 
 @pytest.mark.parametrize(
@@ -262,9 +264,35 @@ def test_a_file_for_a_folder_is_refused_before_any_work(
     file.write_text("")
     assert cli.main([*arguments, f"{file}{below}"]) == 2
     assert not begun
-    assert capsys.readouterr().err == f"{arguments[-1]}: got {file}, a file; expected a folder.\n"
+    assert capsys.readouterr().err.startswith(f"{arguments[-1]}: got {file}, a file; expected a folder. ")
+    assert cli.main([*arguments, str(tmp_path / "new.STL")]) == 2
+    assert not begun
+    assert f"give {tmp_path / 'new'}" in capsys.readouterr().err, "a folder that is called prop.stl helps nobody"
+    (tmp_path / "old.csv").mkdir()
+    assert cli.main([*arguments, str(tmp_path / "old.csv")]) == 0, "a folder that is there may have any name"
     assert cli.main([*arguments, str(tmp_path / "new" / "folder")]) == 0
     assert begun
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["estimate", "10x5", "--rmp", "6000"], "Did you mean --rpm?"),
+        (["estimate", "10x5", "--rpm", "6k"], "--rpm: got 6k; expected a number, without its unit"),
+        (["new", "10x5", "--kv", "2300", "--cells", "33"], "--kv, --cells: got 2300 rev/min/V on 33 cells"),
+        (["estimate", "cases", "--rpm", "6000"], "bemt sweep cases"),
+    ],
+    ids=lambda a: " ".join(a) if isinstance(a, list) else "",
+)
+def test_a_slip_of_the_keyboard_is_named_as_it_was_typed(
+    arguments: list[str], words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    try:
+        code = cli.main(arguments)
+    except SystemExit as stopped:
+        code = int(stopped.code or 0)
+    assert code == 2 and words in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize("command", ["thrusters", "motor", "cfd"])

@@ -26,6 +26,7 @@ from bemt.compare.stand_run import StandRun, stand_run
 from bemt.dataset import Dataset
 from bemt.diagnose.by_laws import changed
 from bemt.diagnose.contrast import compare
+from bemt.diagnose.law_rotor import CoefficientCurve
 from bemt.effects import catalogue
 from bemt.recordings.load import import_file
 
@@ -678,3 +679,8 @@ def test_no_ratio_is_drawn_without_a_common_advance_ratio(monkeypatch: pytest.Mo
     readings, ratio = panels(changed(runs[0], runs[1], D), monkeypatch)[:2]
     assert [label[:3] for label in readings.get_legend_handles_labels()[1]] == ["A, ", "B, "]
     assert not ratio.lines and "no advance ratio J in common" in ratio.texts[0].get_text()
+
+
+def test_one_reading_is_a_level_without_a_warning() -> None:
+    one = CoefficientCurve.of(np.array([0.05, np.nan]), np.zeros(2), np.array([6000.0, 7000.0]), (-0.3, -0.4, 0.2))
+    assert one(np.zeros(1), np.array([6000.0]))[0] == pytest.approx(0.05, rel=1e-3)

@@ -340,7 +340,7 @@ def _words(label: str, rpm: float, V: float, folder: Path) -> dict[str, tuple[st
         "solve": p.solve(rpm, V, bands=False).flags[0],
         "sweep": _sweep(case, [rpm], [V])[0][4],
         "estimate": tuple(estimate(label, [rpm], [V])["rows"][0]["flags"]),
-        "diagnose": tuple(words.removeprefix("3 of 3 points: ") for words in diagnosed),
+        "diagnose": tuple(words.removeprefix("3 of 3 points of the recording: ") for words in diagnosed),
     }
 
 

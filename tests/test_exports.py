@@ -218,17 +218,26 @@ def test_another_format_keeps_what_is_there_and_says_what_is_stale(
         there = {p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file()} - {"manifest.json"}
         entries = manifest.get("targets", [])
         named = {f"{t['target']}/{f['path']}" for t in entries for f in t["files"]}
-        assert there == named | {f["path"] for f in manifest["files"]}
+        assert there == named | {f["path"] for f in manifest["files"]} | set(
+            manifest.get("openfoam", {}).get("files", {})
+        )
         return sorted(manifest["case_sha256"]), said["kept"], said["stale"]
 
     assert main([*command, "px4"]) == 0
     assert listed() == (["px4", "rotorpy", "table"], ["rotorpy", "table"], [])
     assert main([*command, "stl"]) == 0
     assert listed() == (["px4", "rotorpy", "stl", "table"], ["px4", "rotorpy", "table"], [])
+    before = files(out)
+    assert main([*command, "openfoam", "--level", "5"]) == 0, "which makes the folder itself a case"
+    assert listed()[1] == ["px4", "rotorpy", "stl", "table"] and (out / "Allrun").is_file()
+    assert {name: data for name, data in files(out).items() if name in before and name != "manifest.json"} == {
+        name: data for name, data in before.items() if name != "manifest.json"
+    }
     text = (tmp_path / "case/case.toml").read_text()
     (tmp_path / "case/case.toml").write_text(text + "\n# edited\n")
     assert main([*command, "table"]) == 0
-    assert listed() == (["px4", "rotorpy", "stl", "table"], ["px4", "rotorpy", "stl"], ["px4", "rotorpy", "stl"])
+    others = ["openfoam", "px4", "rotorpy", "stl"]
+    assert listed() == ([*others, "table"], others, others)
     (tmp_path / "case/case.toml").write_text(text.replace('name = "prop_10x5"', 'name = "other"'))
     before = files(out)
     assert main([*command, "table"]) == 2

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import doctest
+import pydoc
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +33,55 @@ def test_rooms_of_the_same_name_are_called_like_functions() -> None:
     from bemt.diagnose import plan  # noqa: F401 - the room stays a package
 
     assert callable(bemt.diagnose) and callable(bemt.drive) and callable(bemt.compare)
-    with pytest.raises(bemt.InputError, match="--kv"):
+    with pytest.raises(bemt.InputError, match="^kv: got 1"):
         bemt.drive("10x5", kv=1.0, cells=3)
+
+
+@pytest.mark.parametrize("name", ["compare", "design", "diagnose", "drive", "report", "validate"])
+def test_help_of_a_room_is_that_of_its_function_and_runs_no_example_twice(name: str) -> None:
+    room = getattr(bemt, name)
+    shown, function = pydoc.plain(pydoc.render_doc(room)), getattr(bemt.library, name)
+    assert "Parameters" in shown and f"bemt.{name}(" in shown and str(function.__doc__).splitlines()[0] in shown
+    assert not any(test.examples for test in doctest.DocTestFinder(recurse=False).find(room))
+
+
+PAIR = "10x5"
+FOREIGN = re.compile(r"--[a-z]|case\.toml|second_rotor|LABEL")
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: bemt.propeller(PAIR).coaxial(-0.3), "z_over_D"),
+        (lambda: bemt.propeller(PAIR).coaxial(0.3, turns="both"), "turns"),
+        (lambda: bemt.propeller(PAIR).coaxial(0.3, second="9x"), "second"),
+        (lambda: bemt.propeller(PAIR).coaxial(), "coaxial"),
+        (lambda: bemt.propeller(PAIR).solve(6000, density_kg_m3=-1.0), "density_kg_m3"),
+        (lambda: bemt.drive(PAIR, kv=2300), "cells"),
+        (lambda: bemt.drive(PAIR, kv=2300, cells=3, mass_kg=1200), "mass_kg"),
+        (lambda: bemt.design(6.0), "diameter_in"),
+        (lambda: bemt.propeller("nine"), "label"),
+    ],
+)
+def test_faults_are_those_of_the_arguments_of_the_call(call: Callable[[], object], name: str) -> None:
+    with pytest.raises(bemt.InputError) as caught:
+        call()
+    for fault in caught.value.faults:
+        assert (fault.file or fault.where) == name
+        assert not FOREIGN.search(f"{fault.file} {fault.where} {fault.expected} {fault.hint}")
+
+
+@pytest.mark.parametrize("value", ["6000", ["6000"], True, [5000, "6000"], {"rpm": 6000}, np.array(["6000"])])
+def test_a_text_is_no_number(value: object) -> None:
+    for call in (bemt.propeller(PAIR).solve, lambda v: bemt.estimate(PAIR, v)):
+        with pytest.raises(bemt.InputError, match=r"^rpm: got \w+ .*; expected a number"):
+            call(value)
+
+
+def test_one_number_is_one() -> None:
+    with pytest.raises(bemt.InputError, match="^density_kg_m3: got 2 numbers"):
+        bemt.propeller(PAIR).solve(6000, density_kg_m3=[1.1, 1.2])
+    assert bemt.propeller(PAIR).solve(6000, density_kg_m3=[1.1], bands=False)["density_kg_m3"][0] == 1.1
 
 
 def test_a_case_gives_what_the_solver_gives() -> None:
@@ -207,7 +258,8 @@ def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:
     import pandas as pd
 
     frame = pd.DataFrame({"rpm": [4000.0, 6000.0, 8000.0], "airspeed_m_s": [0.0, 4.0, 8.0]})
-    frame.to_csv(tmp_path / "plan.csv", index=False)
+    stand = frame.rename(columns={"rpm": "Motor Optical Speed (RPM)"})  # as the log of a stand calls it
+    stand.to_csv(tmp_path / "plan.csv", index=False)
     one, other = bemt.plan(frame, "10x5"), bemt.plan(tmp_path / "plan.csv", "10x5")
     assert one.detectable == other.detectable and one.to_dict()["size"] == pytest.approx(other.to_dict()["size"])
 

@@ -10,11 +10,31 @@ from types import ModuleType
 from typing import Any
 
 
-class CallableRoom(ModuleType):
-    """Package whose call and signature are those of the function of its name in ``bemt.library``.
+class _Help(str):
+    """Docstring of the class, which gives every room that of its function when it is read."""
 
-    So ``bemt.diagnose(...)`` and ``from bemt.diagnose import plan`` both work.
+    def __get__(self, room: CallableRoom | None, owner: type) -> str:
+        return str(self) if room is None else room._help()
+
+    def __set__(self, room: CallableRoom, text: str) -> None:  # else what stands in the module's file would win
+        raise AttributeError("__doc__ of a room is that of its function")
+
+
+class CallableRoom(ModuleType):
+    """Package whose call, signature and help are those of the function of its name in ``bemt.library``.
+
+    So ``bemt.diagnose(...)``, ``help(bemt.diagnose)`` and ``from bemt.diagnose import plan`` all work.
     """
+
+    def _help(self) -> str:
+        """Docstring of the function, then that of the package; examples are tested where the function is."""
+        name, function = self.__name__, inspect.getdoc(self._function()) or ""
+        lead, _, rest = function.partition("\n\n")
+        quoted = "\n".join(f"| {line}" if line.startswith((">>>", "...")) else line for line in rest.splitlines())
+        package = inspect.cleandoc(self.__dict__.get("__doc__") or "")
+        return f"{lead}\n\n{name}{self.__signature__}\n\n{quoted}\n\nThe package {name}: {package}\n"
+
+    __doc__ = _Help(__doc__ or "")
 
     def __call__(self, *args: Any, **more: Any) -> Any:
         """Call the function of the public face."""

@@ -67,12 +67,24 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
     if faults:
         raise InputError(faults)
     files = _files(wanted)
-    case = checked(files)
+    try:
+        case = checked(files)
+    except InputError as error:
+        raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
     write_files(files, folder)
     return folder, sorted(files)
+
+
+def _of_motor(fault: Fault, wanted: Wanted) -> Fault:
+    """Fault of a speed that nobody typed: it comes from K_v and cells."""
+    if wanted.motor is None or wanted.rpm is not None or fault.where != "operating.rpm":
+        return fault
+    speed = fault.got.replace(" with", " rev/min with", 1)
+    got = f"{wanted.motor[0]:g} rev/min/V on {wanted.motor[1]} cells, that is {speed}"
+    return replace(fault, file="", where="--kv, --cells", got=got, hint="Check both numbers")
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from bemt.effects import source_of
 from bemt.readers import references as reference_file
 
 SCHEMA = "bemt.sources/1"
-BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, beside recordings, version {}; "
+BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, compared with recordings, version {}; "
         "CITATION.cff gives the entry to cite")  # fmt: skip
 METHOD = (
     "Blade element momentum theory: Glauert (1935), Airplane Propellers, in Durand, Aerodynamic Theory IV, ch. VII; "

@@ -26,6 +26,8 @@ from bemt.commands._terminal import coloured
 EXIT_INTERRUPTED = 130
 GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
 """Groups of the help in order; other groups come after them."""
+FILE_ENDINGS = tuple(".csv .json .toml .txt .md .html .png .pdf .stl .step .stp .obj .3mf".split())
+"""Endings of a name that was meant for a file, where a folder is asked for."""
 CODES = "Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal."
 
 
@@ -49,8 +51,22 @@ class _Parser(argparse.ArgumentParser):
         super().__init__(**{**more, "allow_abbrev": False})
         self.register("action", None, _Once)
         self.register("action", "store", _Once)
+        self._words: list[str] = []
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse, and keep the words: what is missing may be there with a typo."""
+        self._words = list(args or ())
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> Any:
+        if message.startswith("the following arguments are required"):
+            options = [option for action in self._actions for option in action.option_strings]
+            typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
+            message += "".join(f". Got {w}.{did_you_mean(w, options)}" for w in typed if w not in options)
+        number = re.match(r"argument (.+?): invalid (float|int) value: '(.*)'$", message)
+        if number:
+            expected = "a number, without its unit" if number[2] == "float" else "a whole number, without its unit"
+            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}."
         wrong = re.match(r"argument (.+?): invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong:
             name, got, known = wrong.groups()
@@ -135,11 +151,15 @@ def _check_folders(args: argparse.Namespace) -> None:
     """Refuse a file in place of a folder before the work starts, not after it."""
     faults = []
     for name in ("out", "work", "dir"):
-        near = getattr(args, name, None) or "."
+        asked = near = getattr(args, name, None) or "."
         while near and not os.path.exists(near):
             near = os.path.dirname(near)
         if near and not os.path.isdir(near):
-            faults.append(Fault(f"--{name}", "", f"{near}, a file", "a folder"))
+            hint = f"{args.command} writes files into it: give a folder, or a name that is not taken"
+            faults.append(Fault(f"--{name}", "", f"{near}, a file", "a folder", hint))
+        elif not os.path.exists(asked) and asked.lower().endswith(FILE_ENDINGS):
+            hint = f"{args.command} names the files in it: give {os.path.splitext(asked)[0]}"
+            faults.append(Fault(f"--{name}", "", f"{asked}, the name of a file", "a folder", hint))
     if faults:
         raise InputError(faults)
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.contrast import Contrast
 
 NAME = "compare"
-HELP = "say what changed between two recordings, or put one CFD run beside BEMT (RUN --case CASE)"
+HELP = "say what changed between two recordings, or compare one CFD run with BEMT (RUN --case CASE)"
 GROUP = "Recordings"
 EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 
@@ -21,7 +21,7 @@ EXAMPLE = "compare monday.csv tuesday.csv --case cases/prop_8x5"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("a", metavar="A", help="first recording (before, or without the change)")
-    second = "second recording (after, or with the change); without it A is one CFD run, shown beside BEMT of --case"
+    second = "second recording (after, or with the change); without it A is one CFD run, compared with BEMT of --case"
     parser.add_argument("b", metavar="B", nargs="?", help=second)
     known = "case of the rotor: diagnose B with A as its reference (default: causes that scale like the ratios)"
     parser.add_argument("--case", metavar="CASE", help=known)
@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
-    from bemt.compare import two_grids
+    from bemt.compare import two_grids, two_runs
     from bemt.compare.contrast_text import text
     from bemt.diagnose.contrast import compare
 
@@ -51,6 +51,9 @@ def run(args: argparse.Namespace) -> int:
     grids = two_grids.compare_grids(args.a, args.b, args.rows_a, args.rows_b)
     if grids is not None:
         return _show(args, grids, two_grids.text(grids), two_grids.text(grids))
+    runs = two_runs.compare_runs(args.a, args.b, args.rows_a, args.rows_b)
+    if runs is not None:
+        return _show(args, runs, two_runs.text(runs), two_runs.text(runs))
     with _terminal.progress(args.quiet or args.json) as say:
         answer = compare(
             args.a, args.b, args.case, label=args.label, rows_a=args.rows_a, rows_b=args.rows_b, air_a=args.air_a,
@@ -74,7 +77,7 @@ def _one_run(args: argparse.Namespace) -> int:
 
     if not args.case:
         hint = "Two recordings, A B, need none"
-        raise InputError(Fault("--case", "", "no case and one recording", "the case to put it beside", hint))
+        raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
     with _terminal.progress(args.quiet or args.json) as say:
         document = one_run.compare_run(args.a, args.case, say)
     _draw_first(args, [args.a])

@@ -33,10 +33,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the estimate."""
+    import os
+    from dataclasses import replace
+
+    from bemt.base.errors import InputError
     from bemt.base.tables import json_text
     from bemt.case.estimate import document, text
 
-    found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,
-                     args.series, args.density, args.angle or ())  # fmt: skip
+    try:
+        found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,
+                         args.series, args.density, args.angle or ())  # fmt: skip
+    except InputError as error:
+        if not os.path.exists(args.label):
+            raise
+        hint = f"A case? bemt sweep {args.label} solves it"
+        raise InputError([replace(f, hint=hint) if f.file == "LABEL" else f for f in error.faults]) from None
     print(json_text(found) if args.json else text(found), end="")
     return EXIT_OK

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bemt.flight.answer import FlightAnswer
 
 NAME = "fly"
-HELP = "identify the rotors of a flight log, and judge it beside healthy flights"
+HELP = "identify the rotors of a flight log, and compare it with healthy flights"
 GROUP = "Recordings"
 EXAMPLE = "fly flight.ulg --mass 1.2 --case 10x4.5"
 

@@ -55,7 +55,8 @@ def run(args: argparse.Namespace) -> int:
         for fault in page["result"]["faults"]:
             _terminal.complain(fault)
     if not args.quiet:
+        count = len(book["cases"])
         for file in files:
-            size = f": {file.stat().st_size / 1e6:.2f} MB, {len(book['cases'])} cases" if file.name == HTML_NAME else ""
-            print(f"{file}{size}")
+            size = f": {file.stat().st_size / 1e6:.2f} MB, {count} case{'s' * (count != 1)}"
+            print(f"{file}{size if file.name == HTML_NAME else ''}")
     return int(book["exit_code"])

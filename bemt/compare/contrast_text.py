@@ -169,7 +169,8 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
         out.append(f"{ends} ({density - 1:+.1%}).")
     step = doc.get("next_measurement") or {}
     told = doc["told"] if "diagnosis" in doc else [sentence(doc)]
-    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(("Next: ", "bemt ")))]
+    said_below = ("Next: ", "bemt ", "if ")
+    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
     drive = (doc.get("subsystems") or {}).get("drive")
     if drive and drive["effects"] and drive["effects"] != doc["effects"]:
         out.append(f"Drive: {drive['verdict']}: {', '.join(_title(k) for k in drive['effects'])}.")
@@ -179,6 +180,7 @@ def _said(doc: Mapping[str, Any]) -> list[str]:
         out.append(f"Next: {step['text']}.")
     out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
     if step.get("command"):
+        out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
         out.append(f"    {step['command']}")
     return out
 

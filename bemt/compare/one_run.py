@@ -35,11 +35,11 @@ _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
 
-def cfd_points(path: str) -> tuple[Dataset, Dataset]:
-    """Points of a CFD recording, and the file as it was read: a run, or a table of runs such as a campaign's."""
+def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset]:
+    """Points of a CFD recording, and the file as it was `read`: a run, or a table of runs such as a campaign's."""
     from bemt.recordings.load import as_dataset, import_file
 
-    imported = import_file(path)
+    imported = import_file(path) if read is None else read
     if is_run(imported):
         return imported, imported
     if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):

@@ -82,8 +82,23 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
                                    "readings of this rotor", "Wrong unit, or wrong case?"))  # fmt: skip
     odd = _between(problem, [groups[k][1] for k in order], records)
     problem, found = _calibrated(problem, [groups[k][0] for k in order])
-    outside = tuple(_outside(p, groups[k][0]) for p, k in zip(problem.parts, order, strict=True))
-    return replace(problem, between=(*odd, *found), validity=tuple(dict.fromkeys(sum(outside, ()))))
+    outside: dict[str, list[str]] = {}
+    for part, key in zip(problem.parts, order, strict=True):
+        whose = "the reference" if part.record.reference else "the recording"
+        for words in _outside(part, groups[key][0]):
+            outside.setdefault(words, []).append(whose)
+    validity = tuple(_of(" and ".join(dict.fromkeys(whose)), words) for words, whose in outside.items())
+    return replace(problem, between=(*odd, *found), validity=validity)
+
+
+def _of(whose: str, words: str) -> str:
+    """Say whose points a flag is about.
+
+    >>> _of("the reference", "2 of 3 points: supersonic tip: Mach 1.09"), _of("the recording", "a duct")
+    ('2 of 3 points of the reference: supersonic tip: Mach 1.09', 'the recording: a duct')
+    """
+    count, points, rest = words.partition(" points: ")
+    return f"{count} points of {whose}: {rest}" if points else f"{whose}: {words}"
 
 
 def _outside(part: Part, case: Case) -> tuple[str, ...]:

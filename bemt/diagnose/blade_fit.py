@@ -88,5 +88,5 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, 
     if not np.isfinite(rest).all() or _misfit(tables[chosen], rest) > _misfit(tables[chosen], start):
         return None, "no blade fits the reference better than that of the case, which was kept", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
-    note = f"blade calibrated on the reference (known from {prior.known_from}): {words or 'as the case has it'}"
+    note = f"blade fitted to the reference, starting from its {prior.known_from}: {words or 'no change worth stating'}"
     return CalibratedBlade(found.mean, prior.mean, size * root, kind), note, ""

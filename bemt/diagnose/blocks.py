@@ -51,7 +51,7 @@ def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.in
         lines = int(line.max()) + 1
         if 3 <= lines <= max(count // 2, 3):
             few = np.minimum(line * most // max(lines, most), most - 1) if lines > most else line
-            out.append((f"whole lines of {name}", whole(few)))
+            out.append((f"all readings at one {name}", whole(few)))
     if out:
         return out
     spread = {

@@ -409,7 +409,7 @@ def text(d: Diagnosis) -> str:
     out += [
         "",
         text_table(
-            ["explanation", "probability", "ln odds over none", "size in this plan"], rows, left=(0,), indent="  "
+            ["explanation", "probability", "ln odds over none", "typical size [sd]"], rows, left=(0,), indent="  "
         ),
     ]
     kinds = ("before", "after", "noise", "holdout_before", "holdout_after", "gp_only")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
+from bemt.diagnose.document import headline
 from bemt.diagnose.figures_recording import FIRST, first_picture
 from bemt.diagnose.record import CHANNELS
 
@@ -385,8 +386,8 @@ def _before_after(answer: Diagnosis) -> Figure:
     _one_range(axes[0], [line.over for line in shown])
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
-    if len(shown) < len(groups):
-        figure.suptitle(f"{len(shown)} of {len(groups)} lines of points", fontsize=9)
+    some = f" ({len(shown)} of {len(groups)} series shown)" if len(shown) < len(groups) else ""
+    figure.suptitle(textwrap.fill(f"{headline(answer)}{some}", 100), fontsize=9)
     return figure
 
 

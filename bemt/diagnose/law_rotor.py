@@ -137,10 +137,12 @@ class CoefficientCurve:
 
     def _bent(self, c: Array, J: Array, x: Array) -> CoefficientCurve:
         """With what neighbours in speed and J share beyond the line, where they scatter by less (kriging)."""
+        if x.size < _ENOUGH:
+            return self
         left = c - self(J, np.exp(x))
         order = np.lexsort((x, np.round(J, 2)))
         scatter, size = float(np.std(np.diff(left[order]))) / math.sqrt(2.0), float(np.std(left))
-        if x.size < _ENOUGH or size < _BENT * max(scatter, _FLOOR * float(np.max(np.abs(c)))):
+        if size < _BENT * max(scatter, _FLOOR * float(np.max(np.abs(c)))):
             return self
         K = size**2 * _neighbours(J, x, J, x)
         weights = np.linalg.solve(K + scatter**2 * np.eye(x.size), left) * size**2

@@ -95,6 +95,7 @@ def record_of(imported: Dataset, case: Case) -> Record:
     """Points of a plan from a table of them."""
     from bemt.base.errors import Fault, InputError
     from bemt.dataset import Dataset
+    from bemt.dataset.channels import channel_fault
     from bemt.diagnose.record import from_series
     from bemt.recordings.channels import named
 
@@ -102,6 +103,7 @@ def record_of(imported: Dataset, case: Case) -> Record:
     rows = named(imported)
     values = {k: v for k, v in imported.values.items() if imported.unit(k) or k in ("rpm", "J", "run")}
     values |= dict(rows.values)
+    values = {k: v for k, v in values.items() if channel_fault(k) is None}  # rpm stands for the speed of each sensor
     if "rpm" not in values:
         raise InputError(Fault(path, "", f"columns {', '.join(imported.values)}", "a column rpm"))
     n = len(imported)

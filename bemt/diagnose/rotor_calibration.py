@@ -101,6 +101,7 @@ def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, A
         "converged": found.found.converged, "steps": found.found.steps, "log_evidence": found.found.log_evidence,
         "size": size, "excess": found.found.excess, "known_from": found.prior.known_from, "numbers": numbers,
         "recommended_airspeed_m_s": airspeed, "rpm": case.rpm,
+        "recommended_J": None if airspeed is None else airspeed / (case.rpm / 60.0 * case.diameter_m),
     })  # fmt: skip
     return out
 
@@ -129,8 +130,9 @@ def text(doc: dict[str, Any]) -> str:
         )
     if doc["recommended_airspeed_m_s"] is not None:
         lines.append(
-            "All points are at rest, which leaves flight uncertain. Recommended: one flight point too, such as\n"
-            f"{doc['recommended_airspeed_m_s']:.0f} m/s at {doc['rpm']:g} rev/min; name both recordings as REFERENCE."
+            "All points are at rest, which leaves flight uncertain. Recommended: one flight point too, at an advance\n"
+            f"ratio near {doc['recommended_J']:.2f}, such as {doc['recommended_airspeed_m_s']:.0f} m/s at "
+            f"{doc['rpm']:g} rev/min; name both recordings as REFERENCE."
         )
     return "\n".join(lines)
 

@@ -149,7 +149,7 @@ def with_drive(case: Case, **given: float | None) -> Case:
     changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
-        hint = "As in: drive 10x5 --kv 900 --cells 3; or a table [drive] in the case"
+        hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
         raise InputError([Fault("", name, "nothing", "--kv and --cells together", hint) for name in missing])
     names = {key: f"--{name.split('_')[0]}" for name, key in OPTIONS.items()}
     try:

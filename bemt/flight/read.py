@@ -32,6 +32,8 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
     InputError
         For a file that is no flight log, or damaged before its first twenty samples.
     """
+    if Path(path).is_dir():
+        raise InputError(Fault(os.fspath(path), "", "a folder", "one flight log", "Name the file in it"))
     try:
         with Path(path).open("rb") as file:
             head = file.read(4096)

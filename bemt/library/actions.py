@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.dataset import Dataset, from_pandas
-from bemt.library.given import in_words_of_the_library, numbers, path_text
+from bemt.library.given import in_words_of_the_library, number, numbers, path_text
 from bemt.library.rotors import Propeller, load, rotor_of
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def estimate(
 
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair)).tolist() for pair in asked)
-    density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
+    density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
     with in_words_of_the_library():
         found = estimating.document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
     rows: list[dict[str, Any]] = found["rows"]
@@ -392,8 +392,8 @@ def export(
     known = target_ids()
     faults = [Fault("", "formats", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
     flow = Run(
-        rpm=None if rpm is None else float(numbers("rpm", rpm)),
-        airspeed_m_s=None if airspeed_m_s is None else float(numbers("airspeed_m_s", airspeed_m_s)),
+        rpm=None if rpm is None else number("rpm", rpm),
+        airspeed_m_s=None if airspeed_m_s is None else number("airspeed_m_s", airspeed_m_s),
     )
     faults += check_run(flow)
     if faults:

@@ -14,7 +14,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.case import case_of
 from bemt.dataset import Dataset, from_pandas
-from bemt.library.given import numbers, path_text
+from bemt.library.given import in_words_of_the_library, number, path_text
 from bemt.library.rotors import Propeller, rotor_of
 
 if TYPE_CHECKING:
@@ -284,7 +284,9 @@ def drive(
     for name, value in (*given.items(), ("airspeed_m_s", airspeed_m_s)):
         if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
             raise InputError(Fault("", name, repr(value), "a number"))
-    return drive_result.solve(drive_result.with_drive(rotor_of(propeller).case, **given), float(airspeed_m_s))
+    case = rotor_of(propeller).case
+    with in_words_of_the_library():
+        return drive_result.solve(drive_result.with_drive(case, **given), float(airspeed_m_s))
 
 
 def compare(
@@ -329,7 +331,7 @@ def compare(
     """
     from bemt.diagnose import contrast
 
-    diameter = contrast.label_diameter(None) if diameter_m is None else float(numbers("diameter_m", diameter_m))
+    diameter = contrast.label_diameter(None) if diameter_m is None else number("diameter_m", diameter_m)
     if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
     known = None if case is None else path_text("case", case)

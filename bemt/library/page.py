@@ -130,7 +130,7 @@ def recording(st: Any, propeller: bemt.Propeller) -> Any:
 
 def exports(st: Any, propeller: bemt.Propeller) -> None:
     """Buttons that write the case, exports and sources."""
-    st.subheader("Take it with you")
+    st.subheader("Export")
     left, right = st.columns(2)
     left.download_button("Case (case.toml)", propeller.text, "case.toml", "text/plain")
     chosen = right.selectbox("For another program", FORMATS)
@@ -139,7 +139,7 @@ def exports(st: Any, propeller: bemt.Propeller) -> None:
             written = bemt.export(propeller, folder, chosen)
             right.code(written.text.replace(folder, "."), language=None)
             right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
-    with st.expander("What this answer stands on"):
+    with st.expander("Sources of this answer"):
         for source in bemt.cite(propeller):
             st.markdown(f"**{source.name}** ({source.kind}): {source.source}")
 

@@ -17,7 +17,7 @@ from bemt.base.face import table_html
 from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.dataset import Dataset
-from bemt.library.given import conditions, numbers, path_text, turned
+from bemt.library.given import conditions, in_words_of_the_library, number, numbers, path_text, turned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,8 +162,9 @@ class Propeller:
         from bemt.case import lattice
 
         n, V, angle = turned(self.case, *conditions(self.case, rpm, airspeed_m_s, J), angle_deg)
-        density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
-        found = lattice.solve(self.case, n, V, density, bands, angle)
+        density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
+        with in_words_of_the_library({"air.density_kg_m3": "density_kg_m3"}, self.case.path.as_posix()):
+            found = lattice.solve(self.case, n, V, density, bands, angle)
         more = DUCTED if self.case.ducted else (*OBLIQUE, *PAIRED)
         names = [key for key in (*CHANNELS, *more) if key in found]
         by = {origin: {key: v for key, v in part.items() if key in names} for origin, part in found.u_by.items()}
@@ -229,7 +230,12 @@ class Propeller:
         unknowns = [item for item in written.pop("assumptions", []) if not item["key"].startswith("second_rotor.")]
         table = {"second_rotor": {key: value for key, value in given.items() if value is not None}}
         text = tomlkit.dumps(written | table | ({"assumptions": unknowns} if unknowns else {}))
-        return Propeller(case_of(text, self.case.folder), text)
+        keys = {f"second_rotor.{key}": key for key in given} | {
+            f"second_rotor.{k}": "second" for k in ("label", "case")
+        }
+        keys["second_rotor"] = "coaxial"
+        with in_words_of_the_library(keys, self.case.path.as_posix()):
+            return Propeller(case_of(text, self.case.folder), text)
 
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
@@ -313,7 +319,7 @@ class Propeller:
         n, V = conditions(self.case, rpm, airspeed_m_s, J)
         if n.size != 1:
             raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
-        density = None if density_kg_m3 is None else float(numbers("density_kg_m3", density_kg_m3))
+        density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
         air = self.case.air(None if density is None else {"air.density_kg_m3": density})
         prep = self._model.prep
         at = {key: value[0] for key, value in solver.solve(prep, n, V, air, radial=True).radial.items()}
@@ -475,7 +481,7 @@ def propeller(
     >>> propeller("ten by five")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: LABEL: 'ten by five': got unreadable text; expected ...
+    bemt.base.errors.InputError: label: 'ten by five': got unreadable text; expected ...
     """
     faults = []
     if (label is None) == (stations is None):
@@ -490,9 +496,9 @@ def propeller(
         faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
     if stations is not None:
         stations = path_text("stations", stations)
-    rpm = None if rpm is None else float(numbers("rpm", rpm))
-    airspeed_m_s = float(numbers("airspeed_m_s", airspeed_m_s))
-    diameter_m = None if diameter_m is None else float(numbers("diameter_m", diameter_m))
+    rpm = None if rpm is None else number("rpm", rpm)
+    airspeed_m_s = number("airspeed_m_s", airspeed_m_s)
+    diameter_m = None if diameter_m is None else number("diameter_m", diameter_m)
     if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
         hint = "Is that in mm? Divide by 1000" if 10.0 < diameter_m <= 1e4 else ""
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
@@ -501,7 +507,8 @@ def propeller(
     if faults:
         raise InputError(faults)
     if label is not None:
-        text = fresh.label_text(label, blades, rpm, airspeed_m_s)
+        with in_words_of_the_library():
+            text = fresh.label_text(label, blades, rpm, airspeed_m_s)
         return Propeller(case_of(text), text)
     assert stations is not None and diameter_m is not None
     file = Path(stations)

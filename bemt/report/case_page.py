@@ -124,8 +124,9 @@ def _performance(page: Mapping[str, Any]) -> Section:
             traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
             traces += _points(page, "J", name, lambda r: near(r, "rpm"))
-        title = f"{label} over advance ratio at {own['rpm']:g} rev/min"
-        plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces))
+        title = f"{label[0].upper()}{label[1:]} over advance ratio at {own['rpm']:g} rev/min"
+        note = "Where the band exceeds 1, the efficiency is not known." if name == "eta" else ""
+        plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces, note=note))
     with np.errstate(divide="ignore", invalid="ignore"):
         per_kW: Any = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
     simple = Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4")

@@ -13,10 +13,13 @@ from bemt.report.verdicts import NOTHING_RECORDED, verdict
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip
+BADGE = {"none": "no cause shows", "named": "cause", "class": "one of", "sensor": "sensor",
+         "unknown": "cause not in the library", "insufficient": "cause not known"}  # fmt: skip
+"""Words of the badge; the verdict alone reads as if nothing agreed."""
 RANKED, LEAST = 8, 1e-3
 """Most effects of the ranking that are shown, and the probability below which none is."""
 FIT = ("before", "after", "noise", "gp_only", "holdout_before", "holdout_after")
-FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth unknown effect only", "held out, before",
+FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth fit without physics", "held out, before",
             "held out, after")  # fmt: skip
 
 
@@ -49,7 +52,8 @@ def diagnosis_verdict(item: Mapping[str, Any]) -> tuple[str, str, str]:
     said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
     why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
-    return KIND.get(said, "unknown"), f"{said}: {effects}" if effects else said, why
+    word = BADGE.get(said, said)
+    return KIND.get(said, "unknown"), f"{word}: {effects}" if effects else word, why
 
 
 def page_verdict(page: Mapping[str, Any]) -> tuple[str, str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.diagnosis_block import page_verdict
+from bemt.report.diagnosis_block import diagnosis_verdict, page_verdict
 from bemt.report.plot import Mark, Plot, figure, points
 from bemt.report.values import Part, uri
 from bemt.report.verdicts import answer, headline, verdict
@@ -30,10 +30,12 @@ NOTE = (
     "data; own CFD: grid study). No bar: unknown. Reference: the first recorded CFD value, "
     "else bench, else vendor. A triangle at the edge points to a value beyond it."
 )
-NEEDS = (
-    "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at least that large. "
-    "“Inside the model's band”: they agree for any uncertainty of the recording."
-)
+NEEDS = {
+    "needs u_D": "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at "
+    "least that large.",
+    "inside the model's band": "“Inside the model's band”: they agree for any uncertainty of the recording.",
+}
+"""Explanations of badges, by how their words begin."""
 OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
 
 
@@ -110,8 +112,10 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
 def front_parts(book: Mapping[str, Any], ids: Sequence[str]) -> list[Part]:
     """Give the chart and the table of all cases."""
     plot = _comparison_plot(book)
+    badges = [page_verdict(page)[1] for page in book["cases"]]
+    told = [text for lead, text in NEEDS.items() if any(badge.startswith(lead) for badge in badges)]
     return [
-        ("words", NEEDS if plot else ""),
+        ("words", " ".join(told) if plot else ""),
         ("figures", [plot] if plot else []),
         ("words", OF_TABLE),
         ("table", _comparison_table(book, ids)),
@@ -149,10 +153,12 @@ def summary(book: Mapping[str, Any]) -> str:
             first.setdefault(row["source"], row)
         cells = [_n(first.get("bemt", {}).get("thrust_N")), _n(first.get("bemt", {}).get("u"), 2)]
         cells += [_n(first.get(s, {}).get("thrust_N")) for s in ("k1k2", "cfd", "bench", "vendor")]
-        out.append("| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(verdict(r)[1])]) + " |")
+        out.append(
+            "| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(page_verdict(page)[1])]) + " |"
+        )
     for page in book["cases"]:
         r = page["result"]
-        out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(verdict(r)[2], 1500)]
+        out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(page_verdict(page)[2], 1500)]
         for audit in r.get("audit", []):
             for status in ("fault", "doubtful", "not stated"):
                 topics = [line["topic"] for line in audit["lines"] if line["status"] == status]
@@ -164,11 +170,10 @@ def summary(book: Mapping[str, Any]) -> str:
                     ]
         item = page.get("diagnosis")
         if item:
-            d = item["document"]
             out += [
                 "",
-                f"Diagnosis: {plain_markdown(d.get('verdict', 'unknown'), 40)}. "
-                f"{plain_markdown(d.get('explanation', ''), 800)}",
+                f"Diagnosis: {plain_markdown(diagnosis_verdict(item)[1], 80)}. "
+                f"{plain_markdown(diagnosis_verdict(item)[2], 800)}",
             ]
         out += [f"- {plain_markdown(fault)}" for fault in r.get("faults", [])[:20]]
         out += ["", *(f"Note: {plain_markdown(note)}" for note in page["problems"])] if page["problems"] else []
