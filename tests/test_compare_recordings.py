@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import runpy
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -420,6 +421,16 @@ def test_the_printed_command_runs_with_the_rotor_that_was_chosen(
     assert main([*words[1:6], "--rows-b", "speed_ratio=0.95:1.05"]) == 0
     again = next(line for line in capsys.readouterr().out.splitlines() if "bemt" in line)
     assert {"rotor=right", "speed_ratio=0.95:1.05", "CASE"} <= set(shlex.split(again))
+
+
+def test_turned_blades_of_the_quick_start_are_among_the_causes(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(project / "docs" / "two_runs.py"))
+    for label in (None, "10x5"):
+        found = compare("before.csv", "after.csv", label=label)
+        assert found.verdict in ("named", "class") and "pitch_offset" in found.effects, label
 
 
 @pytest.mark.parametrize(

@@ -361,6 +361,7 @@ REVISIONS: dict[str, tuple[verdict.Decision, dict[str, Any], str]] = {
 # Rules that need a solved problem or a file: tested on one.
 BY_MODEL = (
     "an exact relation in the file", "a wrong unit of the airspeed, or the wind",
+    "another propeller, or what changes this one",
     "does not predict", "on, and out of its range", "a few are left", "many are left",
     "the ratios to the reference forbid a none",
 )  # fmt: skip

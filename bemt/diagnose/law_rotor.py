@@ -286,12 +286,15 @@ def _lifted(faster: Array, loads: Loads, flow: Flow, laws: Laws) -> None:
 
     The slope of thrust over V has dv/dV in it: with v (V + v) = T/(2 rho A) (Glauert 1935, ch. VII 2) an angle changes
     thrust by (V + 2 v)/(V + v) times as much as the same change of inflow by V. The power of the added thrust is
-    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile.
+    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile, whose drag rises with the lift that the angle gives where the
+    blade is not stalled: beyond, thrust hardly follows and drag does.
     """
     V, v = np.maximum(flow.V, 0.0), flow.induced
     dT = -flow.dT_dV * faster * (V + 2.0 * v) / np.maximum(V + v, 1e-9)
     top = np.max(np.abs(flow.T0) / flow.n**2, initial=0.0) * flow.n**2
-    share = np.divide(dT, top, out=np.zeros_like(dT), where=top > 0.0)
+    angle = faster / (flow.omega * flow.R)
+    slope = np.divide(dT, top * angle, out=np.zeros_like(dT), where=top * angle != 0.0)
+    share = float(np.max(np.abs(slope), initial=0.0)) * angle
     loads.Q = loads.Q + dT * (V + 1.5 * laws.kappa * v) / flow.omega + _profile(loads, flow, laws) * laws.rise * share
     loads.T = loads.T + dT
 

@@ -17,6 +17,7 @@ from bemt.compare.recordings import NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.diagnose import blocks, ratio_check, wrong_rotor_check
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.form import FORM
 from bemt.diagnose.suggest import LEVEL
 from bemt.diagnose.thresholds import (
     BESIDE,
@@ -482,6 +483,20 @@ def _two_in_the_air_and_no_reference(a: VerdictQuery) -> Decision | None:
             ),
         )
     return None
+
+
+@_rule("another propeller, or what changes this one", "FORM, LARGEST")
+def _another_propeller_or_a_change(a: VerdictQuery) -> Decision | None:
+    """Declared after two proofs named a duct so: two free shares fit what any change does whose law is off by half."""
+    if tuple(a.leading) != ("propeller",) or a.found.problem.by_laws:
+        return None
+    least = (1.0 - max(FORM)) * a.odds
+    laws = {i: v for i in a.found.spans if rough(i) and (v := a.found.log_bayes(Explanation.of(i))) > least}
+    members = tuple(sorted(laws, key=lambda i: -laws[i]))[:LARGEST]
+    if len(members) < 2:
+        return None
+    why = "two free shares fit whatever changes a rotor; these explain nearly as much by a law"
+    return replace(a.says("class", why, members, mass(a.found, members)), sets=(members,))
 
 
 @_rule("several are sure", "SURE, BOTH")

@@ -21,6 +21,7 @@ from bemt.diagnose import confusion as look
 from bemt.diagnose import fit as fitting
 from bemt.diagnose import prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.diagnose.form import FORM
 from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.thresholds import (
     ANOTHER,
@@ -405,8 +406,8 @@ def inclusion(found: Evidence) -> dict[str, float]:
 def alike(found: Evidence, name: str) -> tuple[str, ...]:
     """Single effects that explain what an effect explains, within noise and evidence, itself left out.
 
-    Without a case the laws of flow and blade are rougher than any noise: as of a smooth rest, what they miss by a small
-    share of all that is explained is a detail.
+    Without a case the laws of flow and blade are rougher than any noise: what they miss by as small a share as
+    published laws differ by is a detail.
     """
     state, what = found.states[0], Explanation.of(name)
     s = state.white.changes(fitting.fit(found, what).signature)
@@ -415,7 +416,7 @@ def alike(found: Evidence, name: str) -> tuple[str, ...]:
     def near(i: str) -> bool:
         behind = best - found.log_bayes(Explanation.of(i))
         if found.problem.by_laws and rough(i) and rough(name):
-            return behind < max(NEAR, SMALL * best)
+            return behind < max(NEAR, min(FORM) * best)
         return behind < NEAR and look.distance(state, s, found.spans[i], state.forms[name]) < look.ALIKE
 
     return tuple(i for i in found.spans if i != name and near(i))
