@@ -243,9 +243,23 @@ class Baking:
 
 
 def follows(time_s: Array) -> NDArray[np.bool_]:
-    """Whether each point but the first follows the one before closely, (P-1,): by 0.1 ms to 1 s.
+    """Whether each point but the first follows the one before closely: by 0.1 ms to 1 s.
 
     Points that are means of others may share one time but for rounding.
+
+    Parameters
+    ----------
+    time_s : (P,) float
+        Times in order [s].
+
+    Returns
+    -------
+    (P-1,) bool
+
+    Examples
+    --------
+    >>> follows(np.array([0.0, 0.1, 0.1, 9.0])).tolist()
+    [True, False, False]
     """
     step = np.diff(time_s)
     return np.asarray((step > _SHORTEST_STEP) & (step < _LONGEST_STEP))
