@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# What a motor's losses may differ by from run to run, and from row to row (heat), share, where electrical power stands
-# for torque.
-_BY_POWER, _EFFICIENCY = 0.03, 0.02
+# What a motor's losses may differ by from run to run, and beyond its law with the load, share, where electrical power
+# stands for torque.
+_BY_POWER, _EFFICIENCY = 0.03, 0.08
 # Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
 _SAME_DRIVE = 0.06
 # Speed below this share of the largest: a rotor that has just set off.

@@ -277,24 +277,28 @@ class LawRotor:
 
 
 def _turned(degrees: Array | float, loads: Loads, flow: Flow, laws: Laws) -> None:
-    """Turn the blade by an angle at 0.75 R."""
-    _lifted(np.radians(degrees) * _AT * flow.omega * flow.R, loads, flow, laws)
+    """Turn the blade by an angle at 0.75 R.
+
+    Drag follows the angle also where the blade stalls and lift does not: as much as where thrust follows best.
+    """
+    _lifted(np.radians(degrees) * _AT * flow.omega * flow.R, loads, flow, laws, stalled=True)
 
 
-def _lifted(faster: Array, loads: Loads, flow: Flow, laws: Laws) -> None:
+def _lifted(faster: Array, loads: Loads, flow: Flow, laws: Laws, stalled: bool = False) -> None:
     """More lift, as of an inflow slower by so much [m/s] with the induced speed left to follow, and its torque.
 
     The slope of thrust over V has dv/dV in it: with v (V + v) = T/(2 rho A) (Glauert 1935, ch. VII 2) an angle changes
     thrust by (V + 2 v)/(V + v) times as much as the same change of inflow by V. The power of the added thrust is
-    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile, whose drag rises with the lift that the angle gives where the
-    blade is not stalled: beyond, thrust hardly follows and drag does.
+    dT (V + 1.5 kappa v), P = T (V + kappa v) + profile.
     """
     V, v = np.maximum(flow.V, 0.0), flow.induced
     dT = -flow.dT_dV * faster * (V + 2.0 * v) / np.maximum(V + v, 1e-9)
     top = np.max(np.abs(flow.T0) / flow.n**2, initial=0.0) * flow.n**2
-    angle = faster / (flow.omega * flow.R)
-    slope = np.divide(dT, top * angle, out=np.zeros_like(dT), where=top * angle != 0.0)
-    share = float(np.max(np.abs(slope), initial=0.0)) * angle
+    share = np.divide(dT, top, out=np.zeros_like(dT), where=top > 0.0)
+    if stalled:
+        angle = faster / (flow.omega * flow.R)
+        slope = np.divide(share, angle, out=np.zeros_like(dT), where=angle != 0.0)
+        share = np.asarray(np.max(np.abs(slope), initial=0.0) * angle)
     loads.Q = loads.Q + dT * (V + 1.5 * laws.kappa * v) / flow.omega + _profile(loads, flow, laws) * laws.rise * share
     loads.T = loads.T + dT
 
@@ -317,7 +321,7 @@ def _untwist(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
 def _section(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Camber turns the zero-lift line by 2 camber; drag scales the profile torque and brakes thrust."""
     dQ = (e.drag - 1.0) * _profile(loads, flow, laws)
-    _turned(math.degrees(2.0 * e.camber), loads, flow, laws)
+    _lifted(2.0 * e.camber * _AT * flow.omega * flow.R, loads, flow, laws)
     helix = (flow.V + flow.induced) / (_AT * flow.omega * flow.R)
     loads.Q = loads.Q + dQ
     loads.T = loads.T - dQ * helix / (_AT * flow.R)

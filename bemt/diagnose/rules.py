@@ -666,8 +666,12 @@ def _density_not_recorded(a: VerdictQuery) -> Decision | None:
 
 @_rule("the drive changed, the loads say nothing", revises=True)
 def _drive_alone(a: VerdictQuery) -> Decision | None:
-    """Declared: loads that stay open do not veto the drive, unless what changes with time may have loaded the motor."""
+    """Declared: loads that stay open do not veto the drive, unless what changes with time, or clearly changed from the
+    reference, may have loaded the motor.
+    """
     if a.drive is None or a.answer.effects or a.load_moves:
+        return None
+    if not a.alone and a.change is not None and ratio_check.clear_changes(a.change):
         return None
     changed = a.drive.verdict in ("named", "class") or (a.drive.verdict == "unknown" and a.answer.verdict == "none")
     return replace(a.drive, by="drive") if changed else None
@@ -767,7 +771,9 @@ def _thrust_turned(a: VerdictQuery) -> Decision | None:
 @_rule("two recordings without a case: electrical power for torque", revises=True)
 def _by_proxy(a: VerdictQuery) -> Decision | None:
     """Declared: nothing unlisted, and no single name, where the losses of a motor are in the readings."""
-    if a.pair is None or a.answer.verdict not in ("unknown", "named", "sensor") or not a.pair.by_proxy:
+    if a.pair is None or not a.pair.by_proxy:
+        return None
+    if a.answer.verdict not in ("unknown", "named", "sensor") and a.answer.rule != BESIDE_IT:
         return None
     why = "electrical power replaces torque and includes the losses of the motor"
     return replace(a.answer, verdict="insufficient", effects=(), classes=(), sets=(), why=why)
