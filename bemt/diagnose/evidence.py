@@ -25,7 +25,7 @@ from bemt.gaussian.evidence import log_sum, shares
 from bemt.gaussian.whitening import conditional
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Hyper, Rival
+    from bemt.diagnose.noise import Hyper, SmoothAlternative
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
     from bemt.gaussian.whitening import Conditional, Whitener
@@ -74,7 +74,7 @@ class Evidence:
         Columns of each candidate in ``State.S``.
     log_w : (G,) float
         Logarithm of the prior weight of each column within its candidate [1].
-    rivals : tuple of Rival
+    rivals : tuple of SmoothAlternative
         Unknown smooth effects.
     """
 
@@ -84,7 +84,7 @@ class Evidence:
     probability: dict[Explanation, float]
     spans: dict[str, slice]
     log_w: Array
-    rivals: tuple[Rival, ...] = ()
+    rivals: tuple[SmoothAlternative, ...] = ()
 
     def of(self, name: str) -> Candidate:
         """Candidate by id."""
@@ -126,7 +126,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     spans, S, log_w = _stacked(problem, candidates)
     modes = form.form_modes(problem, candidates)
     # a few settings of each effect are enough to see which covariances matter
-    coarse = _Table(problem, S, log_w, spans, candidates, modes, _few(problem, candidates))
+    coarse = _EvidenceTable(problem, S, log_w, spans, candidates, modes, _few(problem, candidates))
     best: dict[Hyper, dict[Explanation, float]] = {}
     top = -np.inf
     for h, C in noise.covariances(problem):
@@ -135,7 +135,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
             best_pair(state, coarse.spans, coarse.log_w, coarse.shape)
         best[h] = state.log_z
         top = max(top, max(best[h].values()) + np.log(h.weight))
-    fine = _Table(problem, S, log_w, spans, candidates, modes, None)
+    fine = _EvidenceTable(problem, S, log_w, spans, candidates, modes, None)
     rivals = noise.rivals(problem, _told(candidates))
     states: list[State] = []
     for h in _leading(best):
@@ -211,7 +211,7 @@ def _few(problem: Problem, candidates: Sequence[Candidate], most: int = 9) -> ND
     return np.concatenate([np.zeros(0, dtype=np.intp), *out])
 
 
-class _Table:
+class _EvidenceTable:
     """Settings of all candidates, or some of each, laid out so that one covariance weighs them in a few products."""
 
     def __init__(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
 
-__all__ = ["Hyper", "Rival", "discrepancy", "hypers", "rivals", "unlike"]
+__all__ = ["Hyper", "SmoothAlternative", "discrepancy", "hypers", "rivals", "unlike"]
 
 Array = NDArray[np.float64]
 
@@ -202,7 +202,7 @@ def _tangents(problem: Problem) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class SmoothAlternative:
     """An unknown smooth effect of the test.
 
     Attributes
@@ -230,7 +230,7 @@ class Rival:
         return out
 
 
-def unlike(covariance: Array, u: Array, chosen: Sequence[Rival]) -> list[tuple[Conditional, Whitener]]:
+def unlike(covariance: Array, u: Array, chosen: Sequence[SmoothAlternative]) -> list[tuple[Conditional, Whitener]]:
     """What rivals change given the rest, without and with each of them beside a covariance."""
     found: dict[bytes, Conditional] = {}
     out = []
@@ -243,7 +243,7 @@ def unlike(covariance: Array, u: Array, chosen: Sequence[Rival]) -> list[tuple[C
     return out
 
 
-def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
+def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternative, ...]:
     """Unknown smooth effects of the test: along each recorded variable but those ``told``, and pairs of them."""
     X: dict[str, Array] = {}
     for name, values in problem.covariates.items():
@@ -271,7 +271,7 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
                 kernel *= np.multiply.outer(problem.scale[mine], problem.scale[mine])
                 for size in _RIVAL_SIZES:
                     label = " and ".join(words[k] for k in group)
-                    out.append(Rival(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
+                    out.append(SmoothAlternative(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
     load, falling = _loading(problem)
     for group in groups:
         mine = free & np.isin(c, group) & falling
@@ -281,7 +281,7 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[Rival, ...]:
         most = np.array([np.max(np.abs(problem.y[c == k])) for k in present])[np.searchsorted(present, c[mine])]
         kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine]) * np.multiply.outer(most, most)
         label = " and ".join(words[k] for k in group)
-        out += [Rival(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
+        out += [SmoothAlternative(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
     return tuple(out)
 
 

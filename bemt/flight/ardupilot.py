@@ -59,7 +59,7 @@ def sniff(head: bytes) -> bool:
 
 
 @dataclass(eq=False)
-class _Table:
+class _MessageTable:
     """Messages of one kind: their layout, bytes not yet unpacked, and columns."""
 
     name: str
@@ -107,11 +107,13 @@ def read(path: Path) -> FlightLog:
         raise InputError(Fault(name, "", f"a damaged log ({error})", "whole DataFlash messages")) from error
 
 
-def _tables(data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type]]) -> tuple[dict[str, _Table], str]:
+def _tables(
+    data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type]]
+) -> tuple[dict[str, _MessageTable], str]:
     """Walk the messages; where they cannot be read, skip to the next mark."""
     sizes: dict[int, int] = {_FORMATS: _FORMAT_SIZE}
-    kinds: dict[int, _Table] = {}
-    tables: dict[str, _Table] = {}
+    kinds: dict[int, _MessageTable] = {}
+    tables: dict[str, _MessageTable] = {}
     at, end, skipped, cut = 0, len(data), 0, 0
     while at + 3 <= end:
         size = sizes.get(data[at + 2]) if data[at : at + 2] == _HEAD else None
@@ -143,7 +145,9 @@ def _tables(data: mmap.mmap, letters: Mapping[str, tuple[str, float | None, type
     return tables, f"ends within a message, {cut} bytes before its end" if cut else ""
 
 
-def _format(body: bytes, letters: Mapping[str, tuple[str, float | None, type]]) -> tuple[int, int, _Table | None]:
+def _format(
+    body: bytes, letters: Mapping[str, tuple[str, float | None, type]]
+) -> tuple[int, int, _MessageTable | None]:
     """Number and length of the messages that a FMT message describes; their table when they are wanted."""
     number, size = body[0], body[1]
     name, form, labels = (part.rstrip(b"\0").decode("latin-1") for part in (body[2:6], body[6:22], body[22:86]))
@@ -160,7 +164,7 @@ def _format(body: bytes, letters: Mapping[str, tuple[str, float | None, type]]) 
         if factor is not None:
             scale[label] = factor
     row = np.dtype([(a, np.dtype((b, c))) for a, b, c in fields])
-    return (number, size, _Table(name, row, scale)) if row.itemsize == size - 3 else (number, size, None)
+    return (number, size, _MessageTable(name, row, scale)) if row.itemsize == size - 3 else (number, size, None)
 
 
 def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> FlightLog:

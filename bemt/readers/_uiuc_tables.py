@@ -33,7 +33,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {  # outside: a wrong column or u
 
 
 @dataclass(frozen=True, eq=False)
-class _Table:
+class _UiucTable:
     """One file as arrays: ``file``, ``sha256``, ``rows`` (line numbers from 1), ``flags`` (per row, may be empty)."""
 
     file: str
@@ -43,7 +43,7 @@ class _Table:
 
 
 @dataclass(frozen=True, eq=False)
-class UiucGeometry(_Table):
+class UiucGeometry(_UiucTable):
     """Blade stations: ``r_R``, ``c_R`` (N,), ``beta_deg`` (N,) [deg]; ``origin`` and ``rotation_deg`` as above."""
 
     r_R: Array
@@ -54,7 +54,7 @@ class UiucGeometry(_Table):
 
 
 @dataclass(frozen=True, eq=False)
-class UiucStatic(_Table):
+class UiucStatic(_UiucTable):
     """Static run: ``rpm`` (N,) [rev/min], ``CT``, ``CP`` (N,)."""
 
     rpm: Array
@@ -64,7 +64,7 @@ class UiucStatic(_Table):
 
 
 @dataclass(frozen=True, eq=False)
-class UiucLine(_Table):
+class UiucLine(_UiucTable):
     """Run over advance ratio at one nominal ``rpm`` [rev/min]: ``J``, ``CT``, ``CP``, ``eta`` (N,)."""
 
     rpm: float
@@ -76,7 +76,7 @@ class UiucLine(_Table):
 
 
 @dataclass(frozen=True, eq=False)
-class UiucThickness(_Table):
+class UiucThickness(_UiucTable):
     """Thickness ratio ``t_c`` (N,) over ``r_R`` (N,)."""
 
     r_R: Array
