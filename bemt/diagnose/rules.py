@@ -152,7 +152,7 @@ def _level(a: VerdictQuery) -> bool:
     seen = problem.free & (problem.centre != 0.0)
     share = fitting.fit(a.found, a.leading).signature[seen] / problem.centre[seen]
     of = problem.channel[seen]
-    largest = float(np.max(np.abs(share)))
+    largest = float(np.max(np.abs(share), initial=0.0))
     return all(np.ptp(share[of == c]) <= _SAME * largest for c in np.unique(of))
 
 
