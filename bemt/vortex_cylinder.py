@@ -17,11 +17,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-__all__ = ["MOUNT_DRAG", "SWIRL", "WAKE_RADIUS", "ahead", "on_axis"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 WAKE_RADIUS = 0.78
 """Radius of the developed wake in hover over that of its rotor: Landgrebe 1972, J. American Helicopter Society 17(4),

@@ -43,6 +43,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt import coefficients as co
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import solver
 from bemt.bem.model import Model
@@ -53,10 +54,6 @@ from bemt.vortex_cylinder import WAKE_RADIUS, ahead
 if TYPE_CHECKING:
     from bemt.bem.solver import Prepared, Solution
     from bemt.effects import Effect
-
-__all__ = ["LOADS", "RATIOS", "Pair", "PairModel", "PairSolution", "contracted", "solve"]
-
-Array = NDArray[np.float64]
 
 JET = 6.2
 """Length of a jet over its diameter from which its speed falls as 1/z (Albertson et al. 1950, Trans. ASCE 115) [1]."""
@@ -73,31 +70,17 @@ _REACH = np.array([0.6, 1.0, 1.7])  # speeds of the lower rotor with balanced to
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two prepared open rotors on one axis.
+    """Two prepared open rotors on one axis."""
 
-    Attributes
-    ----------
-    upper, lower : Prepared
-        The rotor upstream and the one in its wake.
-    spacing_m : float
-        Distance of their disks [m].
-    opposite : bool
-        Whether they turn against each other.
-    wake_radius : float
-        Radius of the upper rotor's developed wake in hover over its own, 0.707 by momentum theory [1].
-    interference : float
-        Factor on all that the rotors induce at each other; 0: two rotors alone [1].
-    swirl : float
-        Share of the upper rotor's swirl that reaches the lower one [1].
-    """
-
+    # The rotor upstream and the one in its wake
     upper: Prepared
     lower: Prepared
-    spacing_m: float
-    opposite: bool = True
+    spacing_m: float  # Distance of their disks [m]
+    opposite: bool = True  # Whether they turn against each other
+    # Radius of the upper rotor's developed wake in hover over its own, 0.707 by momentum theory [1]
     wake_radius: float = WAKE_RADIUS
-    interference: float = 1.0
-    swirl: float = 1.0
+    interference: float = 1.0  # Factor on all that the rotors induce at each other; 0: two rotors alone [1]
+    swirl: float = 1.0  # Share of the upper rotor's swirl that reaches the lower one [1]
 
     @cached_property
     def _influence(self) -> tuple[Array, Array, Array]:

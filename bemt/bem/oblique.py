@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import residual, vecmath
 from bemt.bem.kernel import (
@@ -69,8 +70,6 @@ from bemt.bem.kernel import (
 )
 from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, Y_BRAKE, Y_RING, loss, mass_flow
 from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
-
-Array = NDArray[np.float64]
 
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE, P_CONE, P_BACK, P_TOWARD = range(9)
 N_POINT = 9

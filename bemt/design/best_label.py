@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.units import INCH
 from bemt.case import Case
 from bemt.case.load import with_changes
@@ -16,8 +16,6 @@ from bemt.design import rotor_loads
 from bemt.design.requirement import Requirement
 from bemt.design.rotor_loads import RotorLoads
 from bemt.design.search import DIAMETERS, RATIOS
-
-Array = NDArray[np.float64]
 
 FLYING = (0.85, 1.0, 1.2)
 """More pitches over the diameter where the target flies [1]."""

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.case import Case, case_of, new_folder
@@ -29,7 +29,6 @@ from bemt.design.requirement import DesignPoint, Requirement, required
 if TYPE_CHECKING:
     from bemt.bem.model import Model
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 HUB_RATIO = 0.15

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import canvas
+from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREY, ORANGE
 from bemt.design.blade_design import Design
-
-Array = NDArray[np.float64]
 
 BEFORE: dict[str, Any] = {"color": ORANGE, "ls": "--", "lw": 1.4}
 AFTER: dict[str, Any] = {"color": BLUE, "ls": "-", "lw": 1.8}

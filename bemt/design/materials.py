@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from bemt.base.arrays import Array
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem.duct import DuctFlow
 
-Array = NDArray[np.float64]
 Section = Callable[[Array], tuple[Array, Array, Array]]
 """Reynolds numbers of the elements, (N,), to lift coefficient, angle of attack [rad] and drag over lift there."""
 
@@ -37,27 +36,18 @@ _STEPS = 6  # of the Reynolds number, which depends on W c only
 
 @dataclass(frozen=True, eq=False)
 class MinimumLoss:
-    """A blade of minimum induced loss.
+    """A blade of minimum induced loss."""
 
-    Attributes
-    ----------
-    r, chord, beta, phi : (N,) float
-        Radii and chord [m], blade angle and inflow angle [rad].
-    circulation, W : (N,) float
-        Circulation of a blade [m2/s], speed of the section [m/s].
-    displacement : float
-        Speed v' of the vortex sheets [m/s].
-    thrust_N, power_W : float
-        Of all blades.
-    """
-
+    # (N,) Radii and chord [m], blade angle and inflow angle [rad]
     r: Array
     chord: Array
     beta: Array
     phi: Array
+    # (N,) Circulation of a blade [m2/s], speed of the section [m/s]
     circulation: Array
     W: Array
-    displacement: float
+    displacement: float  # Speed v' of the vortex sheets [m/s]
+    # Of all blades
     thrust_N: float
     power_W: float
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.design.minimum_loss import MinimumLoss, minimum_loss
 from bemt.design.problem import BladeProblem, Values, top_lift
@@ -22,7 +22,6 @@ from geometry.blade import Blade, from_stations
 if TYPE_CHECKING:
     from bemt.bem.model import Model
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, str], None]
 
 ENOUGH = 1e-3
@@ -36,29 +35,17 @@ _USUAL_TIP = 0.35  # Mach number of a first guess where the speed is free
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """A blade found.
+    """A blade found."""
 
-    Attributes
-    ----------
-    problem : BladeProblem
-        What was solved.
-    start, best : (V,) float
-        Variables of start and result.
-    before, after : Values
-        What they give.
-    steps : int
-        Iterations.
-    converged : bool
-        Whether the optimum was reached within the tolerance.
-    """
-
-    problem: BladeProblem
+    problem: BladeProblem  # What was solved
+    # (V,) Variables of start and result
     start: Array
     best: Array
+    # What they give
     before: Values
     after: Values
-    steps: int
-    converged: bool
+    steps: int  # Iterations
+    converged: bool  # Whether the optimum was reached within the tolerance
 
 
 def section_at_best(

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import InputError
 from bemt.bem import gradient as around
 from bemt.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WHIRL
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
     from bemt.sections.polars import Polar
     from geometry.blade import Stations
 
-Array = NDArray[np.float64]
-
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
 _ALPHA, _W, _AXIAL, _SWIRL, _CL, _ROOM, _LIFT = range(2, 9)  # the last two are added here
 _STEP_RPM = 1e-6
@@ -60,31 +59,20 @@ _TIGHT = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """What a blade does at the points: rotors as built averaged.
+    """What a blade does at the points: rotors as built averaged."""
 
-    Attributes
-    ----------
-    rpm, thrust_N, power_W : (P,) float
-        Speed [rev/min], thrust with duct, shaft power.
-    cl, limit, load, stress_Pa : (P, N) float
-        Lift coefficient and its limit [1], thrust per radius of all blades [N/m], stress [Pa].
-    objective : float
-        Mean power over the scale of the problem.
-    margins : (M,) float
-        Constraints, good at 0 or above.
-    gradient, jacobian : (V,), (M, V) float, empty unless asked for
-        Their derivatives by the variables.
-    """
-
+    # (P,) Speed [rev/min], thrust with duct, shaft power
     rpm: Array
     thrust_N: Array
     power_W: Array
+    # (P, N) Lift coefficient and its limit [1], thrust per radius of all blades [N/m], stress [Pa]
     cl: Array
     limit: Array
     load: Array
     stress_Pa: Array
-    objective: float
-    margins: Array
+    objective: float  # Mean power over the scale of the problem
+    margins: Array  # (M,) Constraints, good at 0 or above
+    # (V,), (M, V) Their derivatives by the variables
     gradient: Array
     jacobian: Array
 

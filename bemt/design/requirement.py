@@ -28,76 +28,39 @@ WIDEST = 0.3
 
 @dataclass(frozen=True)
 class DesignPoint:
-    """One operating point.
+    """One operating point."""
 
-    Parameters
-    ----------
-    thrust_N : float
-        Least thrust [N].
-    airspeed_m_s : float
-        Along the shaft [m/s].
-    rpm : float or None
-        Speed; None: whatever gives the thrust with the least power [rev/min].
-    weight : float
-        Share of the time, of which the mean power is taken; 0: a floor only [1].
-    """
-
-    thrust_N: float
-    airspeed_m_s: float = 0.0
-    rpm: float | None = None
-    weight: float = 1.0
+    thrust_N: float  # Least thrust [N]
+    airspeed_m_s: float = 0.0  # Along the shaft [m/s]
+    rpm: float | None = None  # Speed; None: whatever gives the thrust with the least power [rev/min]
+    weight: float = 1.0  # Share of the time, of which the mean power is taken; 0: a floor only [1]
 
 
 @dataclass(frozen=True)
 class BladeLimits:
-    """What the blade must keep to.
+    """What the blade must keep to."""
 
-    Parameters
-    ----------
-    min_chord_m, min_thickness_m : float
-        Least chord and least greatest thickness anywhere [m].
-    max_tip_mach : float
-        Helical tip Mach number.
-    stall_margin : float
-        The lift coefficient stays below (1 - margin) times the section's largest at the same Reynolds number.
-    material : Material
-        Gives density and strength.
-    safety : float
-        Strength over stress, at least.
-    """
-
+    # Least chord and least greatest thickness anywhere [m]
     min_chord_m: float = MIN_CHORD_MM * 1e-3
     min_thickness_m: float = 0.0
-    max_tip_mach: float = 0.8
+    max_tip_mach: float = 0.8  # Helical tip Mach number
+    # The lift coefficient stays below (1 - margin) times the section's largest at the same Reynolds number
     stall_margin: float = STALL_MARGIN
-    material: Material = MATERIALS["pla"]
-    safety: float = SAFETY
+    material: Material = MATERIALS["pla"]  # Gives density and strength
+    safety: float = SAFETY  # Strength over stress, at least
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """Points, size and limits of a blade, checked.
+    """Points, size and limits of a blade, checked."""
 
-    Parameters
-    ----------
-    points : tuple of Point
-        The static floor, if any, is the last.
-    R, Rhub : float
-        Tip and hub radius [m].
-    blades : int
-        Number of blades.
-    limits : BladeLimits
-        What it must keep to.
-    air : Air
-        State of the air.
-    """
-
-    points: tuple[DesignPoint, ...]
+    points: tuple[DesignPoint, ...]  # The static floor, if any, is the last
+    # Tip and hub radius [m]
     R: float
     Rhub: float
-    blades: int
-    limits: BladeLimits
-    air: Air
+    blades: int  # Number of blades
+    limits: BladeLimits  # What it must keep to
+    air: Air  # State of the air
 
     @property
     def slow(self) -> float:

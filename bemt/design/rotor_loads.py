@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.units import INCH
 from bemt.case import Case, case_of, fresh
 from bemt.case.prepare import prepare_case
@@ -17,7 +17,6 @@ from bemt.case.propagate import propagate
 from bemt.drive.rotor_table import SPEEDS
 from geometry.common import pchip
 
-Array = NDArray[np.float64]
 FINE = 481
 SPEED_STEP = 1.2
 """Ratio of neighbouring speeds at which bands are computed [1]."""

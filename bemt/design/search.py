@@ -27,8 +27,8 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.case.drive_schema import LIPO_SOC, LIPO_V
@@ -40,7 +40,6 @@ from bemt.design.rotor_loads import LoadScatter, RotorLoads
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 DIAMETERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 20, 22, 24, 26, 28, 30, 32, 36, 40)
 """Diameters on sale [in]."""
 RATIOS = (0.35, 0.45, 0.55, 0.7)
@@ -59,32 +58,15 @@ SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 @dataclass(frozen=True)
 class Target:
-    """What a propeller has to do.
+    """What a propeller has to do."""
 
-    Parameters
-    ----------
-    thrust_N : float
-        Of one rotor at full throttle. [N]
-    cells : int
-        LiPo cells in series.
-    cruise_N : float, optional
-        Thrust at which power, current and time are stated; `thrust_N` unless given. [N]
-    airspeed_m_s : float
-        Of flight. [m/s]
-    max_tip_mach : float
-        Helical, at the target thrust.
-    rotors : int
-        On the battery.
-    capacity_Ah, minutes : float, optional
-        Battery capacity [A h]; time at `cruise_N` that is part of the target [min].
-    """
-
-    thrust_N: float
-    cells: int
-    cruise_N: float | None = None
-    airspeed_m_s: float = 0.0
-    max_tip_mach: float = 0.8
-    rotors: int = 1
+    thrust_N: float  # Of one rotor at full throttle. [N]
+    cells: int  # LiPo cells in series
+    cruise_N: float | None = None  # Thrust at which power, current and time are stated; `thrust_N` unless given. [N]
+    airspeed_m_s: float = 0.0  # Of flight. [m/s]
+    max_tip_mach: float = 0.8  # Helical, at the target thrust
+    rotors: int = 1  # On the battery
+    # Battery capacity [A h]; time at `cruise_N` that is part of the target [min]
     capacity_Ah: float | None = None
     minutes: float | None = None
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from geometry.blade import Blade, Stations
-
-Array = NDArray[np.float64]
 
 CONTROLS = 5
 """Control points of the chord, and as many of the blade angle."""
@@ -19,29 +17,17 @@ TURN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Blades around a start: ``ln(chord / R)`` is a cubic spline, the blade angle that of the start plus another one.
+    """Blades around a start: ``ln(chord / R)`` is a cubic spline, the blade angle that of the start plus another."""
 
-    Attributes
-    ----------
-    r, dr : (N,) float
-        Blade elements [m].
-    R, Rhub : float
-        Tip and hub [m].
-    nodes : (K,) float
-        r/R of the control points.
-    basis : (N + 2, K) float
-        Splines of unit control points, at the hub, the elements and the tip.
-    beta0 : (N + 2,) float
-        Blade angle of the start there [rad].
-    """
-
+    # (N,) Blade elements [m]
     r: Array
     dr: Array
+    # Tip and hub [m]
     R: float
     Rhub: float
-    nodes: Array
-    basis: Array
-    beta0: Array
+    nodes: Array  # (K,) r/R of the control points
+    basis: Array  # (N + 2, K) Splines of unit control points, at the hub, the elements and the tip
+    beta0: Array  # (N + 2,) Blade angle of the start there [rad]
 
     @staticmethod
     def around(blade: Blade, elements: int) -> tuple[Shape, Array]:

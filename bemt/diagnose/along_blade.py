@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem import solver
 from bemt.bem.model import Model, acts_on_points, acts_on_rotor
@@ -21,10 +21,6 @@ from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
     from bemt.case import Case
-
-__all__ = ["BladeLoads", "Comparison", "along", "compare_along", "read_blade_loads"]
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 # Root and tip are left out: hubs are not modelled, and what the last percents of a blade carry no two codes agree on.
@@ -58,27 +54,16 @@ class BladeLoads:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Rotor over recording in each band, and what is left of the squared misfit with each single effect.
+    """Rotor over recording in each band, and what is left of the squared misfit with each single effect."""
 
-    Attributes
-    ----------
-    bands : (N + 1,) float
-        Edges over the tip radius [1].
-    thrust, torque : (N,) float
-        Load of the rotor over the recorded one [1].
-    left : dict of str to float
-        Effect as a case writes it to the share of the squared misfit that is left with it, best first [1].
-    named : tuple of str
-        Effects that explain and are not told apart; empty: none does, or nothing needs to.
-    fine : (2,) tuple of float
-        Difference of thrust and torque up to which nothing needs to be explained [1].
-    """
-
-    bands: Array
+    bands: Array  # (N + 1,) Edges over the tip radius [1]
+    # (N,) Load of the rotor over the recorded one [1]
     thrust: Array
     torque: Array
+    # Effect as a case writes it to the share of the squared misfit that is left with it, best first [1]
     left: dict[str, float]
-    named: tuple[str, ...]
+    named: tuple[str, ...]  # Effects that explain and are not told apart; empty: none does, or nothing needs to
+    # (2,) Difference of thrust and torque up to which nothing needs to be explained [1]
     fine: tuple[float, float] = (FINE, FINE)
 
     @property

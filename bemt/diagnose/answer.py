@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import prior, verdict
 from bemt.diagnose.explanation import UNKNOWN, Explanation
 from bemt.diagnose.record import CHANNELS
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from bemt.diagnose import suggest as suggestion
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
-
-__all__ = ["Diagnosis", "Baseline", "Posterior", "Readings"]
-
-Array = NDArray[np.float64]
 
 # Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
 _NEAR_ZERO, _FAR = 0.1, 0.05
@@ -67,62 +64,30 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong, in named groups; text, JSON, figures and report are views of it.
+    """What is wrong, in named groups; text, JSON, figures and report are views of it."""
 
-    Attributes
-    ----------
-    found : Evidence
-        Outcome of the weighing, with the problem in it.
-    decision : Decision
-        Verdict of the evidence in the case.
-    said : Decision
-        What is said in the end: the same, unless the ratios to the reference answer.
-    best : Fit
-        Leading explanation at its best setting.
-    parameters : dict
-        Effect to parameter to value and 90 % interval, of the leading explanation.
-    p_value : float
-        Of the gate [1].
-    where : Location
-        Of the mismatch; of the largest scatter when the verdict is none.
-    scores : dict
-        Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
-        magnitude of the readings.
-    blocks : str
-        What was left out in turn for the held-out scores.
-    after, held : (M,) float
-        Readings as the improved model gives them: fitted, and each block from the others [units of the readings].
-    next : Suggestion
-        What would decide.
-    alike : Confusion
-        Distances of effects in this plan.
-    absent : dict of str to str
-        Effects that could not be tried, and why.
-    drive : Diagnosis or None
-        Of the motor's speed over pulse width, a problem of its own; None where it was not recorded.
-    loads : Diagnosis or None
-        Of thrust and torque, where they name nothing and the answer is that of the drive.
-    change : RunChange or None
-        Change from the references, where there is one recording beside them.
-    """
-
-    found: evidence.Evidence
-    decision: verdict.Decision
-    said: verdict.Decision
-    best: fitting.Fit
+    found: evidence.Evidence  # Outcome of the weighing, with the problem in it
+    decision: verdict.Decision  # Verdict of the evidence in the case
+    said: verdict.Decision  # What is said in the end: the same, unless the ratios to the reference answer
+    best: fitting.Fit  # Leading explanation at its best setting
+    # Effect to parameter to value and 90 % interval, of the leading explanation
     parameters: dict[str, dict[str, dict[str, Any]]]
-    p_value: float
-    where: location.Location
+    p_value: float  # Of the gate [1]
+    where: location.Location  # Of the mismatch; of the largest scatter when the verdict is none
+    # Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
+    # magnitude of the readings
     scores: dict[str, dict[str, float]]
-    blocks: str
+    blocks: str  # What was left out in turn for the held-out scores
+    # (M,) Readings as the improved model gives them: fitted, and each block from the others [units of the readings]
     after: Array
     held: Array
-    next: suggestion.Suggestion
-    alike: confusion.Confusion
-    absent: dict[str, str]
+    next: suggestion.Suggestion  # What would decide
+    alike: confusion.Confusion  # Distances of effects in this plan
+    absent: dict[str, str]  # Effects that could not be tried, and why
+    # Of the motor's speed over pulse width, a problem of its own; None where it was not recorded
     drive: Diagnosis | None = None
-    loads: Diagnosis | None = None
-    change: RunChange | None = None
+    loads: Diagnosis | None = None  # Of thrust and torque, where they name nothing and the answer is that of the drive
+    change: RunChange | None = None  # Change from the references, where there is one recording beside them
 
     @property
     def readings(self) -> Readings:

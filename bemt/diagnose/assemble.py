@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem import model as bem
 from bemt.case.as_built import as_built_of
@@ -28,10 +28,6 @@ from bemt.rotors.validity import counted
 
 if TYPE_CHECKING:
     from bemt.case import Case
-
-__all__ = ["assemble", "build"]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 16
 _FEWEST = 3

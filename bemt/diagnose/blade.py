@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.case.as_built import as_built_of, known_from
 from bemt.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
@@ -20,10 +21,6 @@ from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.effects.base import Baking, Effect
-
-__all__ = ["PLAIN", "AsLabelled", "CalibratedBlade", "prior_of"]
-
-Array = NDArray[np.float64]
 
 # Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
 # calibrations; a wide blade without a reference would swallow slips of speed and unit.
@@ -54,24 +51,13 @@ class AsLabelled(AsBuilt):
 
 @dataclass(frozen=True, eq=False)
 class CalibratedBlade:
-    """What is believed of the rotor's blade.
+    """What is believed of the rotor's blade."""
 
-    Attributes
-    ----------
-    at : (K,) float
-        Point of the tangents, in the order and units of `NAMES`.
-    mean : (K,) float
-        Centre of the prior, in the units of `NAMES`.
-    root : (K, K) float
-        Square root of the prior's covariance: its columns are one standard deviation each, in the units of `NAMES`.
-    kind : type of AsBuilt
-        What an angle means: a turn, or another pitch.
-    """
-
-    at: Array
-    mean: Array
+    at: Array  # (K,) Point of the tangents, in the order and units of `NAMES`
+    mean: Array  # (K,) Centre of the prior, in the units of `NAMES`
+    # (K, K) Square root of the prior's covariance: its columns are one standard deviation each, in the units of `NAMES`
     root: Array
-    kind: type[AsBuilt] = AsBuilt
+    kind: type[AsBuilt] = AsBuilt  # What an angle means: a turn, or another pitch
 
     @property
     def effect(self) -> AsBuilt:

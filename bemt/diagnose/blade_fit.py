@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose import noise
 from bemt.diagnose.blade import AsLabelled, CalibratedBlade
 from bemt.gaussian.whitening import log_density
@@ -16,10 +16,6 @@ from bemt.rotors.latents import NAMES, UNITS, AsBuilt, Prior
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
-
-__all__ = ["FARTHEST_DEG", "calibrated"]
-
-Array = NDArray[np.float64]
 
 FARTHEST_DEG = 11.0
 """A blade that a reference turns further than this is another rotor, or the recording is wrong [deg]."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose import noise
 from bemt.diagnose.fit import fit, form_covariance
 from bemt.gaussian.evidence import shares
@@ -16,10 +17,6 @@ if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.explanation import Explanation
     from bemt.diagnose.problem import Problem
-
-__all__ = ["REFERENCE", "held_out", "partitions"]
-
-Array = NDArray[np.float64]
 
 REFERENCE = -1
 """Block of points that are always given: readings without the cause."""

@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.bem.model import acts_on_rotor
 from bemt.compare import recordings
 from bemt.compare.drive_laws import Judgement
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
     from bemt.dataset import Dataset
     from bemt.diagnose.problem import Part
     from bemt.diagnose.signatures import Candidate
-
-__all__ = ["changed", "judged", "law_effects", "records_of", "weighed"]
-
-Array = NDArray[np.float64]
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import (
     blocks,
     by_laws,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Diagnosis", "diagnose"]
 
-Array = NDArray[np.float64]
 # Explanations that the next run is to tell apart.
 _MOST_RIVALS = 5
 

@@ -12,17 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.form import Form, Forms, columns, form_modes
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.state import State
-
-__all__ = ["ALIKE", "Confusion", "confusion", "distance", "nearest"]
-
-Array = NDArray[np.float64]
 
 ALIKE = 3.0
 """Distance below which two effects are one class [1]."""
@@ -30,21 +26,11 @@ ALIKE = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Confusion:
-    """Distances between effects in a plan.
+    """Distances between effects in a plan."""
 
-    Attributes
-    ----------
-    ids : tuple of str
-        Effects.
-    size : (N,) float
-        Length of each effect's whitened signature at the setting that was used [1].
-    distance : (N, N) float
-        Row effect from the nearest setting of the column effect [1].
-    """
-
-    ids: tuple[str, ...]
-    size: Array
-    distance: Array
+    ids: tuple[str, ...]  # Effects
+    size: Array  # (N,) Length of each effect's whitened signature at the setting that was used [1]
+    distance: Array  # (N, N) Row effect from the nearest setting of the column effect [1]
 
     def classes(self) -> list[list[str]]:
         """Effects that are seen but not told apart: connected groups of two or more."""

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from bemt.diagnose.locate import Location
     from bemt.effects import Parameter
 
-__all__ = ["SCHEMA", "document", "explanation", "headline", "text"]
-
 SCHEMA = "bemt.diagnosis/1"
 
 _CHANNEL = {"thrust_N": "Thrust", "torque_Nm": "Torque", "rpm": "Speed of rotation"}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.form import Forms
@@ -29,10 +30,6 @@ if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
     from bemt.gaussian.whitening import Conditional, Whitener
-
-__all__ = ["Evidence", "weigh"]
-
-Array = NDArray[np.float64]
 
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0
@@ -58,33 +55,15 @@ def one_thread() -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Outcome of the weighing.
+    """Outcome of the weighing."""
 
-    Attributes
-    ----------
-    problem : Problem
-        Readings.
-    candidates : tuple of Candidate
-        Effects.
-    states : tuple of State
-        Settings of the covariance that matter, best for the likeliest explanation first.
-    probability : dict of Explanation to float
-        Posterior probability [1].
-    spans : dict of str to slice
-        Columns of each candidate in ``State.S``.
-    log_w : (G,) float
-        Logarithm of the prior weight of each column within its candidate [1].
-    rivals : tuple of SmoothAlternative
-        Unknown smooth effects.
-    """
-
-    problem: Problem
-    candidates: tuple[Candidate, ...]
-    states: tuple[State, ...]
-    probability: dict[Explanation, float]
-    spans: dict[str, slice]
-    log_w: Array
-    rivals: tuple[SmoothAlternative, ...] = ()
+    problem: Problem  # Readings
+    candidates: tuple[Candidate, ...]  # Effects
+    states: tuple[State, ...]  # Settings of the covariance that matter, best for the likeliest explanation first
+    probability: dict[Explanation, float]  # Posterior probability [1]
+    spans: dict[str, slice]  # Columns of each candidate in ``State.S``
+    log_w: Array  # (G,) Logarithm of the prior weight of each column within its candidate [1]
+    rivals: tuple[SmoothAlternative, ...] = ()  # Unknown smooth effects
 
     def of(self, name: str) -> Candidate:
         """Candidate by id."""

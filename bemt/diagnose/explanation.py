@@ -15,21 +15,14 @@ __all__ = ["NONE", "UNKNOWN", "Explanation"]
 class Explanation:
     """A set of effects; false where it has none. Documents write it as ``str`` does: "none", "unknown", "a", "a+b".
 
-    Attributes
-    ----------
-    ids : frozenset of str
-        Effects at work.
-    smooth : bool
-        Whether something smooth is at work that no effect of the catalogue is.
-
     Examples
     --------
     >>> str(Explanation.of("thrust_zero", "reynolds")), str(NONE), str(UNKNOWN)
     ('reynolds+thrust_zero', 'none', 'unknown')
     """
 
-    ids: frozenset[str] = frozenset()
-    smooth: bool = False
+    ids: frozenset[str] = frozenset()  # Effects at work
+    smooth: bool = False  # Whether something smooth is at work that no effect of the catalogue is
 
     @classmethod
     @cache

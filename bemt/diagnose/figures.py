@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from bemt.compare.first_picture import PredictionView
     from bemt.diagnose.answer import Diagnosis
 
-__all__ = ["NAMES", "draw", "residual"]
-
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 NAMES = ("residual", "before_after", "posterior", "radius", "confusion", "ranking")

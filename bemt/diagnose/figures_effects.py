@@ -7,8 +7,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.bem import model as bem
 from bemt.bem import solver
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
 
     from bemt.air import Air
     from bemt.diagnose.answer import Diagnosis
-
-__all__ = ["blade_loads", "matrix", "radius", "ranking"]
-
-Array = NDArray[np.float64]
 
 _MOST_EFFECTS, _MOST_BARS = 10, 8
 # Probability below which an explanation is summed up with others.

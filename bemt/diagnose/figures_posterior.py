@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
 from bemt.diagnose import fit
 from bemt.diagnose.explanation import Explanation
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
 
     from bemt.diagnose.answer import Diagnosis
     from bemt.diagnose.signatures import Candidate
-
-__all__ = ["posterior"]
-
-Array = NDArray[np.float64]
 
 _MOST_PANELS, _MOST_BARS = 6, 6
 

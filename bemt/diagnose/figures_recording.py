@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
 
-__all__ = ["FIRST", "first_picture", "points_of"]
-
 FIRST = "recording"
 """Stem of the file."""
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose import noise
 from bemt.diagnose.evidence import unknown
 from bemt.diagnose.explanation import Explanation
@@ -20,10 +20,6 @@ from bemt.gaussian.whitening import whitener
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.effects import Parameter
-
-__all__ = ["Fit", "fit", "form_covariance", "intervals", "left_over", "refined", "smooth", "weights"]
-
-Array = NDArray[np.float64]
 
 _STEPS = 5
 # Values of a discrete parameter that are told with their odds.
@@ -38,24 +34,12 @@ _FORM_SIZE = float(np.sqrt(sum(w * f**2 for f, w in FORM.items())))
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An explanation at its best setting.
+    """An explanation at its best setting."""
 
-    Attributes
-    ----------
-    ids : tuple of str
-        Effects; of nothing none.
-    settings : tuple of dict
-        Parameters of each.
-    columns : tuple of int
-        Columns of ``State.S``.
-    signature : (M,) float
-        Change of the readings, solved together (not added up) [units of the readings].
-    """
-
-    ids: tuple[str, ...]
-    settings: tuple[dict[str, Any], ...]
-    columns: tuple[int, ...]
-    signature: Array
+    ids: tuple[str, ...]  # Effects; of nothing none
+    settings: tuple[dict[str, Any], ...]  # Parameters of each
+    columns: tuple[int, ...]  # Columns of ``State.S``
+    signature: Array  # (M,) Change of the readings, solved together (not added up) [units of the readings]
 
 
 def fit(found: Evidence, what: Explanation) -> Fit:

@@ -16,8 +16,6 @@ from bemt.diagnose.improve import beside, improved_case, is_improved
 if TYPE_CHECKING:
     from bemt.case import Case
 
-__all__ = ["check", "write"]
-
 
 def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Case], figures: bool = True) -> None:
     """Write everything; improved cases of an earlier answer go."""

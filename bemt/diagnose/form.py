@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import noise
 from bemt.gaussian.evidence import LinearTerms
 
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
     from bemt.diagnose.signatures import Candidate
     from bemt.gaussian.whitening import Conditional
 
-__all__ = ["FORM", "Form", "Forms", "columns", "form_modes"]
-
-Array = NDArray[np.float64]
-
 FORM = {0.15: 0.7, 0.45: 0.3}
 """Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect
 differ by that, of some by half [1]."""
@@ -29,14 +26,9 @@ differ by that, of some by half [1]."""
 
 @dataclass(frozen=True, eq=False)
 class Form(LinearTerms):
-    """Error of the form of one effect, whitened: published laws of one effect differ by a share of its own size.
+    """Error of the form of one effect, whitened: published laws of one effect differ by a share of its own size."""
 
-    Attributes
-    ----------
-    size : float
-        Standard deviation of the form, share of the effect's size; columns for instruments: none, they are exact [1].
-    """
-
+    # Standard deviation of the form, share of the effect's size; columns for instruments: none, they are exact [1]
     size: float = 0.0
 
     @property
@@ -47,30 +39,17 @@ class Form(LinearTerms):
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """Errors of the forms of several effects at a time, side by side: columns that an effect does not have are zero.
+    """Errors of the forms of several effects at a time, side by side: columns that an effect does not have are zero."""
 
-    Attributes
-    ----------
-    B : (C, M, Q) float
-        Whitened modes of unit size, then what lies between a setting and its neighbours on the grid [1].
-    size : (C,) float
-        Standard deviation of each form, share of the effect's size [1].
-    scale : (C, Q) float
-        Size of each column: that of the form, 1 for what lies between settings and for columns that are not there [1].
-    gram : (C, Q, Q) float
-        1 + B^T B with the columns scaled [1].
-    width : (C,) int
-        Columns that each effect has.
-    half_log_det : (C,) float
-        As that of :class:`Form`, 0 where an effect has no column [1].
-    """
-
+    # (C, M, Q) Whitened modes of unit size, then what lies between a setting and its neighbours on the grid [1]
     B: Array
-    size: Array
+    size: Array  # (C,) Standard deviation of each form, share of the effect's size [1]
+    # (C, Q) Size of each column: that of the form, 1 for what lies between settings and for columns that are not there
+    # [1]
     scale: Array
-    gram: Array
-    width: NDArray[np.intp]
-    half_log_det: Array
+    gram: Array  # (C, Q, Q) 1 + B^T B with the columns scaled [1]
+    width: NDArray[np.intp]  # (C,) Columns that each effect has
+    half_log_det: Array  # (C,) As that of :class:`Form`, 0 where an effect has no column [1]
 
     @classmethod
     def of(cls, white: Conditional, columns: Sequence[tuple[int, Array]], d: Array | None = None) -> Forms:

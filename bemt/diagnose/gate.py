@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose import evidence as ev
 from bemt.diagnose import noise, prior
 from bemt.diagnose.explanation import UNKNOWN, Explanation
@@ -20,10 +20,6 @@ from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
-
-__all__ = ["NULLS", "p_value"]
-
-Array = NDArray[np.float64]
 
 NULLS = 400
 """Bootstrapped nulls of one diagnosis [1]."""

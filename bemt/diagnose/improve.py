@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.answer import Diagnosis
 
-__all__ = ["beside", "elsewhere", "improved_case", "is_improved"]
-
 _HEAD = "with what `bemt diagnose` found: "
 
 

@@ -16,8 +16,6 @@ from typing import Any
 
 from bemt import effects
 
-__all__ = ["FILE", "scale_of", "widened"]
-
 FILE = "interval_scales.json"
 
 

@@ -14,15 +14,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.problem import Part
 from bemt.diagnose.record import Record
 from bemt.effects.base import Effect, Flow, Loads
-
-__all__ = ["BLADE_LAWS", "CoefficientCurve", "LawPart", "LawRotor", "law_part"]
-
-Array = NDArray[np.float64]
 
 # Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
 # rest, a + b CP/CT between two ends [1]. Those of the solver for eight propellers by label, 8x3.8 to 18x12, and three
@@ -45,40 +41,20 @@ _AT = 0.75
 
 @dataclass(frozen=True)
 class Laws:
-    """Numbers of the laws that theory leaves open; each of :data:`VARIANTS` changes one of them by its uncertainty.
+    """Numbers of the laws that theory leaves open; each of :data:`VARIANTS` changes one of them by its uncertainty."""
 
-    Attributes
-    ----------
-    no_thrust : float
-        Advance ratio of no thrust over CP/CT at rest: 1.5 to 1.8 of the same propellers [1].
-    slope : float
-        Added to the slope of thrust at rest [1].
-    last_torque : float
-        Torque there, share of that at rest: 0.1 to 0.5 [1].
-    kappa : float
-        Induced power over that of the ideal disk: 1.1 to 1.4 (Leishman 2006, ch. 2; not checked) [1].
-    rise : float
-        Power of the lift that profile drag rises with [1].
-    diameter : (float, float)
-        Powers of the diameter with which thrust and torque go: 4 and 5 of similar propellers, 1.3 and 1.1 of a tapered
-        blade that is cut, by the solver [1].
-    ducted_kappa : float
-        As ``kappa`` within a duct, whose wall carries the flow to the tips [1].
-    size : float
-        Diameter over the one that is guessed, where none is known [1].
-    copper, idle : float
-        Where electrical power stands for torque: voltage lost in the winding over that of rotation, and current without
-        load over the whole, both at the largest power: 0.05 to 0.25 and 0.02 to 0.1 of drone motors (declared) [1].
-    """
-
-    no_thrust: float = 1.65
-    slope: float = 0.0
-    last_torque: float = 0.3
-    kappa: float = 1.25
-    rise: float = 1.5
+    no_thrust: float = 1.65  # Advance ratio of no thrust over CP/CT at rest: 1.5 to 1.8 of the same propellers [1]
+    slope: float = 0.0  # Added to the slope of thrust at rest [1]
+    last_torque: float = 0.3  # Torque there, share of that at rest: 0.1 to 0.5 [1]
+    kappa: float = 1.25  # Induced power over that of the ideal disk: 1.1 to 1.4 (Leishman 2006, ch. 2; not checked) [1]
+    rise: float = 1.5  # Power of the lift that profile drag rises with [1]
+    # Powers of the diameter with which thrust and torque go: 4 and 5 of similar propellers, 1.3 and 1.1 of a tapered
+    # blade that is cut, by the solver [1]
     diameter: tuple[float, float] = (4.0, 5.0)
-    ducted_kappa: float = 1.05
-    size: float = 1.0
+    ducted_kappa: float = 1.05  # As ``kappa`` within a duct, whose wall carries the flow to the tips [1]
+    size: float = 1.0  # Diameter over the one that is guessed, where none is known [1]
+    # Where electrical power stands for torque: voltage lost in the winding over that of rotation, and current without
+    # load over the whole, both at the largest power: 0.05 to 0.25 and 0.02 to 0.1 of drone motors (declared) [1]
     copper: float = 0.15
     idle: float = 0.05
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.air import Air
@@ -28,10 +27,6 @@ from bemt.recordings.check import check
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.diagnose.record import Record
-
-__all__ = ["cases_of", "check_effects", "load", "load_all"]
-
-Array = NDArray[np.float64]
 
 _POINT = ("rpm", "J", "airspeed_m_s", "density_kg_m3", "sideslip_deg", *records.COVARIATES)
 _LOADS = ("CT", "CP", "CQ", "thrust_N", "torque_Nm", "power_W")

@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import fit as fitting
 from bemt.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
     from bemt.diagnose.fit import Fit
-
-__all__ = ["Location", "bare", "locate"]
-
-Array = NDArray[np.float64]
 
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
@@ -31,32 +28,18 @@ _ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_r
 
 @dataclass(frozen=True)
 class Location:
-    """An interval of one variable in one channel.
+    """An interval of one variable in one channel."""
 
-    Attributes
-    ----------
-    channel, variable : str
-        Reading and covariate.
-    low, high : float
-        Interval of the covariate, in its unit.
-    size : float
-        Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1].
-    z : float
-        Sum of the standardised mismatch over the root of the number of readings [1].
-    ties : tuple of str
-        Other variables that explain it as well in this plan.
-    mismatch : (M,) float
-        Of every reading, in its unit; what `size` is the mean of.
-    """
-
+    # Reading and covariate
     channel: str
     variable: str
+    # Interval of the covariate, in its unit
     low: float
     high: float
-    size: float
-    z: float
-    ties: tuple[str, ...]
-    mismatch: Array = field(repr=False, compare=False)
+    size: float  # Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1]
+    z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
+    ties: tuple[str, ...]  # Other variables that explain it as well in this plan
+    mismatch: Array = field(repr=False, compare=False)  # (M,) Of every reading, in its unit; what `size` is the mean of
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""

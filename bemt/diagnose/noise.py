@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.record import CHANNELS
 from bemt.gaussian.kernels import alike, modes, smooth
 from bemt.gaussian.whitening import Conditional, Whitener, conditional, whitener
@@ -23,10 +24,6 @@ from bemt.gaussian.whitening import Conditional, Whitener, conditional, whitener
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects.base import Effect
-
-__all__ = ["Hyper", "SmoothAlternative", "discrepancy", "hypers", "rivals", "unlike"]
-
-Array = NDArray[np.float64]
 
 # Noise over the stated uncertainty, or over the default where none is stated; correlation of neighbours.
 _SCALES = {True: (0.7, 1.0, 1.5, 2.5, 5.0), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
@@ -76,33 +73,15 @@ _LOGARITHMIC = ("rpm", "density_kg_m3", "tip_gap_m", "wall_distance_m")
 
 @dataclass(frozen=True)
 class Hyper:
-    """One setting of the unknown numbers of the covariance.
+    """One setting of the unknown numbers of the covariance."""
 
-    Attributes
-    ----------
-    scale : float
-        Noise over stated uncertainty [1].
-    ar : float
-        Correlation of neighbouring points of a run [1].
-    model : float
-        Error of the solver, share of the largest coefficient [1].
-    own : float
-        Factor on the nuisances that are errors of the solver itself [1].
-    weight : float
-        Prior probability [1].
-    session : float
-        What runs differ by, a share [1].
-    real : float
-        Size of what real rotors differ by from the solver, over that of the population [1].
-    """
-
-    scale: float
-    ar: float
-    model: float
-    own: float
-    weight: float
-    session: float = 0.006
-    real: float = 0.0
+    scale: float  # Noise over stated uncertainty [1]
+    ar: float  # Correlation of neighbouring points of a run [1]
+    model: float  # Error of the solver, share of the largest coefficient [1]
+    own: float  # Factor on the nuisances that are errors of the solver itself [1]
+    weight: float  # Prior probability [1]
+    session: float = 0.006  # What runs differ by, a share [1]
+    real: float = 0.0  # Size of what real rotors differ by from the solver, over that of the population [1]
 
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
@@ -203,24 +182,12 @@ def _tangents(problem: Problem) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class SmoothAlternative:
-    """An unknown smooth effect of the test.
+    """An unknown smooth effect of the test."""
 
-    Attributes
-    ----------
-    name : str
-        Channels, variables and size.
-    mine : (M,) bool
-        Readings that it changes.
-    kernel : (N, N) float
-        Its covariance in these at size 1 [square of the units of the readings].
-    size : float
-        Standard deviation, share of the largest coefficient [1].
-    """
-
-    name: str
-    mine: NDArray[np.bool_]
-    kernel: Array
-    size: float
+    name: str  # Channels, variables and size
+    mine: NDArray[np.bool_]  # (M,) Readings that it changes
+    kernel: Array  # (N, N) Its covariance in these at size 1 [square of the units of the readings]
+    size: float  # Standard deviation, share of the largest coefficient [1]
 
     @property
     def covariance(self) -> Array:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.noise import law_of, smooth_modes
 from bemt.diagnose.record import CHANNELS
 from bemt.effects.base import Effect
@@ -21,10 +22,6 @@ from bemt.rotors.latents import NAMES, AsBuilt
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem
-
-__all__ = ["PRIORS", "PULSE_POWERS", "nuisances"]
-
-Array = NDArray[np.float64]
 
 PRIORS = {
     "thrust gain": 0.01, "torque gain": 0.01,

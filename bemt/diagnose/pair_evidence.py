@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.diagnose import form
 from bemt.diagnose.explanation import NONE, Explanation
 from bemt.diagnose.signatures import effect_of
-from bemt.diagnose.state import Array, State
+from bemt.diagnose.state import State
 from bemt.gaussian.evidence import log_sum
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 from bemt.base.tables import text_table
 from bemt.diagnose import confusion as look
 from bemt.diagnose import evidence, noise, prior, problem, signatures, thresholds
@@ -22,10 +22,6 @@ from bemt.gaussian.whitening import whitener
 if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
-
-__all__ = ["SCHEMA", "Plan", "document", "plan", "points", "text"]
-
-Array = NDArray[np.float64]
 
 SCHEMA = "bemt.plan/1"
 
@@ -40,35 +36,18 @@ DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a plan can do.
+    """What a plan can do."""
 
-    Attributes
-    ----------
-    confusion : Confusion
-        Distances.
-    size, best : (N,) float
-        What the readings will say for each effect against nothing, usually and if the solver is at its best, as
-        standard deviations: the square root of twice the expected log odds [1].
-    bar : (N,) float
-        Log odds from which a diagnosis names each effect [1].
-    absent : dict of str to str
-        Effects that cannot show, and why.
-    added : Suggestion or None
-        A run that separates the largest pair of look-alikes.
-    points : int
-        Points of the plan [1].
-    notes : tuple of str
-        What the file left open, and what was assumed for it.
-    """
-
-    confusion: look.Confusion
+    confusion: look.Confusion  # Distances
+    # (N,) What the readings will say for each effect against nothing, usually and if the solver is at its best, as
+    # standard deviations: the square root of twice the expected log odds [1]
     size: Array
     best: Array
-    bar: Array
-    absent: dict[str, str]
-    added: suggestion.Suggestion | None
-    points: int
-    notes: tuple[str, ...] = ()
+    bar: Array  # (N,) Log odds from which a diagnosis names each effect [1]
+    absent: dict[str, str]  # Effects that cannot show, and why
+    added: suggestion.Suggestion | None  # A run that separates the largest pair of look-alikes
+    points: int  # Points of the plan [1]
+    notes: tuple[str, ...] = ()  # What the file left open, and what was assumed for it
 
     @property
     def sight(self) -> dict[str, str]:

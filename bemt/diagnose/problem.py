@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.bem import model as bem
 from bemt.diagnose import real_rotors
 from bemt.diagnose.blade import PLAIN, CalibratedBlade
@@ -18,10 +19,6 @@ from bemt.effects.base import Effect, Flow, Reading
 
 if TYPE_CHECKING:
     from bemt.case.as_built import CaseAsBuilt
-
-__all__ = ["Part", "Problem", "SpeedCurve"]
-
-Array = NDArray[np.float64]
 
 # Speeds over the recorded ones beyond which the tables of these do not reach.
 _SLOWER, _FASTER = 0.7, 1.1
@@ -56,38 +53,19 @@ class SpeedCurve:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One recording with the rotor that made it.
+    """One recording with the rotor that made it."""
 
-    Attributes
-    ----------
-    record : Record
-        Points.
-    model : Model
-        Rotor.
-    baseline : tuple of Effect
-        Physics that the case has on.
-    flow : Flow
-        Recorded conditions with the baseline's loads.
-    key : str
-        Rotor: parts of one rotor share the error of its model.
-    left_out : tuple of str
-        Effects that the case switches off.
-    as_built : CaseAsBuilt or None
-        How well the rotor is known; None where the population of real rotors says nothing of the baseline.
-    instead : (C P,) float or None
-        Baseline of another model, to which effects add what share they change in ours [N], [N m], [rev/min].
-    drive : SpeedCurve or None
-        Speed over pulse width as the reference shows it; None: as this recording itself does.
-    """
-
-    record: Record
-    model: bem.Model
-    baseline: tuple[Effect, ...]
-    flow: Flow
-    key: str = ""
-    left_out: tuple[str, ...] = ()
+    record: Record  # Points
+    model: bem.Model  # Rotor
+    baseline: tuple[Effect, ...]  # Physics that the case has on
+    flow: Flow  # Recorded conditions with the baseline's loads
+    key: str = ""  # Rotor: parts of one rotor share the error of its model
+    left_out: tuple[str, ...] = ()  # Effects that the case switches off
+    # How well the rotor is known; None where the population of real rotors says nothing of the baseline
     as_built: CaseAsBuilt | None = None
+    # (C P,) Baseline of another model, to which effects add what share they change in ours [N], [N m], [rev/min]
     instead: Array | None = None
+    # Speed over pulse width as the reference shows it; None: as this recording itself does
     drive: SpeedCurve | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
 
@@ -172,68 +150,37 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Stacked readings of all parts.
+    """Stacked readings of all parts."""
 
-    Attributes
-    ----------
-    parts : tuple of Part
-        Recordings.
-    y, f0, u, scale : (M,) float
-        Readings, baseline, standard uncertainty, and the size that shares refer to (the largest coefficient in the
-        recording at the point's speed and density), each in the unit of its channel.
-    u_known : bool
-        Whether the recording states its uncertainties.
-    channel, point, part : (M,) int
-        Index into :data:`CHANNELS`, into all P points, into the parts.
-    kept : (M0,) bool
-        Which of all stacked readings were used (measured and converged).
-    covariates : dict of str to (P,) float
-        rpm, J, M_tip, Re and what was recorded besides.
-    tangents : (M, K) float
-        Change of the readings for one standard deviation of each nuisance [units of the readings].
-    names : tuple of str
-        Names of the nuisances.
-    own : (K,) bool
-        Which of them are errors of the solver itself.
-    notes : tuple of str
-        What was assumed or left out.
-    validity : tuple of str
-        Where the recording leaves what the solver was measured against, or its method, in the words of every command.
-    between : tuple of str
-        What looks wrong in a recording beside the others, its file named in front.
-    scatter : dict of str to float
-        Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1].
-    blade : CalibratedBlade
-        What is believed of the rotor's blade, and the point of its tangents.
-    offset : (M,) float
-        Change of the readings from the centre of the blade's prior to that point [units of the readings].
-    variants : tuple of tuple of Part
-        The parts under other laws, each off by about its uncertainty in one number.
-    predicted : dict
-        Readings that were solved already, by the effects added.
-    """
-
-    parts: tuple[Part, ...]
+    parts: tuple[Part, ...]  # Recordings
+    # (M,) Readings, baseline, standard uncertainty, and the size that shares refer to (the largest coefficient in the
+    # recording at the point's speed and density), each in the unit of its channel
     y: Array
     f0: Array
     u: Array
     scale: Array
-    u_known: bool
+    u_known: bool  # Whether the recording states its uncertainties
+    # (M,) Index into :data:`CHANNELS`, into all P points, into the parts
     channel: NDArray[np.intp]
     point: NDArray[np.intp]
     part: NDArray[np.intp]
-    kept: NDArray[np.bool_]
-    covariates: dict[str, Array]
-    tangents: Array
-    names: tuple[str, ...]
-    own: NDArray[np.bool_]
-    notes: tuple[str, ...] = ()
+    kept: NDArray[np.bool_]  # (M0,) Which of all stacked readings were used (measured and converged)
+    covariates: dict[str, Array]  # (P,) rpm, J, M_tip, Re and what was recorded besides
+    tangents: Array  # (M, K) Change of the readings for one standard deviation of each nuisance [units of the readings]
+    names: tuple[str, ...]  # Names of the nuisances
+    own: NDArray[np.bool_]  # (K,) Which of them are errors of the solver itself
+    notes: tuple[str, ...] = ()  # What was assumed or left out
+    # Where the recording leaves what the solver was measured against, or its method, in the words of every command
     validity: tuple[str, ...] = ()
-    between: tuple[str, ...] = ()
+    between: tuple[str, ...] = ()  # What looks wrong in a recording beside the others, its file named in front
+    # Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1]
     scatter: dict[str, float] = field(default_factory=dict)
-    blade: CalibratedBlade = PLAIN
+    blade: CalibratedBlade = PLAIN  # What is believed of the rotor's blade, and the point of its tangents
+    # (M,) Change of the readings from the centre of the blade's prior to that point [units of the readings]
     offset: Array = field(default_factory=lambda: np.zeros(0))
+    # The parts under other laws, each off by about its uncertainty in one number
     variants: tuple[tuple[Part, ...], ...] = ()
+    # Readings that were solved already, by the effects added
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
     @property

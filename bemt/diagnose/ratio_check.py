@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from bemt.compare.drive_laws import Judgement
     from bemt.diagnose.record import Record
 
-__all__ = ["change_of", "clear_changes", "next_of"]
-
 # Standard deviations from which a load has changed.
 _CLEAR = 3.0
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}

@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.record import CHANNELS, air_of
 from bemt.rotors.model import beta75_deg, coefficients
 from bemt.rotors.population import population
@@ -20,10 +20,6 @@ from bemt.rotors.predict import sense
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Part, Problem
-
-__all__ = ["covariance"]
-
-Array = NDArray[np.float64]
 
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 # Coefficient at rest of a rotor that has none, so that shares of it are finite.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.diagnose.repeats import conditions, spread_sizes
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
     from bemt.case import Case
     from bemt.dataset import Dataset
     from bemt.recordings.findings import Finding
-
-__all__ = ["CHANNELS", "COVARIATES", "Record", "air_of", "concatenated", "from_series", "merged", "owners", "thinned"]
-
-Array = NDArray[np.float64]
 
 CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 """Readings that may be explained; the speed only where a pulse width was recorded."""
@@ -55,56 +52,29 @@ MAX_POINTS = 160
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """P points of one recording.
+    """P points of one recording."""
 
-    Parameters
-    ----------
-    name : str
-        What was recorded.
-    rpm, V : (P,) float
-        Speed of rotation [rev/min], axial onset speed [m/s].
-    air : Air
-        Its fields are (P,) arrays.
-    measured : dict of str to (P,) float
-        thrust_N, torque_Nm, and rpm where a pulse width was recorded; NaN: not measured.
-    u : dict of str to (P,) float
-        Standard uncertainty of each, uncorrelated part; NaN: unknown.
-    extra : dict of str to (P,) float
-        Covariates of :data:`COVARIATES` that were recorded.
-    gain, zero : dict of str to float
-        Correlated standard uncertainty of a channel: share of the value [1], in its unit.
-    air_recorded : bool
-        Whether density, or pressure and temperature, came with the recording.
-    notes : tuple of str
-        What was assumed or dropped.
-    reference : bool
-        Known to be without the cause that is looked for: shows how far model and stand differ anyway.
-    findings : tuple of str
-        What looks wrong in the file before any physics, the file named in front; nothing was corrected.
-    contradictions : tuple of Finding
-        Those of them that cannot be so.
-    repeatability : float
-        Standard deviation of what runs of this stand differ by, a share, as stated; NaN: not stated [1].
-    electrical : bool
-        Whether torque is electrical power over the indicated speed.
-    """
-
-    name: str
+    name: str  # What was recorded
+    # (P,) Speed of rotation [rev/min], axial onset speed [m/s]
     rpm: Array
     V: Array
-    air: Air
-    measured: dict[str, Array]
-    u: dict[str, Array]
-    extra: dict[str, Array] = field(default_factory=dict)
+    air: Air  # Its fields are (P,) arrays
+    measured: dict[str, Array]  # (P,) thrust_N, torque_Nm, and rpm where a pulse width was recorded; NaN: not measured
+    u: dict[str, Array]  # (P,) Standard uncertainty of each, uncorrelated part; NaN: unknown
+    extra: dict[str, Array] = field(default_factory=dict)  # (P,) Covariates of :data:`COVARIATES` that were recorded
+    # Correlated standard uncertainty of a channel: share of the value [1], in its unit
     gain: Mapping[str, float] = field(default_factory=dict)
     zero: Mapping[str, float] = field(default_factory=dict)
-    air_recorded: bool = False
-    notes: tuple[str, ...] = ()
+    air_recorded: bool = False  # Whether density, or pressure and temperature, came with the recording
+    notes: tuple[str, ...] = ()  # What was assumed or dropped
+    # Known to be without the cause that is looked for: shows how far model and stand differ anyway
     reference: bool = False
+    # What looks wrong in the file before any physics, the file named in front; nothing was corrected
     findings: tuple[str, ...] = ()
-    contradictions: tuple[Finding, ...] = ()
+    contradictions: tuple[Finding, ...] = ()  # Those of them that cannot be so
+    # Standard deviation of what runs of this stand differ by, a share, as stated; NaN: not stated [1]
     repeatability: float = np.nan
-    electrical: bool = False
+    electrical: bool = False  # Whether torque is electrical power over the indicated speed
 
     def __len__(self) -> int:
         """Give the number of points."""

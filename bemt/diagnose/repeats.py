@@ -12,11 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.gaussian.reml import Restricted
-
-__all__ = ["FEWEST", "conditions", "noise_sizes", "projected_out", "spread_sizes"]
-
-Array = NDArray[np.float64]
 
 FEWEST = 10
 """Repeats, less what is projected out, from which on they give the noise [1]."""

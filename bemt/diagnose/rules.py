@@ -54,33 +54,18 @@ from bemt.diagnose.verdict import (
     unsettled,
 )
 
-__all__ = ["RULES", "Rule", "decide"]
-
-
 MOTOR = "motor"
 """Another motor, controller or setting, as the scaling laws name it: no effect of the catalogue describes it."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """One row of the list.
+    """One row of the list."""
 
-    Attributes
-    ----------
-    name : str
-        What it asks.
-    ask : callable
-        Its answer; None where it does not apply. Its docstring is its source.
-    threshold : str
-        Names of the numbers it asks with.
-    revises : bool
-        Whether it sees the answer of the rows before it, and only then is asked.
-    """
-
-    name: str
-    ask: Callable[[Any], Decision | None]
-    threshold: str = ""
-    revises: bool = False
+    name: str  # What it asks
+    ask: Callable[[Any], Decision | None]  # Its answer; None where it does not apply. Its docstring is its source
+    threshold: str = ""  # Names of the numbers it asks with
+    revises: bool = False  # Whether it sees the answer of the rows before it, and only then is asked
 
     @property
     def source(self) -> str:

@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import effects
+from bemt.base.arrays import Array
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.effects import Effect, Parameter
 
-__all__ = ["Candidate", "candidates", "effect_of"]
-
-Array = NDArray[np.float64]
 # Setting, its signature, whether it was solved, its prior weight.
 _Column = tuple[dict[str, Any], Array, bool, float]
 
@@ -33,29 +31,14 @@ _LARGEST = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect over its ranges.
+    """One effect over its ranges."""
 
-    Attributes
-    ----------
-    id : str
-        Effect.
-    settings : tuple of dict
-        G settings of its parameters.
-    signatures : (M, G) float
-        Change of the readings for each [units of the readings].
-    weight : (G,) float
-        Prior probability of each setting, adds up to 1 [1].
-    solved : (G,) bool
-        Whether the setting was solved rather than interpolated.
-    directions : callable or None
-        Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings].
-    """
-
-    id: str
-    settings: tuple[dict[str, Any], ...]
-    signatures: Array
-    weight: Array
-    solved: NDArray[np.bool_]
+    id: str  # Effect
+    settings: tuple[dict[str, Any], ...]  # G settings of its parameters
+    signatures: Array  # (M, G) Change of the readings for each [units of the readings]
+    weight: Array  # (G,) Prior probability of each setting, adds up to 1 [1]
+    solved: NDArray[np.bool_]  # (G,) Whether the setting was solved rather than interpolated
+    # Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings]
     directions: Callable[[Effect], Array] | None = None
     _between: dict[int, Array] = field(default_factory=dict, repr=False)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.explanation import Explanation
 from bemt.diagnose.form import Form
 
@@ -16,48 +16,22 @@ if TYPE_CHECKING:
     from bemt.diagnose.noise import Hyper
     from bemt.gaussian.whitening import Conditional, Whitener
 
-__all__ = ["State"]
-
-Array = NDArray[np.float64]
-
 
 @dataclass(eq=False)
 class State:
-    """Readings and signatures whitened by one setting of the covariance, those of the test given the reference.
+    """Readings and signatures whitened by one setting of the covariance, those of the test given the reference."""
 
-    Attributes
-    ----------
-    hyper : Hyper
-        The setting.
-    white : Conditional
-        Its factors.
-    r : (M,) float
-        Whitened residual [1].
-    S : (M, G) float
-        Whitened signatures of all settings of all candidates [1].
-    half : (G,) float
-        Half of their squared lengths [1].
-    forms : dict of str to Form
-        Error of the form of each candidate, at its best setting.
-    rivals : list of (Conditional, Whitener)
-        Factors without and with each unknown smooth effect.
-    log_z : dict of Explanation to float
-        Logarithm of the evidence per explanation.
-    best_rival : str
-        Unknown smooth effect of largest evidence.
-    mixed : dict of Explanation to (float array, int, int)
-        What two effects change together beyond the sum of both, whitened, and the columns at which it was solved.
-    """
-
-    hyper: Hyper
-    white: Conditional
-    r: Array
-    S: Array
-    half: Array
-    forms: dict[str, Form] = field(default_factory=dict)
+    hyper: Hyper  # The setting
+    white: Conditional  # Its factors
+    r: Array  # (M,) Whitened residual [1]
+    S: Array  # (M, G) Whitened signatures of all settings of all candidates [1]
+    half: Array  # (G,) Half of their squared lengths [1]
+    forms: dict[str, Form] = field(default_factory=dict)  # Error of the form of each candidate, at its best setting
+    # Factors without and with each unknown smooth effect
     rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
-    log_z: dict[Explanation, float] = field(default_factory=dict)
-    best_rival: str = ""
+    log_z: dict[Explanation, float] = field(default_factory=dict)  # Logarithm of the evidence per explanation
+    best_rival: str = ""  # Unknown smooth effect of largest evidence
+    # What two effects change together beyond the sum of both, whitened, and the columns at which it was solved
     mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
 
     def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:

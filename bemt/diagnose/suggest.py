@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.air import R_DRY
+from bemt.base.arrays import Array
 from bemt.base.units import ZERO_CELSIUS
 from bemt.bem import model as bem
 from bemt.compare.change_document import AIR_OF_BOTH, DAYS
@@ -25,13 +25,6 @@ from bemt.gaussian.whitening import whitener
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
-
-__all__ = [
-    "LEVEL", "REFERENCE", "ROTOR", "Given", "Rival", "Suggestion", "correction", "minutes", "nothing_called_for",
-    "suggest", "weather",
-]  # fmt: skip
-
-Array = NDArray[np.float64]
 
 REFERENCE = (
     "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "
@@ -61,22 +54,13 @@ _WORTH, _LEAST = 0.02, 1e-6
 
 @dataclass(frozen=True)
 class Given:
-    """What was asked, as a command line has it.
+    """What was asked, as a command line has it."""
 
-    Attributes
-    ----------
-    recordings, references : tuple of str
-        Files.
-    rest : str
-        Options.
-    ruled_out : tuple of str
-        Effects that a check has ruled out.
-    """
-
+    # Files
     recordings: tuple[str, ...] = ("RECORDING",)
     references: tuple[str, ...] = ()
-    rest: str = "--case CASE"
-    ruled_out: tuple[str, ...] = ()
+    rest: str = "--case CASE"  # Options
+    ruled_out: tuple[str, ...] = ()  # Effects that a check has ruled out
 
     def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
         """Command that diagnoses the same again, with one more file or one effect less."""
@@ -97,44 +81,22 @@ class Given:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A run, and what it would do.
+    """A run, and what it would do."""
 
-    Attributes
-    ----------
-    text : str
-        What to do.
-    points : tuple of dict
-        Operating points: rpm, airspeed_m_s and what else is set.
-    separates : tuple of str
-        The two explanations.
-    before, after : float
-        Distance of the two in standard deviations, now and with the run [1].
-    kind : str
-        "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
-        recording), "air" (write it down), or "" when nothing is called for.
-    commands : tuple of str
-        What to type then; after a check, if the effect is not there.
-    checks : str
-        Effect that a check looks for.
-    minutes : float
-        Time that it takes on a stand [min].
-    gain : float
-        Expected share of the doubt between the explanations that it takes away [1].
-    otherwise : Suggestion or None
-        What to do if there can be no such reference.
-    """
-
-    text: str
-    points: tuple[dict[str, float], ...]
-    separates: tuple[str, ...]
+    text: str  # What to do
+    points: tuple[dict[str, float], ...]  # Operating points: rpm, airspeed_m_s and what else is set
+    separates: tuple[str, ...]  # The two explanations
+    # Distance of the two in standard deviations, now and with the run [1]
     before: float
     after: float
+    # "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
+    # recording), "air" (write it down), or "" when nothing is called for
     kind: str = "run"
-    commands: tuple[str, ...] = ()
-    checks: str = ""
-    minutes: float = 0.0
-    gain: float = 0.0
-    otherwise: Suggestion | None = None
+    commands: tuple[str, ...] = ()  # What to type then; after a check, if the effect is not there
+    checks: str = ""  # Effect that a check looks for
+    minutes: float = 0.0  # Time that it takes on a stand [min]
+    gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
+    otherwise: Suggestion | None = None  # What to do if there can be no such reference
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""

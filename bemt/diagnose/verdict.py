@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.diagnose import confusion as look
@@ -50,14 +49,10 @@ if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
     from bemt.diagnose.evidence import Evidence
 
-__all__ = ["BESIDE_IT", "CLAIMS", "Decision", "VerdictQuery"]
-
 BESIDE_IT = "one is sure, another may be there"
 """Rule after which the second cause may as well be absent."""
 CLAIMS = ("named", "sensor", "class")
 """Verdicts that give a cause."""
-
-Array = NDArray[np.float64]
 
 _BALANCE = ("thrust_N", "torque_Nm")
 # Faults of a cell that shift its reading: one stays, the other creeps.
@@ -68,70 +63,32 @@ _SHARES = ("gain", "cross-talk")
 
 @dataclass(frozen=True)
 class Decision:
-    """What is said, and why.
+    """What is said, and why."""
 
-    Attributes
-    ----------
-    verdict : str
-        none, named, class, sensor, unknown or insufficient.
-    effects : tuple of str
-        Effects of the verdict; of a class all members.
-    leading : Explanation
-        What is shown.
-    probability : float
-        Of the verdict [1].
-    left_over : float
-        Logarithm of the odds of a smooth rest beside the leading explanation [1].
-    classes : tuple of tuple of str
-        Effects that this plan cannot tell from the leading ones.
-    why : str
-        Reason, in words.
-    rule : str
-        Name of the rule that decided.
-    sets : tuple of tuple of str
-        One set of effects per cause: one of each is at work.
-    by : str
-        Whose evidence it is: of the "model", of the "drive", of "both", or of the "ratios" to the reference.
-    """
-
-    verdict: str
-    effects: tuple[str, ...]
-    leading: Explanation
-    probability: float
-    left_over: float
-    classes: tuple[tuple[str, ...], ...]
-    why: str
-    rule: str = ""
-    sets: tuple[tuple[str, ...], ...] = ()
+    verdict: str  # none, named, class, sensor, unknown or insufficient
+    effects: tuple[str, ...]  # Effects of the verdict; of a class all members
+    leading: Explanation  # What is shown
+    probability: float  # Of the verdict [1]
+    left_over: float  # Logarithm of the odds of a smooth rest beside the leading explanation [1]
+    classes: tuple[tuple[str, ...], ...]  # Effects that this plan cannot tell from the leading ones
+    why: str  # Reason, in words
+    rule: str = ""  # Name of the rule that decided
+    sets: tuple[tuple[str, ...], ...] = ()  # One set of effects per cause: one of each is at work
+    # Whose evidence it is: of the "model", of the "drive", of "both", or of the "ratios" to the reference
     by: str = "model"
 
 
 @dataclass(eq=False)
 class VerdictQuery:
-    """What the rules ask of an outcome, each worked out when it is first asked.
+    """What the rules ask of an outcome, each worked out when it is first asked."""
 
-    Attributes
-    ----------
-    found : Evidence
-        Outcome of the weighing.
-    p_value : float
-        Of the gate [1].
-    drive : Decision or None
-        On the speed over pulse width, where it was recorded.
-    ratios : callable or None
-        Gives the change from the reference, where there is one recording and one reference.
-    pair : RunChange or None
-        The two recordings themselves, where there is no case.
-    steps : list of Decision
-        Answers of the rules so far, the last one in force.
-    """
-
-    found: Evidence
-    p_value: float
-    drive: Decision | None = None
+    found: Evidence  # Outcome of the weighing
+    p_value: float  # Of the gate [1]
+    drive: Decision | None = None  # On the speed over pulse width, where it was recorded
+    # Gives the change from the reference, where there is one recording and one reference
     ratios: Callable[[], RunChange | None] | None = None
-    pair: RunChange | None = None
-    steps: list[Decision] = field(default_factory=list)
+    pair: RunChange | None = None  # The two recordings themselves, where there is no case
+    steps: list[Decision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
     _refined: dict[Explanation, tuple[fitting.Fit, dict[str, dict[str, dict[str, Any]]]]] = field(default_factory=dict)
 
     @property

@@ -26,11 +26,6 @@ if TYPE_CHECKING:
     from bemt.diagnose.verdict import Decision
     from bemt.recordings.findings import Finding
 
-__all__ = [
-    "CONTRADICTED", "FACTOR", "SLIPS", "UNREPEATABLE", "Suspect", "another_label", "contradiction", "exact_faults",
-    "finding", "foreign", "impossible", "levels", "nearest_rotors", "odd_speed", "suspects", "to_mend", "unrepeatable",
-]  # fmt: skip
-
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
 UNREPEATABLE = 0.10

@@ -26,8 +26,6 @@ from bemt.flight.simulator import simulator_constants
 from bemt.flight.vibration import Vibration, shaken, vibration
 from bemt.flight.wind import Wind, wind
 
-__all__ = ["FlightAnswer", "Predicted", "answer_on"]
-
 _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]
 
@@ -38,73 +36,38 @@ SPEED_POWER = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """What the model of a case says of the rotor in this flight.
+    """What the model of a case says of the rotor in this flight."""
 
-    Attributes
-    ----------
-    constant, u : float
-        Thrust constant at the mean speed, hovering, and its standard uncertainty [N/rpm^2].
-    axial, inplane : (2, n) float
-        Velocity along the axis (above zero in a climb) and in the plane [m/s], and the relative change of the thrust
-        constant that it makes [1].
-    """
-
+    # Thrust constant at the mean speed, hovering, and its standard uncertainty [N/rpm^2]
     constant: float
     u: float
+    # (2, n) Velocity along the axis (above zero in a climb) and in the plane [m/s], and the relative change of the
+    # thrust constant that it makes [1]
     axial: NDArray[np.float64]
     inplane: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class FlightAnswer:
-    """What a flight shows and what is wrong.
+    """What a flight shows and what is wrong."""
 
-    Attributes
-    ----------
-    log : FlightLog
-        The flight.
-    found : Identified
-        Constants with bands.
-    judged : FlightVerdict
-        The decision, with the evidence and the error rate.
-    wind : Wind
-        Speed [m/s].
-    balance : tuple of float
-        By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
-        that turn to the left than those that turn to the right; empty without a layout [1].
-    limited : tuple of float
-        Share of the time at full command, of each motor [1].
-    change : FlightChange or None
-        A change within the flight.
-    vibration : Vibration
-        At the frequencies of the rotors.
-    shaken : tuple of (int, float, bool)
-        As :func:`bemt.flight.vibration.shaken` gives it.
-    speeds : tuple of (int, float)
-        As :func:`bemt.flight.motor_speed.speed_changes` gives it.
-    inflow : Inflow or None
-        Thrust over the flow.
-    mass : Constant or None
-        Mass from healthy flights of known mass [kg].
-    predicted : Predicted or None
-        The case in this flight.
-    simulator : dict of str to Constant
-        Constants in the units of simulators; the band of the thrust constant holds what flights differ by.
-    """
-
-    log: FlightLog
-    found: Identified
-    judged: FlightVerdict
-    wind: Wind
+    log: FlightLog  # The flight
+    found: Identified  # Constants with bands
+    judged: FlightVerdict  # The decision, with the evidence and the error rate
+    wind: Wind  # Speed [m/s]
+    # By how much the left motors are driven harder than the right ones, the front ones than the rear ones, and those
+    # that turn to the left than those that turn to the right; empty without a layout [1]
     balance: tuple[float, ...] = ()
-    limited: tuple[float, ...] = ()
-    change: FlightChange | None = None
+    limited: tuple[float, ...] = ()  # Share of the time at full command, of each motor [1]
+    change: FlightChange | None = None  # A change within the flight
+    # At the frequencies of the rotors
     vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
-    shaken: tuple[tuple[int, float, bool], ...] = ()
-    speeds: tuple[tuple[int, float], ...] = ()
-    inflow: Inflow | None = None
-    mass: Constant | None = None
-    predicted: Predicted | None = None
+    shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.flight.vibration.shaken` gives it
+    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.flight.motor_speed.speed_changes` gives it
+    inflow: Inflow | None = None  # Thrust over the flow
+    mass: Constant | None = None  # Mass from healthy flights of known mass [kg]
+    predicted: Predicted | None = None  # The case in this flight
+    # Constants in the units of simulators; the band of the thrust constant holds what flights differ by
     simulator: dict[str, Constant] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
 from bemt.flight.layout import LAYOUTS
 from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
-Array = NDArray[np.float64]
 KIND = "ArduPilot DataFlash"
 _HEAD, _FORMATS, _FORMAT_SIZE, _CHUNK = b"\xa3\x95", 128, 89, 1 << 20
 _IMU = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")

@@ -17,15 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.flight.layout import effect_matrix
 from bemt.flight.log import FlightLog
 from bemt.flight.population import SCATTER, SCATTER_FREE, TRIM, TRIM_FREE
 
 __all__ = ["BLADE", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
-
-Array = NDArray[np.float64]
 
 BLADE, WEIGHT, WIND = "damaged blade, motor ", "weight ", "wind or forward flight"
 _COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
@@ -114,22 +112,13 @@ def _neighbours(motors: list[int], angle: Array) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True, eq=False)
 class HealthyFlight:
-    """The readings of a healthy flight as the others predict them.
+    """The readings of a healthy flight as the others predict them."""
 
-    Attributes
-    ----------
-    mean, sd : (k,) float
-        Of the readings [1].
-    draws : (D, k) float
-        From the prediction, less the mean, over sd [1].
-    free : float
-        Degrees of freedom behind sd.
-    """
-
+    # (k,) Of the readings [1]
     mean: Array
     sd: Array
-    draws: Array
-    free: float
+    draws: Array  # (D, k) From the prediction, less the mean, over sd [1]
+    free: float  # Degrees of freedom behind sd
 
 
 def healthy_flight(calm: Array, axes: Array, known: bool) -> HealthyFlight:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BATCHES", "half_width", "jackknifed", "u_of_mean"]
+from bemt.base.arrays import Array
 
-Array = NDArray[np.float64]
 BATCHES = 10
 """Pieces of a flight."""
 

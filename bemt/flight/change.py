@@ -11,15 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.thresholds import GATE, NAMED
 from bemt.flight.balance import axes_of, directions
 from bemt.flight.log import FlightLog
 
-__all__ = ["FlightChange", "change_in"]
-
-Array = NDArray[np.float64]
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
 _ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))  # chi squares that differ by less leave a name open
 _SMALL = 0.05  # a change below this is not worth a word [1]
@@ -27,23 +24,12 @@ _SMALL = 0.05  # a change below this is not worth a word [1]
 
 @dataclass(frozen=True)
 class FlightChange:
-    """A change within a flight.
+    """A change within a flight."""
 
-    Attributes
-    ----------
-    kind : str
-        "step" or "growth".
-    at_s : float
-        Time of a step from the first sample; NaN for a growth [s].
-    causes : tuple of str
-        What explains its direction, best first.
-    size, half : float
-        Change of that rotor's drive, over the whole flight for a growth, and the half width of its 95 % interval [1].
-    """
-
-    kind: str
-    at_s: float
-    causes: tuple[str, ...]
+    kind: str  # "step" or "growth"
+    at_s: float  # Time of a step from the first sample; NaN for a growth [s]
+    causes: tuple[str, ...]  # What explains its direction, best first
+    # Change of that rotor's drive, over the whole flight for a growth, and the half width of its 95 % interval [1]
     size: float
     half: float
 

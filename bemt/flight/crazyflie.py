@@ -11,14 +11,13 @@ import zlib
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.flight.log import FlightLog, joined, thrust_axis
 from bemt.readers import crazyflie_log
 
-Array = NDArray[np.float64]
 KIND = "Crazyflie usdlog"
 
 

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.units import G0
 from bemt.flight.batches import BATCHES, half_width, jackknifed
 from bemt.flight.log import FlightLog
 
-__all__ = ["Constant", "Identified", "identify"]
-
-Array = NDArray[np.float64]
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
 
@@ -34,23 +32,13 @@ class Constant:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What a flight shows.
+    """What a flight shows."""
 
-    Attributes
-    ----------
-    constants : dict of str to Constant
-        By name, each with its unit.
-    rotors : dict of str to tuple of float
-        One number a rotor: mean command, mean speed [rev/min], share of the squared drive [1].
-    unseen : tuple of str
-        What the log cannot show, with the manoeuvre or channel that would.
-    weight_per_drive : Constant or None
-        Weight over the sum of squared speeds, for unit mass; of mean commands where there is no speed.
-    """
-
-    constants: dict[str, Constant]
+    constants: dict[str, Constant]  # By name, each with its unit
+    # One number a rotor: mean command, mean speed [rev/min], share of the squared drive [1]
     rotors: dict[str, tuple[float, ...]]
-    unseen: tuple[str, ...]
+    unseen: tuple[str, ...]  # What the log cannot show, with the manoeuvre or channel that would
+    # Weight over the sum of squared speeds, for unit mass; of mean commands where there is no speed
     weight_per_drive: Constant | None
 
 

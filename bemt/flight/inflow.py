@@ -11,41 +11,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.flight.batches import BATCHES, jackknifed
 from bemt.flight.log import FlightLog
 
-__all__ = ["Inflow", "inflow"]
-
-Array = NDArray[np.float64]
 _BINS, _LEAST_M_S = 7, 0.5  # bins of the picture; least span of a velocity [m/s]
 
 
 @dataclass(frozen=True, eq=False)
 class Inflow:
-    """Change of the thrust constant with the flow.
+    """Change of the thrust constant with the flow."""
 
-    Attributes
-    ----------
-    axial, inplane : tuple of (float, float) or None
-        Relative change of the thrust constant at the end of the range, at constant speed, and the half width of its
-        95 % band; None where the flight hardly moves that way [1].
-    axial_m_s : (float, float)
-        Range along the axis, above zero in a climb [m/s].
-    inplane_m_s : float
-        Largest velocity in the plane of the rotors [m/s].
-    turns : float
-        Mean speed of the rotors [1/s].
-    bins : tuple of (3, n) float
-        Velocity [m/s], change of the thrust constant and its standard deviation [1]: along the axis, in the plane.
-    """
-
+    # Relative change of the thrust constant at the end of the range, at constant speed, and the half width of its 95 %
+    # band; None where the flight hardly moves that way [1]
     axial: tuple[float, float] | None
     inplane: tuple[float, float] | None
-    axial_m_s: tuple[float, float]
-    inplane_m_s: float
-    turns: float
+    axial_m_s: tuple[float, float]  # Range along the axis, above zero in a climb [m/s]
+    inplane_m_s: float  # Largest velocity in the plane of the rotors [m/s]
+    turns: float  # Mean speed of the rotors [1/s]
+    # Velocity [m/s], change of the thrust constant and its standard deviation [1]: along the axis, in the plane
     bins: tuple[Array, Array]
 
 

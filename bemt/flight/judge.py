@@ -19,8 +19,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.prior import LEFT_OUT, log_priors
 from bemt.diagnose.rules import Rule, decide
@@ -48,8 +48,6 @@ __all__ = [
     "judge", "weighed",
 ]  # fmt: skip
 
-Array = NDArray[np.float64]
-
 FALSE_ALARM = GATE
 """Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
 BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
@@ -64,76 +62,42 @@ _LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforeha
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """One explanation: how the readings have it.
+    """One explanation: how the readings have it."""
 
-    Attributes
-    ----------
-    size, half : float
-        Change of that rotor's drive (of two, of the smaller one), and half the width of its 95 % interval [1].
-    t, chi2 : float
-        Size over its standard deviation; misfit that remains [1].
-    log_bayes : float
-        Natural logarithm of the odds over nothing, before the prior [1].
-    """
-
+    # Change of that rotor's drive (of two, of the smaller one), and half the width of its 95 % interval [1]
     size: float
     half: float
+    # Size over its standard deviation; misfit that remains [1]
     t: float
     chi2: float
-    log_bayes: float
+    log_bayes: float  # Natural logarithm of the odds over nothing, before the prior [1]
 
 
 @dataclass(frozen=True)
 class BesideBalance:
-    """What else the log shows of the rotors.
+    """What else the log shows of the rotors."""
 
-    Attributes
-    ----------
-    faster, slower, shaken : tuple of int
-        Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor.
-    change : FlightChange or None
-        A change of the balance within the flight.
-    healthy : tuple of bool
-        Of each healthy flight, whether a rotor shakes or the balance changes within it.
-    """
-
+    # Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor
     faster: tuple[int, ...] = ()
     slower: tuple[int, ...] = ()
     shaken: tuple[int, ...] = ()
-    change: FlightChange | None = None
-    healthy: tuple[bool, ...] = ()
+    change: FlightChange | None = None  # A change of the balance within the flight
+    healthy: tuple[bool, ...] = ()  # Of each healthy flight, whether a rotor shakes or the balance changes within it
 
 
 @dataclass(eq=False)
 class FlightQuery:
-    """What the rules ask of a flight.
+    """What the rules ask of a flight."""
 
-    Attributes
-    ----------
-    found : dict of Explanation to FlightEvidence
-        All that is listed.
-    P : dict of Explanation to float
-        Their probabilities, with those of nothing and of something unlisted [1].
-    log_bayes : dict of Explanation to float
-        Log odds over nothing, of these [1].
-    p_value, alarm : float
-        Share of healthy flights that look as bad, and the one that is accepted [1].
-    given : int
-        Healthy flights to compare with.
-    beside : BesideBalance
-        What else the log shows.
-    steps : list of Decision
-        Answers of the rules so far, the last one in force.
-    """
-
-    found: dict[Explanation, FlightEvidence]
-    P: dict[Explanation, float]
-    log_bayes: dict[Explanation, float]
+    found: dict[Explanation, FlightEvidence]  # All that is listed
+    P: dict[Explanation, float]  # Their probabilities, with those of nothing and of something unlisted [1]
+    log_bayes: dict[Explanation, float]  # Log odds over nothing, of these [1]
+    # Share of healthy flights that look as bad, and the one that is accepted [1]
     p_value: float
     alarm: float
-    given: int
-    beside: BesideBalance = field(default_factory=BesideBalance)
-    steps: list[Decision] = field(default_factory=list)
+    given: int  # Healthy flights to compare with
+    beside: BesideBalance = field(default_factory=BesideBalance)  # What else the log shows
+    steps: list[Decision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
 
     @property
     def said(self) -> Decision | None:
@@ -358,50 +322,26 @@ RULES: list[Rule] = [
 
 @dataclass(frozen=True, eq=False)
 class FlightVerdict:
-    """The answer of the judge on a flight.
+    """The answer of the judge on a flight."""
 
-    Attributes
-    ----------
-    said : Decision
-        As of a diagnosis.
-    readings : (B,) float
-        Change of the log of each rotor's share of the drive [1].
-    next : Suggestion
-        What would decide, or confirm.
-    found : dict of Explanation to FlightEvidence
-        All that is listed.
-    probability : dict of Explanation to float
-        Of these, of nothing and of something unlisted [1].
-    p_value : float
-        Share of healthy flights that look as bad [1].
-    scatter : float
-        Standard deviation of a share between healthy flights, or between vehicles where none is given [1].
-    visible : float
-        Smallest change of one rotor's drive that would be named here [1].
-    accused, healthy : int
-        Healthy flights accused when each is judged by the others, of how many.
-    rate95 : (float, float)
-        95 % interval of that rate (Clopper and Pearson) [1].
-    total, total_half : float
-        Change of the total drive against the healthy mean, and its 95 % half width from the healthy scatter [1].
-    given : int
-        Healthy flights to compare with.
-    """
-
-    said: Decision
-    readings: Array
-    next: Suggestion
-    found: dict[Explanation, FlightEvidence] = field(default_factory=dict)
+    said: Decision  # As of a diagnosis
+    readings: Array  # (B,) Change of the log of each rotor's share of the drive [1]
+    next: Suggestion  # What would decide, or confirm
+    found: dict[Explanation, FlightEvidence] = field(default_factory=dict)  # All that is listed
+    # Of these, of nothing and of something unlisted [1]
     probability: dict[Explanation, float] = field(default_factory=dict)
-    p_value: float = float("nan")
+    p_value: float = float("nan")  # Share of healthy flights that look as bad [1]
+    # Standard deviation of a share between healthy flights, or between vehicles where none is given [1]
     scatter: float = float("nan")
-    visible: float = float("nan")
+    visible: float = float("nan")  # Smallest change of one rotor's drive that would be named here [1]
+    # Healthy flights accused when each is judged by the others, of how many
     accused: int = 0
     healthy: int = 0
-    rate95: tuple[float, float] = (0.0, 1.0)
+    rate95: tuple[float, float] = (0.0, 1.0)  # 95 % interval of that rate (Clopper and Pearson) [1]
+    # Change of the total drive against the healthy mean, and its 95 % half width from the healthy scatter [1]
     total: float = float("nan")
     total_half: float = float("nan")
-    given: int = 0
+    given: int = 0  # Healthy flights to compare with
 
 
 def judge(

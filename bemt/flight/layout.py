@@ -6,13 +6,10 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-
-__all__ = ["LAYOUTS", "effect_matrix", "layout_of", "layout_text"]
-
-Array = NDArray[np.float64]
 
 LAYOUTS = {
     "crazyflie": "-45+ -135- 135+ 45-",

@@ -9,11 +9,11 @@ from typing import Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
 __all__ = ["DENSE", "SPARSE", "FlightLog", "Stretches", "joined", "thrust_axis"]
 
-Array = NDArray[np.float64]
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
 
@@ -25,66 +25,36 @@ DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; o
 
 @dataclass(frozen=True, eq=False)
 class FlightLog:
-    """One flight; N samples, B rotors; a quantity that was not logged is None.
+    """One flight; N samples, B rotors; a quantity that was not logged is None."""
 
-    Attributes
-    ----------
-    file, format : str
-        Where it was read, and the format by content.
-    t : (N,) float
-        Time from the first sample [s].
-    command : (N, B) float or None
-        Command of each motor; 0 to 1 unless `command_unit` says otherwise.
-    rpm : (N, B) float or None
-        Speeds [rev/min].
-    current : (N, B) float or None
-        Currents of the speed controllers [A].
-    acceleration : (N, 3) float or None
-        Specific force in body axes, z up [m/s2].
-    rates : (N, 3) float or None
-        Angular velocity in body axes, z up [rad/s].
-    upright : (N,) float or None
-        Cosine of the tilt [1].
-    axis : (N, 3) float or None
-        Unit vector of the thrust, in axes of the world, z up [1].
-    velocity, position : (N, 3) float or None
-        In axes of the world, z up [m/s, m].
-    force : (N, 3) float or None
-        Residual force that the log holds, in its own unit.
-    voltage, battery_current : (N,) float or None
-        Battery [V, A].
-    raw : (times, values) or None
-        Accelerometer at its own rate, with gaps where it was sampled in bursts: (M,) [s], (M, 3) [m/s2]; where there is
-        none, the gyro [rad/s], as `raw_unit` says.
-    command_unit, layout : str
-        Unit of the commands; layout that the log states or the format usually has, may be empty.
-    join_s : dict of str to float
-        Half the sample interval of each quantity's source: how far a value may lie from its time [s].
-    ends : str
-        Where a damaged log ends; empty for a whole one.
-    """
-
+    # Where it was read, and the format by content
     file: str
     format: str
-    t: Array
-    command: Array | None = None
-    rpm: Array | None = None
-    current: Array | None = None
-    acceleration: Array | None = None
-    rates: Array | None = None
-    upright: Array | None = None
-    axis: Array | None = None
+    t: Array  # (N,) Time from the first sample [s]
+    command: Array | None = None  # (N, B) Command of each motor; 0 to 1 unless `command_unit` says otherwise
+    rpm: Array | None = None  # (N, B) Speeds [rev/min]
+    current: Array | None = None  # (N, B) Currents of the speed controllers [A]
+    acceleration: Array | None = None  # (N, 3) Specific force in body axes, z up [m/s2]
+    rates: Array | None = None  # (N, 3) Angular velocity in body axes, z up [rad/s]
+    upright: Array | None = None  # (N,) Cosine of the tilt [1]
+    axis: Array | None = None  # (N, 3) Unit vector of the thrust, in axes of the world, z up [1]
+    # (N, 3) In axes of the world, z up [m/s, m]
     velocity: Array | None = None
     position: Array | None = None
-    force: Array | None = None
+    force: Array | None = None  # (N, 3) Residual force that the log holds, in its own unit
+    # (N,) Battery [V, A]
     voltage: Array | None = None
     battery_current: Array | None = None
+    # (times, values) Accelerometer at its own rate, with gaps where it was sampled in bursts: (M,) [s], (M, 3) [m/s2];
+    # where there is none, the gyro [rad/s], as `raw_unit` says
     raw: Source | None = None
     raw_unit: str = "m/s2"
+    # Unit of the commands; layout that the log states or the format usually has, may be empty
     command_unit: str = "1"
     layout: str = ""
+    # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)
-    ends: str = ""
+    ends: str = ""  # Where a damaged log ends; empty for a whole one
 
     @property
     def rotors(self) -> int:

@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.thresholds import GATE
 from bemt.flight.log import FlightLog
 
-__all__ = ["speed_changes"]
-
-Array = NDArray[np.float64]
 _SCATTER, _FREE, _EXPONENT, _U_EXPONENT = 0.011, 4, 0.5, 0.2
 """Standard deviation between healthy flights (six flights of two Crazyflies 2.1: brushed 1.3 %, brushless 0.24 %), the
 degrees of freedom it counts as, and the exponent with its uncertainty (an assumption)."""

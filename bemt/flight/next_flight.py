@@ -9,8 +9,6 @@ from bemt.diagnose.suggest import Suggestion
 from bemt.diagnose.verdict import Decision
 from bemt.flight.balance import BLADE, WEIGHT, WIND
 
-__all__ = ["next_flight"]
-
 _HOVER = "hover 30 s in still air and judge that flight"
 
 

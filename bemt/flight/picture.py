@@ -13,8 +13,6 @@ from bemt.base.units import G0
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.text import headline
 
-__all__ = ["flight_picture"]
-
 _BLUE, _ORANGE, _GREEN = "#0072B2", "#E69F00", "#009E73"
 _LINES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 

@@ -16,13 +16,12 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
 from bemt.flight.layout import LAYOUTS, layout_text
 from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
-Array = NDArray[np.float64]
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
            "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip

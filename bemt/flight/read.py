@@ -9,8 +9,6 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.flight import ardupilot, crazyflie, px4, table
 from bemt.flight.log import FlightLog
 
-__all__ = ["read_log"]
-
 _READERS = (crazyflie, px4, ardupilot, table)
 
 

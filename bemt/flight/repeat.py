@@ -11,8 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["SCATTER", "SCATTER_FREE", "flight_scatter"]
-
 SCATTER = 0.007
 """Standard deviation of the thrust constant between flights of one vehicle [1]."""
 SCATTER_FREE = 3

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from bemt.compare.as_measured import AsMeasured
     from bemt.flight.identify import Identified
 
-__all__ = ["AIR", "learn_from_flights"]
-
 AIR = 0.03
 """Uncertainty of the density, which logs do not hold, against that of the case: 8 K or 300 m of altitude [1]."""
 

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.flight import crazyflie
@@ -26,7 +26,6 @@ from bemt.flight.log import SPARSE, FlightLog, Stretches, joined
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 KIND = "CSV"
 
 

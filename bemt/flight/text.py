@@ -9,8 +9,6 @@ from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
 from bemt.flight.judge import IN_FLIGHT, FlightVerdict
 
-__all__ = ["headline", "text"]
-
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 
 

@@ -15,14 +15,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.diagnose.thresholds import GATE
 from bemt.flight.log import FlightLog
 
-__all__ = ["Vibration", "shaken", "vibration"]
-
-Array = NDArray[np.float64]
 _WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # lengths tried; longest used; least windows
 _APART, _FOLLOWED = 5.0, 0.5  # largest condition number of the angles; least share of the line's power [1]
 _SIDE = 3  # half width of a band in bins: the lobe of the window and a speed that is off by one bin
@@ -35,33 +32,18 @@ _FLOOR = {"m/s2": 0.2, "rad/s": 0.02}
 
 @dataclass(frozen=True)
 class Vibration:
-    """What the accelerometer shows of the rotors.
+    """What the accelerometer shows of the rotors."""
 
-    Attributes
-    ----------
-    rate_hz : float
-        Samples a second; NaN without an accelerometer or gyro [Hz].
-    shaft_hz : float
-        Mean speed of the rotors; NaN without speeds [Hz].
-    amplitude, blade : tuple of float
-        Of each rotor at once and at twice a turn; NaN where it is above the Nyquist frequency or not told apart
-        [`unit`].
-    line_hz, line : float
-        Strongest line above 20 Hz and its amplitude, for a log without speeds [Hz, `unit`].
-    unit : str
-        m/s2, or rad/s of a gyro.
-    missing : str
-        What the log cannot show, and why.
-    """
-
-    rate_hz: float
-    shaft_hz: float
+    rate_hz: float  # Samples a second; NaN without an accelerometer or gyro [Hz]
+    shaft_hz: float  # Mean speed of the rotors; NaN without speeds [Hz]
+    # Of each rotor at once and at twice a turn; NaN where it is above the Nyquist frequency or not told apart [`unit`]
     amplitude: tuple[float, ...] = ()
     blade: tuple[float, ...] = ()
+    # Strongest line above 20 Hz and its amplitude, for a log without speeds [Hz, `unit`]
     line_hz: float = float("nan")
     line: float = float("nan")
-    unit: str = "m/s2"
-    missing: str = ""
+    unit: str = "m/s2"  # m/s2, or rad/s of a gyro
+    missing: str = ""  # What the log cannot show, and why
 
 
 def vibration(log: FlightLog) -> Vibration:

@@ -27,15 +27,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.units import G0
 from bemt.flight.batches import BATCHES, jackknifed, u_of_mean
 from bemt.flight.log import FlightLog
 
-__all__ = ["Wind", "wind"]
-
-Array = NDArray[np.float64]
 _SMOOTH_S = 0.2
 _SHARE, _FACTOR = 0.041, 1.0  # r [s/m] and the standard deviation of its logarithm
 _GRID, _LOG_C = (401, 31, 41), 1.1  # points over wind, r and c; half the range of log c

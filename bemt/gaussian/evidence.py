@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bemt.base.arrays import Array
 from bemt.gaussian.whitening import triangular
-
-__all__ = ["LinearTerms", "log_sum", "shares"]
-
-Array = NDArray[np.float64]
 
 
 def log_sum(log_values: ArrayLike, log_weights: ArrayLike = 0.0, axis: int = -1) -> Array:
@@ -46,17 +43,10 @@ class LinearTerms:
 
     Everything follows from the small matrix 1 + B^T B (Woodbury; Rasmussen and Williams 2006, eq. A.9 and A.10): no
     factor of the readings' size is needed for another set of terms.
-
-    Attributes
-    ----------
-    B : (M, q) float
-        Whitened columns, each of the size that its coefficient has beforehand [1].
-    root : (q, q) float
-        Cholesky factor of 1 + B^T B [1].
     """
 
-    B: Array
-    root: Array
+    B: Array  # (M, q) Whitened columns, each of the size that its coefficient has beforehand [1]
+    root: Array  # (q, q) Cholesky factor of 1 + B^T B [1]
 
     @staticmethod
     def of(B: Array) -> LinearTerms:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["alike", "modes", "smooth"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 
 def smooth(*axes: tuple[Array, float], to: tuple[Array, ...] | None = None) -> Array:

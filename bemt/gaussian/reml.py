@@ -8,13 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.gaussian.whitening import whitener
-
-__all__ = ["Restricted", "contrasts"]
-
-Array = NDArray[np.float64]
 
 _RANK, _TINY = 1e-8, 1e-9
 
@@ -28,21 +24,11 @@ def contrasts(fixed: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Restricted:
-    """Contrasts of readings whose variance is a sum of independent parts.
+    """Contrasts of readings whose variance is a sum of independent parts."""
 
-    Attributes
-    ----------
-    z : (n,) float
-        Contrasts [units of the readings].
-    base : (n, n) float
-        Their covariance by what is known.
-    parts : tuple of (n, n) float
-        Covariance by each part of standard deviation 1.
-    """
-
-    z: Array
-    base: Array
-    parts: tuple[Array, ...]
+    z: Array  # (n,) Contrasts [units of the readings]
+    base: Array  # (n, n) Their covariance by what is known
+    parts: tuple[Array, ...]  # Covariance by each part of standard deviation 1
 
     @staticmethod
     def of(e: Array, fixed: Array, known: Array | None, *parts: Array) -> Restricted | None:

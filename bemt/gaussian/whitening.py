@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Conditional", "Whitener", "conditional", "leave_one_out", "log_density", "triangular", "whitener"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 _JITTER = 1e-4  # of the stated standard deviation, so that a covariance of tangents alone has a factor
 
@@ -38,18 +36,10 @@ def triangular(factor: Array, vectors: Array, transposed: bool = False) -> Array
 
 @dataclass(frozen=True, eq=False)
 class Whitener:
-    """Cholesky factor of one covariance C = L L^T.
+    """Cholesky factor of one covariance C = L L^T."""
 
-    Attributes
-    ----------
-    factor : (M, M) float
-        L, lower triangular [units of the readings].
-    log_det : float
-        Sum of the logarithms of its diagonal, half of ln det C [1].
-    """
-
-    factor: Array
-    log_det: float
+    factor: Array  # (M, M) L, lower triangular [units of the readings]
+    log_det: float  # Sum of the logarithms of its diagonal, half of ln det C [1]
 
     def __call__(self, vectors: Array) -> Array:
         """Whiten vectors (M,) or columns (M, n): L^-1 x."""
@@ -117,28 +107,15 @@ def leave_one_out(covariance: Array, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Conditional:
-    """Some readings given all others: causes change only these, so the others enter once and not with every cause.
+    """Some readings given all others: causes change only these, so the others enter once and not with every cause."""
 
-    Attributes
-    ----------
-    rows, others : (N,), (M - N,) int
-        The readings, and those that are given.
-    gain : (N, M - N) float
-        Expected change of the readings for one of the others [unit/unit].
-    covariance : (N, N) float
-        Of what remains [square of the units of the readings].
-    white : Whitener
-        Its factor.
-    outside : Whitener
-        Factor of the covariance of the others.
-    """
-
+    # (N,), (M - N,) The readings, and those that are given
     rows: NDArray[np.intp]
     others: NDArray[np.intp]
-    gain: Array
-    covariance: Array
-    white: Whitener
-    outside: Whitener
+    gain: Array  # (N, M - N) Expected change of the readings for one of the others [unit/unit]
+    covariance: Array  # (N, N) Of what remains [square of the units of the readings]
+    white: Whitener  # Its factor
+    outside: Whitener  # Factor of the covariance of the others
 
     @property
     def log_det(self) -> float:

@@ -18,8 +18,6 @@ from bemt.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
 from bemt.proof.stand import Stand
 from bemt.proof.truth_world import Conditions, World
 
-__all__ = ["CAUSES", "LISTED", "UNLISTED", "Cause", "Change", "applied"]
-
 _FLIGHT = ("grid_shuffled", "grid_ordered", "two_air", "single_line")
 _SETTLED = tuple(p for p in (*OPEN_PLANS, *DUCTED_PLANS, *UNDERPOWERED) if p not in ("transient", "wall", "gap"))
 _ANY = tuple(dict.fromkeys((*_SETTLED, "wall", "gap")))
@@ -27,22 +25,14 @@ _ANY = tuple(dict.fromkeys((*_SETTLED, "wall", "gap")))
 
 @dataclass(frozen=True)
 class Change:
-    """What a cause changes.
+    """What a cause changes."""
 
-    Parameters
-    ----------
-    world, section, stand : mapping
-        Fields of `World`, `SectionPhysics` and `Stand` with their values.
-    ducted : bool or None
-        False takes the duct away.
-    parameters : mapping of str to (float, str)
-        Size in the terms that a report may use: name to value and unit.
-    """
-
+    # Fields of `World`, `SectionPhysics` and `Stand` with their values
     world: Mapping[str, Any] = field(default_factory=dict)
     section: Mapping[str, Any] = field(default_factory=dict)
     stand: Mapping[str, Any] = field(default_factory=dict)
-    ducted: bool | None = None
+    ducted: bool | None = None  # False takes the duct away
+    # Size in the terms that a report may use: name to value and unit
     parameters: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
 
@@ -51,36 +41,16 @@ Make = Callable[[float, Rig, Conditions, np.random.Generator], Change]
 
 @dataclass(frozen=True)
 class Cause:
-    """One thing that may be concealed.
+    """One thing that may be concealed."""
 
-    Parameters
-    ----------
-    id : str
-        Effect, or a name of an unlisted cause.
-    make : callable
-        Change for a relative strength (1 is ordinary), a rig, its conditions and a source of signs.
-    kind : str
-        air, stand, drive or unlisted.
-    plans : tuple of str
-        Plans in which it can be at work.
-    ducted : bool or None
-        Whether it needs a duct (True), an open rotor (False) or neither.
-    off : tuple of str
-        Effects that the baseline leaves out.
-    without : Change
-        The truth less the cause.
-    variables : tuple of str
-        Covariates along which it shows; any of them is a right answer of the location.
-    """
-
-    id: str
-    make: Make
-    kind: str = "air"
-    plans: tuple[str, ...] = _SETTLED
-    ducted: bool | None = None
-    off: tuple[str, ...] = ()
-    without: Change = field(default_factory=Change)
-    variables: tuple[str, ...] = ()
+    id: str  # Effect, or a name of an unlisted cause
+    make: Make  # Change for a relative strength (1 is ordinary), a rig, its conditions and a source of signs
+    kind: str = "air"  # air, stand, drive or unlisted
+    plans: tuple[str, ...] = _SETTLED  # Plans in which it can be at work
+    ducted: bool | None = None  # Whether it needs a duct (True), an open rotor (False) or neither
+    off: tuple[str, ...] = ()  # Effects that the baseline leaves out
+    without: Change = field(default_factory=Change)  # The truth less the cause
+    variables: tuple[str, ...] = ()  # Covariates along which it shows; any of them is a right answer of the location
 
 
 def applied(world: World, stand: Stand, change: Change) -> tuple[World, Stand]:

@@ -12,8 +12,6 @@ from bemt.proof import rigs
 from bemt.proof.causes import CAUSES, LISTED, UNLISTED
 from bemt.proof.items import Bench, Item, make_item
 
-__all__ = ["SETS", "SIZES", "benches", "draw_items"]
-
 SETS = ("single", "pair", "null", "mismatch", "unlisted", "sensor", "underpowered")
 """Kinds of items; a null is noise only, a mismatch the difference of truth and solver only."""
 
@@ -24,21 +22,11 @@ _GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
 
 @dataclass(frozen=True)
 class Size:
-    """Counts of a run of the proof.
+    """Counts of a run of the proof."""
 
-    Parameters
-    ----------
-    items : dict of str to int
-        Items of each set. [-]
-    plans : tuple of tuple
-        Rigs: whether ducted, and plans. [-]
-    code : str
-        Code of the truth.
-    """
-
-    items: dict[str, int]
-    plans: tuple[tuple[bool, tuple[str, ...]], ...]
-    code: str = "vortex"
+    items: dict[str, int]  # Items of each set. [-]
+    plans: tuple[tuple[bool, tuple[str, ...]], ...]  # Rigs: whether ducted, and plans. [-]
+    code: str = "vortex"  # Code of the truth
 
 
 _OPEN, _DUCTED, _POOR = rigs.OPEN_PLANS, rigs.DUCTED_PLANS, rigs.UNDERPOWERED

@@ -22,8 +22,6 @@ from bemt.proof.items import recording_text
 from bemt.proof.pairs import followed, pair_files
 from bemt.proof.real import DENSITY, POUND, WRONG_DENSITY
 
-__all__ = ["SCHEMA", "follow", "text", "with_reference"]
-
 SCHEMA = "bemt.followed/1"
 _SILENT = ("none", "unknown", "insufficient")
 # Factors on thrust and torque that undo the cause.

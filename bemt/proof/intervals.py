@@ -18,8 +18,6 @@ from bemt.diagnose.interval_scales import scale_of
 from bemt.proof import seal
 from bemt.proof.score import VISIBLE, judge
 
-__all__ = ["SCHEMA", "calibrate", "misses"]
-
 SCHEMA = "bemt.interval_scales/1"
 SHARE = 0.9
 # Scores from which a parameter has a factor of its own, and what a factor may be: beyond three the law is off.

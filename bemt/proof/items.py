@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
 from bemt.proof.rigs import Rig, conditions, extended
 from bemt.proof.separation import FREEDOM, Yardstick, freedom, yardstick
@@ -18,9 +18,6 @@ from bemt.proof.truth_ccblade import EXPRESSIBLE
 from bemt.proof.truth_section import SectionPhysics
 from bemt.proof.truth_world import Conditions, TrueLoads, World, loads
 
-__all__ = ["Bench", "Item", "case_text", "further_run", "make_item", "recording_text", "stations_text"]
-
-Array = NDArray[np.float64]
 _DIGITS = 6
 # Share of the items that state the uncertainty of their readings, and that come with a run without the cause.
 _STATED, _REFERENCED = 0.75, 0.5
@@ -30,21 +27,11 @@ _BLADE_OFF, _CAMBER_OFF = 0.8, 0.003
 
 @dataclass
 class Bench:
-    """A rig in a plan, with the signatures of the causes once they were asked for.
+    """A rig in a plan, with the signatures of the causes once they were asked for."""
 
-    Parameters
-    ----------
-    rig : Rig
-        What is tested.
-    plan : str
-        Name of the plan.
-    rows : Conditions
-        Real conditions.
-    """
-
-    rig: Rig
-    plan: str
-    rows: Conditions
+    rig: Rig  # What is tested
+    plan: str  # Name of the plan
+    rows: Conditions  # Real conditions
     _signatures: dict[str, dict[str, Array]] = field(default_factory=dict)
     _tangents: list[dict[str, Array]] = field(default_factory=list)
     _starts: dict[bool, TrueAnswer] = field(default_factory=dict)
@@ -120,21 +107,11 @@ class Bench:
 
 @dataclass(frozen=True)
 class Item:
-    """One concealed item.
+    """One concealed item."""
 
-    Parameters
-    ----------
-    files : dict of str to str
-        Name to text: recording.csv, case.toml, stations.csv.
-    entry : dict
-        What the key says of it.
-    reference : str
-        Run without the causes, given when the diagnosis asks for one; "" where there can be none.
-    """
-
-    files: Mapping[str, str]
-    entry: Mapping[str, Any]
-    reference: str = ""
+    files: Mapping[str, str]  # Name to text: recording.csv, case.toml, stations.csv
+    entry: Mapping[str, Any]  # What the key says of it
+    reference: str = ""  # Run without the causes, given when the diagnosis asks for one; "" where there can be none
 
 
 def _quality(rng: np.random.Generator, quiet: bool) -> Stand:

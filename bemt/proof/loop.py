@@ -26,8 +26,6 @@ from bemt.proof import draw, prove, score, seal
 from bemt.proof.items import Bench, further_run
 from bemt.proof.rigs import Rig
 
-__all__ = ["SCHEMA", "Course", "loop", "text"]
-
 SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
 _DONE = ("named", "sensor")
@@ -37,27 +35,14 @@ _FIXED_POINTS = 6
 
 @dataclass(frozen=True)
 class Course:
-    """How one item went.
+    """How one item went."""
 
-    Parameters
-    ----------
-    folder : str
-        Item.
-    answers : list of dict
-        First answer, then one after each run.
-    steps : list of str
-        What each step was: ``reference``, ``run`` or ``look``.
-    minutes : list of float
-        Time of the stand for each run. [min]
-    end : str
-        Why it ended: "named", "confirmed" by a check, a kind of step that is none of the above, "no run", "used up",
-        "failed".
-    """
-
-    folder: str
-    answers: list[dict[str, Any]]
-    steps: list[str] = field(default_factory=list)
-    minutes: list[float] = field(default_factory=list)
+    folder: str  # Item
+    answers: list[dict[str, Any]]  # First answer, then one after each run
+    steps: list[str] = field(default_factory=list)  # What each step was: ``reference``, ``run`` or ``look``
+    minutes: list[float] = field(default_factory=list)  # Time of the stand for each run. [min]
+    # Why it ended: "named", "confirmed" by a check, a kind of step that is none of the above, "no run", "used up",
+    # "failed"
     end: str = ""
 
 

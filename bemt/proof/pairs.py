@@ -15,14 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.folders import data_roots
 from bemt.proof.items import Item, recording_text
-
-__all__ = ["Followed", "PairOf", "draw_pairs", "followed", "pair_files", "pairs"]
-
-Array = NDArray[np.float64]
 
 _KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
          "second_rotor_rad_s", "run")  # fmt: skip
@@ -31,29 +27,17 @@ _PROPELLERS = 4
 
 @dataclass(frozen=True)
 class PairOf:
-    """Two recordings of the manifest.
+    """Two recordings of the manifest."""
 
-    Parameters
-    ----------
-    kind : str
-        Set.
-    a, b : str
-        Names of the recordings.
-    causes, alike : tuple of str
-        What was changed, and what cannot be told from it there.
-    reason : str
-        Where that is documented.
-    case : mapping or None
-        Label of the rotor, for a case.
-    """
-
-    kind: str
+    kind: str  # Set
+    # Names of the recordings
     a: str
     b: str
+    # What was changed, and what cannot be told from it there
     causes: tuple[str, ...]
     alike: tuple[str, ...]
-    reason: str
-    case: Mapping[str, Any] | None = None
+    reason: str  # Where that is documented
+    case: Mapping[str, Any] | None = None  # Label of the rotor, for a case
 
 
 @cache

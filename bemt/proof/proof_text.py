@@ -9,8 +9,6 @@ from typing import Any
 from bemt.base.page import Cell, render, table
 from bemt.base.tables import text_table
 
-__all__ = ["html", "text"]
-
 
 def _percent(value: float | None) -> str:
     return "-" if value is None or not math.isfinite(value) else f"{100 * value:.1f} %"

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
 from bemt.case.unknowns import section_of
@@ -26,10 +26,6 @@ from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
     from bemt.readers.uiuc import UiucPropeller
-
-__all__ = ["SETS", "draw_real", "manifest"]
-
-Array = NDArray[np.float64]
 
 CLEAR, ABSENT = 0.10, 0.02
 """Change of CT or CP over the speeds that counts as clear, and below which there is none. [1]"""

@@ -13,8 +13,6 @@ from bemt.proof.rigs import extended
 from bemt.proof.separation import yardstick
 from bemt.proof.stand import Stand
 
-__all__ = ["resolves"]
-
 _ENOUGH = 3.0
 
 

@@ -7,17 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.proof.stand import StandMotor
 from bemt.proof.truth import TruthRotor
 from bemt.proof.truth_duct import TruthDuct
 from bemt.proof.truth_section import TrueSection
 from bemt.proof.truth_world import Conditions
-
-__all__ = ["DUCTED_PLANS", "OPEN_PLANS", "UNDERPOWERED", "Rig", "conditions", "draw_rig", "extended"]
-
-Array = NDArray[np.float64]
 
 OPEN_PLANS = ("static_sweep", "grid_shuffled", "grid_ordered", "two_air", "wall", "endurance", "transient")
 DUCTED_PLANS = ("static_sweep", "grid_shuffled", "two_air", "gap", "endurance")
@@ -28,30 +24,14 @@ _SOUND = 343.0
 
 @dataclass(frozen=True)
 class Rig:
-    """A rotor on its stand.
+    """A rotor on its stand."""
 
-    Parameters
-    ----------
-    name : str
-        Fit for a folder.
-    rotor : TruthRotor
-        Blades.
-    duct : TruthDuct or None
-        Duct around it.
-    pitch_ratio : float
-        Geometric pitch over diameter. [-]
-    tip_mach : float
-        Rotational tip Mach number at the top of its speed range, 20 C. [-]
-    motor : StandMotor
-        Drive.
-    """
-
-    name: str
-    rotor: TruthRotor
-    duct: TruthDuct | None
-    pitch_ratio: float
-    tip_mach: float
-    motor: StandMotor
+    name: str  # Fit for a folder
+    rotor: TruthRotor  # Blades
+    duct: TruthDuct | None  # Duct around it
+    pitch_ratio: float  # Geometric pitch over diameter. [-]
+    tip_mach: float  # Rotational tip Mach number at the top of its speed range, 20 C. [-]
+    motor: StandMotor  # Drive
 
     @property
     def top_rpm(self) -> float:

@@ -12,21 +12,6 @@ import numpy as np
 
 from bemt.proof.causes import CAUSES
 
-__all__ = [
-    "VISIBLE",
-    "Judged",
-    "answers",
-    "ScoreRow",
-    "baselines",
-    "confusion",
-    "judge",
-    "risk_coverage",
-    "score",
-    "score_real",
-    "strata",
-    "wilson",
-]
-
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
 _CLEAR = 10.0
@@ -56,27 +41,15 @@ def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Judged:
-    """One item with its answer.
+    """One item with its answer."""
 
-    Parameters
-    ----------
-    entry : mapping
-        Of the key.
-    answer : mapping
-        The diagnosis, empty when it failed.
-    claims : bool
-        Whether a cause or a class of causes was claimed.
-    right : bool
-        Whether the claim holds, or, where nothing is to be claimed, nothing was.  A claim holds when every effect it
-        names is at work and none is missing that the plan can see; of a class, when one of its members is.
-    top1, top3 : bool
-        Whether the cause, or one that the plan cannot tell from it, leads the ranking or is among its first three.
-    """
-
-    entry: Mapping[str, Any]
-    answer: Mapping[str, Any]
-    claims: bool
+    entry: Mapping[str, Any]  # Of the key
+    answer: Mapping[str, Any]  # The diagnosis, empty when it failed
+    claims: bool  # Whether a cause or a class of causes was claimed
+    # Whether the claim holds, or, where nothing is to be claimed, nothing was.  A claim holds when every effect it
+    # names is at work and none is missing that the plan can see; of a class, when one of its members is
     right: bool
+    # Whether the cause, or one that the plan cannot tell from it, leads the ranking or is among its first three
     top1: bool
     top3: bool
 
@@ -101,30 +74,18 @@ class Judged:
 
 @dataclass(frozen=True)
 class ScoreRow:
-    """A row of the score table.
+    """A row of the score table."""
 
-    Parameters
-    ----------
-    what : str
-        Metric.
-    hits, n : int
-        Count, of how many; for medians the count of values. [-]
-    value, low, high : float
-        Share or median, with its 95 % Wilson interval (NaN for medians). [-]
-    target : str
-        Wanted.
-    met : bool or None
-        Whether the value meets the target; None without data.
-    """
-
-    what: str
+    what: str  # Metric
+    # Count, of how many; for medians the count of values. [-]
     hits: int
     n: int
+    # Share or median, with its 95 % Wilson interval (NaN for medians). [-]
     value: float
     low: float
     high: float
-    target: str
-    met: bool | None
+    target: str  # Wanted
+    met: bool | None  # Whether the value meets the target; None without data
 
 
 def judge(entry: Mapping[str, Any], answer: Mapping[str, Any] | None) -> Judged:

@@ -12,13 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.gaussian.whitening import Whitener, whitener
 from bemt.proof.stand import Stand, covariance, full_scales
 from bemt.proof.truth_world import TrueLoads, World
-
-__all__ = ["FREEDOM", "Yardstick", "freedom", "yardstick"]
-
-Array = NDArray[np.float64]
 
 # One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2): pitch [deg], drag level, lift
 # slope, gains, zeros over full scale, tachometer, density, constants of motor and controller (no case states them).
@@ -29,17 +26,10 @@ _RELATIVE = {"voltage_V": 0.001, "current_A": 0.004, "pwm_us": 0.002}
 
 @dataclass(frozen=True)
 class Yardstick:
-    """Whitening by noise alone, and by noise and nuisances.
+    """Whitening by noise alone, and by noise and nuisances."""
 
-    Parameters
-    ----------
-    channels : tuple of str
-        Columns in the order of the stacked signature.
-    noise, whole : Whitener
-        Of the covariance: noise; noise and nuisances.
-    """
-
-    channels: tuple[str, ...]
+    channels: tuple[str, ...]  # Columns in the order of the stacked signature
+    # Of the covariance: noise; noise and nuisances
     noise: Whitener
     whole: Whitener
 

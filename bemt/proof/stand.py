@@ -12,94 +12,57 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.proof.truth_world import Conditions, TrueLoads
-
-__all__ = ["StandMotor", "Stand", "covariance", "record"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class StandMotor:
-    """Motor, ESC and battery of the stand.
+    """Motor, ESC and battery of the stand."""
 
-    Parameters
-    ----------
-    kv : float
-        Speed constant. [rev/min/V]
-    resistance, idle_A : float
-        Winding and ESC resistance [ohm], no-load current [A].
-    cells_V, battery_ohm : float
-        Open-circuit voltage when full [V], inner resistance [ohm].
-    """
-
-    kv: float
+    kv: float  # Speed constant. [rev/min/V]
+    # Winding and ESC resistance [ohm], no-load current [A]
     resistance: float
     idle_A: float
+    # Open-circuit voltage when full [V], inner resistance [ohm]
     cells_V: float
     battery_ohm: float
 
 
 @dataclass(frozen=True)
 class Stand:
-    """Quality of the stand, and its faults.
+    """Quality of the stand, and its faults."""
 
-    Parameters
-    ----------
-    noise, floor : float
-        Relative noise of a reading, and noise over full scale. [-]
-    share, memory : float
-        Share of correlated noise in the variance, and its correlation from row to row. [-]
-    session : float
-        Standard deviation of the gain from run to run. [-]
-    step : float
-        Smallest step of a reading over full scale. [-]
-    rpm_noise, airspeed_noise : float
-        Relative noise of the tachometer [-], noise of the pitot [m/s].
-    thrust_gain, torque_gain, thrust_zero, torque_zero : float
-        Gain error [-]; zero error over full scale [-].
-    cross_talk : float
-        Thrust reading per torque over R. [-]
-    thrust_drift, torque_drift, drift_time : float
-        Zero that grows in time, over full scale [-]; time to half of it [s].
-    hysteresis : float
-        Reading that stays behind when the load falls, over full scale. [-]
-    rpm_scale, airspeed_offset, airspeed_gain : float
-        Tachometer reading over the truth, less 1 [-]; pitot error [m/s]; pitot reading over the truth, less 1 [-].
-    unit_slip : float
-        Factor of the slipped unit on ``unit_channel``. [-]
-    unit_channel : str
-        thrust or torque.
-    motor_heating : float
-        Warming of the winding at the end of a long run. [K]
-    battery_sag : float
-        Share of the open-circuit voltage lost at the end of a long run. [-]
-    """
-
+    # Relative noise of a reading, and noise over full scale. [-]
     noise: float = 0.005
     floor: float = 0.001
+    # Share of correlated noise in the variance, and its correlation from row to row. [-]
     share: float = 0.6
     memory: float = 0.7
-    session: float = 0.002
-    step: float = 0.0002
+    session: float = 0.002  # Standard deviation of the gain from run to run. [-]
+    step: float = 0.0002  # Smallest step of a reading over full scale. [-]
+    # Relative noise of the tachometer [-], noise of the pitot [m/s]
     rpm_noise: float = 0.0005
     airspeed_noise: float = 0.05
+    # Gain error [-]; zero error over full scale [-]
     thrust_gain: float = 0.0
     torque_gain: float = 0.0
     thrust_zero: float = 0.0
     torque_zero: float = 0.0
-    cross_talk: float = 0.0
+    cross_talk: float = 0.0  # Thrust reading per torque over R. [-]
+    # Zero that grows in time, over full scale [-]; time to half of it [s]
     thrust_drift: float = 0.0
     torque_drift: float = 0.0
     drift_time: float = 300.0
-    hysteresis: float = 0.0
+    hysteresis: float = 0.0  # Reading that stays behind when the load falls, over full scale. [-]
+    # Tachometer reading over the truth, less 1 [-]; pitot error [m/s]; pitot reading over the truth, less 1 [-]
     rpm_scale: float = 0.0
     airspeed_offset: float = 0.0
     airspeed_gain: float = 0.0
-    unit_slip: float = 1.0
-    unit_channel: str = "thrust"
-    motor_heating: float = 0.0
-    battery_sag: float = 0.0
+    unit_slip: float = 1.0  # Factor of the slipped unit on ``unit_channel``. [-]
+    unit_channel: str = "thrust"  # thrust or torque
+    motor_heating: float = 0.0  # Warming of the winding at the end of a long run. [K]
+    battery_sag: float = 0.0  # Share of the open-circuit voltage lost at the end of a long run. [-]
 
 
 def _sigma(true: Array, scale: float, stand: Stand) -> Array:

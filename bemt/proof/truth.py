@@ -21,12 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.proof import truth_section as ts
 from bemt.proof import truth_wake as tw
 
-__all__ = ["TrueAnswer", "TruthRotor", "air", "solve"]
-
-Array = NDArray[np.float64]
 # rounds and largest Newton step, each for the points that the one before left; stalled panels need small steps
 _STAGES = ((12, 1.0), (12, 1.0), (40, 0.5), (60, 0.25), (300, 0.1))
 _TOLERANCE, _TIGHT, _GOOD = 1e-6, 3e-6, 2e-4  # end of a stage; no further stage; counts as solved
@@ -34,35 +32,18 @@ _TOLERANCE, _TIGHT, _GOOD = 1e-6, 3e-6, 2e-4  # end of a stage; no further stage
 
 @dataclass(frozen=True)
 class TruthRotor:
-    """Blades of the truth.
+    """Blades of the truth."""
 
-    Parameters
-    ----------
-    radius : float
-        Tip radius. [m]
-    blades : int
-        Count. [-]
-    r_R, c_R, beta : (S,) float
-        Stations: r/R, chord over R [-], blade angle [rad]; the first is the hub, the last the tip.
-    section : truth_section.TrueSection
-        One section for the whole blade.
-    panels : int
-        Lifting-line panels. [-]
-    wall : float
-        Inner radius of a duct over R, NaN without one. [-]
-    code : str
-        Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.proof.truth_ccblade`).
-    """
-
-    radius: float
-    blades: int
+    radius: float  # Tip radius. [m]
+    blades: int  # Count. [-]
+    # (S,) Stations: r/R, chord over R [-], blade angle [rad]; the first is the hub, the last the tip
     r_R: tuple[float, ...]
     c_R: tuple[float, ...]
     beta: tuple[float, ...]
-    section: ts.TrueSection = field(default_factory=ts.TrueSection)
-    panels: int = 14
-    wall: float = float("nan")
-    code: str = "vortex"
+    section: ts.TrueSection = field(default_factory=ts.TrueSection)  # One section for the whole blade
+    panels: int = 14  # Lifting-line panels. [-]
+    wall: float = float("nan")  # Inner radius of a duct over R, NaN without one. [-]
+    code: str = "vortex"  # Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.proof.truth_ccblade`)
 
     @property
     def hub(self) -> float:
@@ -97,35 +78,23 @@ class TruthRotor:
 
 @dataclass(frozen=True)
 class TrueAnswer:
-    """Loads of P points.
+    """Loads of P points."""
 
-    Attributes
-    ----------
-    thrust, torque : (P,) float
-        Of the blades [N], [N m]; NaN where not converged.
-    converged : (P,) bool
-        Whether the circulations are found.
-    circulation, ua, ut : (P, N) float
-        Circulation per blade [m2/s]; induced speed downstream and in the direction of rotation [m/s].
-    induced, jet : (P,) float
-        Thrust-weighted axial induced speed; excess speed of a duct's jet, NaN without one. [m/s]
-    re75, m_tip : (P,) float
-        Reynolds number at 0.75 R; rotational tip Mach number. [-]
-    residual : (P,) float
-        Largest relative miss of a circulation, or of the wake's speed over the tip speed. [-]
-    """
-
+    # (P,) Of the blades [N], [N m]; NaN where not converged
     thrust: Array
     torque: Array
-    converged: NDArray[np.bool_]
+    converged: NDArray[np.bool_]  # (P,) Whether the circulations are found
+    # (P, N) Circulation per blade [m2/s]; induced speed downstream and in the direction of rotation [m/s]
     circulation: Array
     ua: Array
     ut: Array
+    # (P,) Thrust-weighted axial induced speed; excess speed of a duct's jet, NaN without one. [m/s]
     induced: Array
     jet: Array
+    # (P,) Reynolds number at 0.75 R; rotational tip Mach number. [-]
     re75: Array
     m_tip: Array
-    residual: Array
+    residual: Array  # (P,) Largest relative miss of a circulation, or of the wake's speed over the tip speed. [-]
 
 
 def air(temperature_C: Array, pressure_Pa: Array) -> tuple[Array, Array, Array]:

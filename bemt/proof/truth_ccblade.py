@@ -16,15 +16,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.proof import truth
 from bemt.proof import truth_section as ts
-
-__all__ = ["EXPRESSIBLE", "solve"]
-
-Array = NDArray[np.float64]
 
 EXPRESSIBLE = frozenset({
     "reynolds", "compressibility", "drag_divergence", "stall_delay", "section", "pitch_offset", "untwist",

@@ -16,35 +16,22 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["TruthDuct", "disk_speeds", "ring_speed", "seal", "tube_speed"]
+from bemt.base.arrays import Array
 
-Array = NDArray[np.float64]
 _PHI = (np.arange(96) + 0.5) * (2.0 * np.pi / 96)
 
 
 @dataclass(frozen=True)
 class TruthDuct:
-    """Shape of a duct; lengths over the tip radius.
+    """Shape of a duct; lengths over the tip radius."""
 
-    Parameters
-    ----------
-    length, position : float
-        Length; rotor plane behind the lip. [-]
-    gap : float
-        Tip clearance over the tip radius. [-]
-    exit_ratio : float
-        Exit area over the area of the rotor annulus. [-]
-    lip_radius : float
-        Radius of the lip over the tip radius. [-]
-    """
-
+    # Length; rotor plane behind the lip. [-]
     length: float
     position: float
-    gap: float = 0.01
-    exit_ratio: float = 1.0
-    lip_radius: float = 0.1
+    gap: float = 0.01  # Tip clearance over the tip radius. [-]
+    exit_ratio: float = 1.0  # Exit area over the area of the rotor annulus. [-]
+    lip_radius: float = 0.1  # Radius of the lip over the tip radius. [-]
 
 
 def ring_speed(x: Array, z: Array, a: Array) -> tuple[Array, Array]:

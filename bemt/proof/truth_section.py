@@ -23,11 +23,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["TrueSection", "SectionPhysics", "loads", "zero_lift_angle"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 # Small moulded or carved blades with early transition: profile drag of a 9 % section at its ideal lift, share of the
 # potential zero-lift angle and lift slope that viscosity leaves, onset of separation [deg], over Reynolds number.
@@ -43,14 +40,9 @@ _DD_M = np.array([0.835, 0.795, 0.76, 0.725, 0.67])
 
 @dataclass(frozen=True)
 class TrueSection:
-    """Section of a blade, one value per panel or one for all.
+    """Section of a blade, one value per panel or one for all."""
 
-    Parameters
-    ----------
-    camber, position, thickness : float or (N,) float
-        NACA four-digit parameters over the chord. [-]
-    """
-
+    # (N,) NACA four-digit parameters over the chord. [-]
     camber: float = 0.035
     position: float = 0.4
     thickness: float = 0.09
@@ -58,38 +50,21 @@ class TrueSection:
 
 @dataclass(frozen=True)
 class SectionPhysics:
-    """What the sections feel; the defaults are a smooth, real blade in real air.
+    """What the sections feel; the defaults are a smooth, real blade in real air."""
 
-    Parameters
-    ----------
-    reynolds : float
-        Exponent on Re / Re_ref: 1 is real, 0 is a Reynolds number that never changes. [-]
-    reference_re : float
-        Re_ref. [-]
-    compressibility, drag_divergence, stall_delay : float
-        Scales, 1 is real and 0 is none. [-]
-    post_stall : float
-        Scale of the plate's cd at 90 deg. [-]
-    camber : float
-        Added camber over the chord. [-]
-    roughness : float
-        Relative growth of the profile drag; separation comes earlier by 12 deg times it. [-]
-    bubble_cl, bubble_re : float
-        Lift lost below a Reynolds number where a laminar bubble bursts. [-]
-    drag_level, slope_level : float
-        Factors on profile drag and lift slope: what no two blades share. [-]
-    """
-
-    reynolds: float = 1.0
-    reference_re: float = 1e5
+    reynolds: float = 1.0  # Exponent on Re / Re_ref: 1 is real, 0 is a Reynolds number that never changes. [-]
+    reference_re: float = 1e5  # Re_ref. [-]
+    # Scales, 1 is real and 0 is none. [-]
     compressibility: float = 1.0
     drag_divergence: float = 1.0
     stall_delay: float = 1.0
-    post_stall: float = 1.0
-    camber: float = 0.0
-    roughness: float = 0.0
+    post_stall: float = 1.0  # Scale of the plate's cd at 90 deg. [-]
+    camber: float = 0.0  # Added camber over the chord. [-]
+    roughness: float = 0.0  # Relative growth of the profile drag; separation comes earlier by 12 deg times it. [-]
+    # Lift lost below a Reynolds number where a laminar bubble bursts. [-]
     bubble_cl: float = 0.0
     bubble_re: float = 1e5
+    # Factors on profile drag and lift slope: what no two blades share. [-]
     drag_level: float = 1.0
     slope_level: float = 1.0
 

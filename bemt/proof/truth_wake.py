@@ -18,11 +18,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["LOADS", "H_GRID", "edges_and_centres", "image_tables", "interpolate", "wake_tables"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 H_GRID: Array = np.geomspace(0.02, 2.0, 21)
 """Advance of the wake per radian over the tip radius. [-]"""

@@ -13,128 +13,68 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.proof import truth, truth_ccblade, truth_duct
 from bemt.proof.truth_section import SectionPhysics
-
-__all__ = ["Conditions", "TrueLoads", "World", "loads"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class World:
-    """What is really there.  The defaults are a plain rotor in free, quiet air with all its section physics.
+    """What is really there.  The defaults are a plain rotor in free, quiet air with all its section physics."""
 
-    Parameters
-    ----------
-    section : truth_section.SectionPhysics
-        Reynolds, Mach and rotation in the sections.
-    pitch_offset : float
-        Every blade angle is larger by this. [deg]
-    untwist : float
-        Elastic turn of the tip at ``untwist_at``; along the blade the integral of torsion moment over stiffness. [deg]
-    untwist_at : float
-        rho Omega^2 where the tip turns by ``untwist``. [kg/m3/s2]
-    leak : float
-        Scale of the leakage over the tips of a ducted rotor, 1 is real. [-]
-    lip : float
-        Scale of the loss of duct thrust behind a lip that separates. [-]
-    ground : float
-        Scale of the images of the wake in a wall behind the rotor, 1 is real. [-]
-    recirculation, recirculation_time : float
-        Onset speed over induced speed when the room has been stirred up for long; time to half of it. [-], [s]
-    blockage : float
-        Rotor over tunnel area: the stream outside the slipstream slows down by continuity. [-]
-    nacelle, nacelle_cd : float
-        Radius of a body behind the rotor over R, whose half-body flow slows the root; its tare drag on pi R^2. [-]
-    oblique : float
-        Angle of the stream to the axis: azimuth by azimuth with Pitt-Peters skew. [deg]
-    inflow_lag : float
-        Time by which induced flow follows the load. [s]
-    inertia : float
-        Rotor inertia, seen by a torque cell under the motor. [kg m2]
-    density_error : float
-        Real density over the one that the air data say, less 1. [-]
-    resonance, resonance_rpm : float
-        Share of thrust and torque lost at the peak of a blade's resonance; where. [-], [rev/min]
-    bearing : float
-        Viscous drag of a bearing behind the torque cell, at 10,000 rev/min. [N m]
-    """
-
-    section: SectionPhysics = field(default_factory=SectionPhysics)
-    pitch_offset: float = 0.0
+    section: SectionPhysics = field(default_factory=SectionPhysics)  # Reynolds, Mach and rotation in the sections
+    pitch_offset: float = 0.0  # Every blade angle is larger by this. [deg]
+    # Elastic turn of the tip at ``untwist_at``; along the blade the integral of torsion moment over stiffness. [deg]
     untwist: float = 0.0
-    untwist_at: float = 1.0
-    leak: float = 1.0
-    lip: float = 0.0
-    ground: float = 0.0
+    untwist_at: float = 1.0  # rho Omega^2 where the tip turns by ``untwist``. [kg/m3/s2]
+    leak: float = 1.0  # Scale of the leakage over the tips of a ducted rotor, 1 is real. [-]
+    lip: float = 0.0  # Scale of the loss of duct thrust behind a lip that separates. [-]
+    ground: float = 0.0  # Scale of the images of the wake in a wall behind the rotor, 1 is real. [-]
+    # Onset speed over induced speed when the room has been stirred up for long; time to half of it. [-], [s]
     recirculation: float = 0.0
     recirculation_time: float = 5.0
-    blockage: float = 0.0
+    blockage: float = 0.0  # Rotor over tunnel area: the stream outside the slipstream slows down by continuity. [-]
+    # Radius of a body behind the rotor over R, whose half-body flow slows the root; its tare drag on pi R^2. [-]
     nacelle: float = 0.0
     nacelle_cd: float = 0.0
-    oblique: float = 0.0
-    inflow_lag: float = 0.0
-    inertia: float = 0.0
-    density_error: float = 0.0
+    oblique: float = 0.0  # Angle of the stream to the axis: azimuth by azimuth with Pitt-Peters skew. [deg]
+    inflow_lag: float = 0.0  # Time by which induced flow follows the load. [s]
+    inertia: float = 0.0  # Rotor inertia, seen by a torque cell under the motor. [kg m2]
+    density_error: float = 0.0  # Real density over the one that the air data say, less 1. [-]
+    # Share of thrust and torque lost at the peak of a blade's resonance; where. [-], [rev/min]
     resonance: float = 0.0
     resonance_rpm: float = 6000.0
-    bearing: float = 0.0
+    bearing: float = 0.0  # Viscous drag of a bearing behind the torque cell, at 10,000 rev/min. [N m]
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Where and when each of P rows of a recording was taken; real values, not recorded ones.
+    """Where and when each of P rows of a recording was taken; real values, not recorded ones."""
 
-    Parameters
-    ----------
-    rpm, airspeed, temperature_C, pressure_Pa : (P,) float
-        [rev/min], [m/s], [C], [Pa]
-    time : (P,) float
-        Since the first row. [s]
-    since_start : (P,) float
-        Since the rotor of this run was started. [s]
-    wall : (P,) float
-        Distance to a wall behind the rotor, NaN without one. [m]
-    gap : (P,) float
-        Tip clearance in a duct, NaN without one. [m]
-    run : (P,) int
-        Number of the run.
-    transient : bool
-        Whether the rows are one history in time rather than settled points.
-    """
-
+    # (P,) [rev/min], [m/s], [C], [Pa]
     rpm: Array
     airspeed: Array
     temperature_C: Array
     pressure_Pa: Array
-    time: Array
-    since_start: Array
-    wall: Array
-    gap: Array
-    run: NDArray[np.int64]
-    transient: bool = False
+    time: Array  # (P,) Since the first row. [s]
+    since_start: Array  # (P,) Since the rotor of this run was started. [s]
+    wall: Array  # (P,) Distance to a wall behind the rotor, NaN without one. [m]
+    gap: Array  # (P,) Tip clearance in a duct, NaN without one. [m]
+    run: NDArray[np.int64]  # (P,) Number of the run
+    transient: bool = False  # Whether the rows are one history in time rather than settled points
 
 
 @dataclass(frozen=True)
 class TrueLoads:
-    """Real loads of P rows.
+    """Real loads of P rows."""
 
-    Attributes
-    ----------
-    thrust, torque : (P,) float
-        On the shaft and the duct together [N], on the shaft [N m]; NaN where the rotor has no solution.
-    re75, m_tip : (P,) float
-        Reynolds number at 0.75 R; tip Mach number. [-]
-    answer : truth.TrueAnswer
-        What the rotor does, to begin another solution from.
-    """
-
+    # (P,) On the shaft and the duct together [N], on the shaft [N m]; NaN where the rotor has no solution
     thrust: Array
     torque: Array
+    # (P,) Reynolds number at 0.75 R; tip Mach number. [-]
     re75: Array
     m_tip: Array
-    answer: truth.TrueAnswer
+    answer: truth.TrueAnswer  # What the rotor does, to begin another solution from
 
 
 def _torsion(rotor: truth.TruthRotor) -> Array:

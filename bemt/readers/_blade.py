@@ -9,13 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.readers import SourceText, load_text, number
 from bemt.sections.parametric import QpropSection, XrotorSection
 from bemt.sections.polars import DEFAULT_RE, Polar
 
-Array = NDArray[np.float64]
 SPAN_DEG = (-20.0, 25.0)
 """Angles of the written tables; beyond them flat-plate laws continue."""
 RE_RANGE = (5e3, 3e6)

@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._columns import Channel, dataset
-
-Array = NDArray[np.float64]
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")

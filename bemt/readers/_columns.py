@@ -8,13 +8,11 @@ from pathlib import PureWindowsPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
 from bemt.dataset import Dataset
 from bemt.dataset.channels import channel_fault, unit_in
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import unit_errors
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers import load_text
@@ -29,7 +29,6 @@ from bemt.readers._samples import clock_seconds, spikes
 from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.readers._words import english, quantities
 
-Array = NDArray[np.float64]
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
 """Throttle beyond which it is no fraction; greatest one from which it is percent. [1]"""
 HOTTEST_AIR, MOST_AIR_VARIES, COLDEST_PART = 323.0, 20.0, 200.0

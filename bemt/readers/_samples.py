@@ -9,7 +9,8 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
+
 BLOCK = 1 << 17
 """Samples that are searched for spikes at once."""
 HALF, TIMES = 3, 2.0

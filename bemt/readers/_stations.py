@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.readers import SourceText, load_text
 from bemt.readers._headings import unit_of
 from bemt.readers._split import decimal_mark, split_table
 from bemt.readers._words import plain
-
-Array = NDArray[np.float64]
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 WIDEST = 0.8

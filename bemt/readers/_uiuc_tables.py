@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._uiuc_names import parse_file_name
 
-Array = NDArray[np.float64]
 NO_SPEED = "no rpm in the file name"
 """What is missing where a line over advance ratio has no name of the database."""
 _COLUMNS = {

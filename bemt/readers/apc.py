@@ -25,15 +25,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
 
-__all__ = ["KIND", "ApcBlade", "ApcPerformance", "parse_designation", "read", "read_pe0", "read_per3", "sniff"]
-
-Array = NDArray[np.float64]
 KIND = "apc"
 SOURCE = "APC Propellers (Landing Products), published data file"
 _PER3_COLUMNS = "v j pe ct cp pwr torque thrust pwr torque thrust thr/pwr mach reyn fom".split()

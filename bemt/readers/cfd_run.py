@@ -15,10 +15,6 @@ from bemt.base.toml import Table, entry, read_model
 from bemt.readers import head_text
 from bemt.readers._cfd import unit_of
 
-__all__ = [
-    "KIND", "QUANTITIES", "ReferenceTable", "RunColumn", "RunColumns", "RunHead", "RunToml", "SetupTable", "toml_text",
-]  # fmt: skip
-
 KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {
     "thrust": ("force", "N"), "duct_thrust": ("force", "N"), "torque": ("torque", "N m"), "power": ("power", "W"),

@@ -27,11 +27,12 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.dataset import Dataset
 from bemt.readers import head_text, number
 from bemt.readers._headings import heading
 from bemt.readers._large import NumberTable
-from bemt.readers._recording import Array, Builder, slip
+from bemt.readers._recording import Builder, slip
 from bemt.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
 from bemt.readers._split import SplitTable
 

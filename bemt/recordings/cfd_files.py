@@ -8,16 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import readers
+from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 
-__all__ = ["FIELDS", "PROGRAMS", "Settled", "cfd_files", "clock_of", "read_run", "settled", "zone_of"]
-
-Array = NDArray[np.float64]
 PROGRAMS: Mapping[str, str] = {
     "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",
     "fluent_xy": "Fluent", "fluent_ascii": "Fluent", "cfd_post_csv": "CFD-Post", "design_points": "Workbench",

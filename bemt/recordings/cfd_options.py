@@ -17,8 +17,6 @@ from bemt.readers._cfd import unit_of
 from bemt.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
 from bemt.recordings.cfd_run import DUCT
 
-__all__ = ["pairs", "run_from", "write_run"]
-
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")
 _WORDS = {"true": True, "yes": True, "false": False, "no": False}

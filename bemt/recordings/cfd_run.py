@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import readers
+from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
@@ -42,7 +42,6 @@ __all__ = [
     "run_text", "settled",
 ]  # fmt: skip
 
-Array = NDArray[np.float64]
 NO_LOAD = "a thrust or a torque"
 MOVING = 0.01
 """Drift over the averaged part above which a load has not settled. [1]"""

@@ -17,11 +17,6 @@ from bemt.recordings.audit import AuditLine, CfdFacts, audit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = [
-    "CONDITIONS", "GRID_FLOOR", "GRID_FLOOR_SOURCE", "audit_of", "conditions_of", "conditions_that_differ",
-    "faults_first", "floor_note", "grid_floor", "grid_that_differs", "references_of", "remark_of", "with_grid_floor",
-]  # fmt: skip
-
 CONDITIONS = (
     "grid_level", "cells", "program", "solver", "gas", "turbulence", "domain", "domain_over_D", "sector", "steady",
     "compressible", "wall", "y_plus",

@@ -12,13 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bemt.base import units
+from bemt.base.arrays import Array
 from bemt.dataset import Dataset
 from bemt.readers._recording import FULL_THROTTLE
 
-Array = NDArray[np.float64]
 HUGE = 1e9
 """Magnitude in SI above which no reading of a stand is physical."""
 LATEST_S = 1e11

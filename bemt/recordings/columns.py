@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.air import LIQUID
 from bemt.base import unit_errors
+from bemt.base.arrays import Array
 from bemt.recordings.findings import Facts, Finding, check_for
 
-Array = NDArray[np.float64]
 SENSORS = (
     "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",
     "temperature_K", "airspeed_m_s", "pressure_Pa",

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.dataset import Dataset
 from bemt.recordings.channels import named
 
-Array = NDArray[np.float64]
 SEVERITIES = ("error", "warning", "note")
 ENOUGH = 200_000
 """Rows from which a median is taken over every so many of them."""

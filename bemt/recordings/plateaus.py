@@ -27,9 +27,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-Array = NDArray[np.float64]
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""
 BLOCK = 1 << 16

@@ -27,13 +27,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._samples import MISREAD, against_load
 from bemt.recordings import plateaus
 from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stated
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
 """Channels that decide about steps, first one first."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from bemt import coefficients as co
 from bemt.air import GAMMA, R_DRY, Air
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.dataset import Dataset, concat
@@ -39,7 +40,6 @@ from bemt.recordings.channels import (
 from bemt.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
 from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
 
-Array = NDArray[np.float64]
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 """Channels of load cells."""
 _SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")

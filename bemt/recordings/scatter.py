@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
+
 Mask = NDArray[np.bool_]
 SAME_SPEED = 0.005
 """Relative difference in speed up to which points are repeats."""

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import coefficients as co
+from bemt.base.arrays import Array
 from bemt.recordings.channels import shaft_power
 from bemt.recordings.findings import MANY, Facts, Finding, check_for
 from bemt.recordings.windmilling import zero_thrust_speed
-
-Array = NDArray[np.float64]
 
 
 def _where(facts: Facts, rows: Array | NDArray[np.intp]) -> str:

@@ -18,8 +18,6 @@ from bemt.readers._split import decimal_mark, some, split_table
 from bemt.readers.recording_toml import QUANTITIES, RecordingToml
 from bemt.recordings.cfd_options import pairs
 
-__all__ = ["write_recording"]
-
 _OF_DIMENSION = {"force": "thrust", "torque": "torque", "angular_speed": "rpm", "voltage": "voltage",
                  "current": "current", "speed": "airspeed", "density": "density", "pressure": "pressure"}  # fmt: skip
 """Quantity that a unit alone stands for."""

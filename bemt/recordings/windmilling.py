@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["zero_thrust_speed"]
-
-Array = NDArray[np.float64]
+from bemt.base.arrays import Array
 
 # Thrust this small, share of the largest, has no sign; fewest readings of either sign; share of these on the wrong side
 # of the zero, as misread speeds are; thrust coefficients next to the zero, share of the largest, that are no jump.
