@@ -340,6 +340,14 @@ def test_a_unit_that_changes_within_a_column(factor: float) -> None:
     assert not said(check(recording(values)), "units_within")
 
 
+def test_a_wrong_speed_of_some_rows_is_no_unit_of_a_load() -> None:
+    values = stand()
+    values["rpm"] = np.where(np.arange(15) < 4, 3.5, 1.0) * values["rpm"]  # as counters read at idle
+    findings = check(recording(values))
+    (finding,) = said(findings, "speed_within")
+    assert finding.rows == tuple(range(4)) and not said(findings, "units_within")
+
+
 def test_a_line_of_constant_speed_is_no_stuck_sensor() -> None:
     J = np.linspace(0.1, 0.7, 13)
     line = Dataset("bench", "line", {"rpm": np.full(13, 5000.0), "J": J, "CT": 0.1 - 0.1 * J, "CP": 0.05 - 0.02 * J})

@@ -32,6 +32,7 @@ from bemt.diagnose.thresholds import (
     MOST,
     NAMED,
     NEAR,
+    PARTNER,
     PREDICTS,
     PROVEN,
     RARE,
@@ -448,26 +449,24 @@ def _on_already_and_no_reference(a: VerdictQuery) -> Decision | None:
     return None
 
 
-@_rule("two in the air, and no reference")
+@_rule("two in the air, and no reference", "BOTH")
 def _two_in_the_air_and_no_reference(a: VerdictQuery) -> Decision | None:
-    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99). The same of
-    two laws without any case.
+    """Declared: the label case of a propeller without a cause was named oblique inflow and untwist (0.99).
+
+    Of two laws without a case one that is in nearly all of the probability stays: what the other explains may be its
+    error.
     """
-    if (
-        (a.real or a.found.problem.by_laws)
-        and a.leading.pair
-        and all(effects.catalogue()[i].kind == "air" for i in a.leading)
-    ):
-        return a.says(
-            "insufficient",
-            f"{' and '.join(a.leading)} together fit best; the error of "
-            + (
-                "their laws looks alike"
-                if a.found.problem.by_laws
-                else "the model on this rotor, without a reference run, looks alike"
-            ),
-        )
-    return None
+    laws = a.found.problem.by_laws
+    if not (a.real or laws) or not a.leading.pair or any(effects.catalogue()[i].kind != "air" for i in a.leading):
+        return None
+    if laws and a.sure:
+        first = max(a.sure, key=lambda i: a.found.log_bayes(Explanation.of(i)))
+        others = [k.without(first).ids for k in sorted(a.P, key=lambda k: -a.P[k]) if k.pair and first in k.ids]
+        members = (first, *(i for ids in others for i in ids if a.share[i] >= PARTNER))[:LARGEST]
+        why = f"{first} is present; the error of its law looks like a second effect"
+        return replace(a.says("class", why, members, a.share[first]), sets=((first,), members[1:]))
+    whose = "their laws" if laws else "the model on this rotor, without a reference run,"
+    return a.says("insufficient", f"{' and '.join(a.leading)} together fit best; the error of {whose} looks alike")
 
 
 @_rule("another propeller, or what changes this one", "FORM, LARGEST")

@@ -99,30 +99,50 @@ def constant(facts: Facts) -> Iterator[Finding]:
             yield Finding("constant_column", own, text, fix, (), severity)
 
 
+def _border(y: Array) -> int:
+    """Row at which a channel jumps most, with a few rows on either side."""
+    return _FEW + int(np.argmax(np.abs(np.diff(y))[_FEW - 1 : 1 - _FEW]))
+
+
 @check_for("units_within")
 def units_within(facts: Facts) -> Iterator[Finding]:
-    """A load over the square of the speed that jumps by a power of ten, or more, from one row on: two units."""
+    """A load over the square of the speed that jumps by a power of ten, or more, from one row on: two units.
+
+    A wrong speed moves every load: where the electrical power over the cube of the speed jumps the same way, it is that.
+    """
     rpm = facts.get("rpm")
     if rpm is None or facts.bare:
         return
+    electric = facts.filled.get("electrical_power_W")
     for name in ("thrust_N", "torque_Nm"):
         v = facts.get(name)
         if v is None:
             continue
         with np.errstate(all="ignore"):
             level = np.log(np.abs(v) / rpm**2)
+            powers = level * np.nan if electric is None else np.log(np.abs(electric) / rpm**3)
         rows = np.flatnonzero(np.isfinite(level))
         if rows.size < 2 * _FEW or not facts.still[rows].all():
             continue
         y = level[rows]
-        k = _FEW + int(np.argmax(np.abs(np.diff(y))[_FEW - 1 : 1 - _FEW]))
+        k = _border(y)
         parts = y[:k], y[k:]
         jump = float(np.median(parts[1]) - np.median(parts[0]))
-        if abs(jump) > np.log(_JUMP) and all(np.ptp(part) < np.log(_STEADY) for part in parts):
-            line = facts.lines[int(rows[k])]
-            text = f"over the square of the speed {np.exp(jump):.3g} times what it was, from line {line} on"
-            fix = "the unit changes within the column: write both parts in one unit"
-            yield Finding("units_within", facts.named(name), text, fix, tuple(int(r) for r in rows[k:]), "error")
+        if abs(jump) <= np.log(_JUMP) or any(np.ptp(part) >= np.log(_STEADY) for part in parts):
+            continue
+        line = facts.lines[int(rows[k])]
+        with np.errstate(all="ignore"):
+            power = float(np.median(powers[rows[k:]]) - np.median(powers[rows[:k]]))
+        if power * np.sign(jump) > np.log(_STEADY):
+            few = rows[:k] if 2 * k < rows.size else rows[k:]
+            lines = f"lines {facts.lines[int(few[0])]} to {facts.lines[int(few[-1])]}"
+            text = f"{lines}: {name} over its square and the electrical power over its cube jump at line {line}"
+            fix = "the speed in these rows is wrong, as counters are at idle: leave them out"
+            yield Finding("speed_within", facts.named("rpm"), text, fix, tuple(int(r) for r in few), "error")
+            return
+        text = f"over the square of the speed {np.exp(jump):.3g} times what it was, from line {line} on"
+        fix = "the unit changes within the column: write both parts in one unit"
+        yield Finding("units_within", facts.named(name), text, fix, tuple(int(r) for r in rows[k:]), "error")
 
 
 @check_for("time")
