@@ -108,7 +108,7 @@ def _border(y: Array) -> int:
 def units_within(facts: Facts) -> Iterator[Finding]:
     """A load over the square of the speed that jumps by a power of ten, or more, from one row on: two units.
 
-    A wrong speed moves every load: where the electrical power over the cube of the speed jumps the same way, it is that.
+    A wrong speed moves every load: where electrical power over the cube of the speed jumps the same way, it is that.
     """
     rpm = facts.get("rpm")
     if rpm is None or facts.bare:
