@@ -197,8 +197,8 @@ def asked(**changed: Any) -> Any:
 REYNOLDS = Explanation.of("reynolds")
 ROWS: dict[str, dict[str, Any]] = {
     "no effect can be seen": {"first": NONE},
-    "nulls look like it": {"p_value": 0.2},
-    "nulls nearly look like it": {"p_value": 0.03},
+    "as large a mismatch occurs without a cause": {"p_value": 0.2},
+    "nearly as large a mismatch occurs without a cause": {"p_value": 0.03},
     "nothing is likelier than anything": {"P": {NONE: 0.6, UNKNOWN: 0.0}},
     "a drive that changed smoothly": {
         "P": {NONE: 0.0, UNKNOWN: 0.6, REYNOLDS: 0.4},
@@ -208,7 +208,7 @@ ROWS: dict[str, dict[str, Any]] = {
     },
     "unknown, and not much better than nothing": {"P": {NONE: 0.0, UNKNOWN: 0.6}, "vague": 4.9},
     "unknown is likelier than all": {"P": {NONE: 0.0, UNKNOWN: 0.6, REYNOLDS: 0.4}, "vague": 20.0},
-    "a smooth rest is left": {"rest": 10.5},
+    "a smooth residual remains": {"rest": 10.5},
     "not much better than nothing": {"odds": 7.0},
     "twin faults": {"leading": Explanation.of("thrust_zero", "torque_drift")},
     "two levels": {"leading": Explanation.of("air_density", "torque_gain")},

@@ -16,7 +16,7 @@ from flight_files import broken_copies
 
 from bemt.base.errors import InputError
 from bemt.commands.cli import main
-from bemt.diagnose.rules import decide
+from bemt.diagnose.rule import decide
 from bemt.flight.answer import FlightAnswer, answer_on
 from bemt.flight.balance import axes_of, blade, features
 from bemt.flight.change import change_in

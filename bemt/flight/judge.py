@@ -23,7 +23,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.prior import LEFT_OUT, log_priors
-from bemt.diagnose.rules import Rule, decide
+from bemt.diagnose.rule import Rule, decide
 from bemt.diagnose.suggest import Suggestion
 from bemt.diagnose.thresholds import (
     EARNED,
