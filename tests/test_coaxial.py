@@ -21,6 +21,7 @@ from bemt.case.propagate import prepared
 from bemt.effects import standard, without
 from bemt.sections.polars import linear_polar
 from bemt.vortex_cylinder import ahead, on_axis
+from bemt.wake import contracted
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -113,7 +114,7 @@ def test_the_lower_rotor_in_the_developed_wake_is_that_of_leishman_and_ananthan(
 
 def test_a_hovering_wake_contracts_as_the_tip_vortex_of_landgrebe() -> None:
     z = np.linspace(0.0, 3.0, 301)
-    radius = np.array([coaxial.contracted(x, np.array([0.008]), 0.08, -12.0, 2)[0] for x in z])
+    radius = np.array([contracted(x, np.array([0.008]), 0.08, -12.0, 2)[0] for x in z])
     assert radius[0] == 1.0 and radius[-1] == pytest.approx(0.78, abs=1e-3) and np.all(np.diff(radius) < 0.0)
     # the next blade passes at psi = pi, when the vortex has sunk by 0.25 (0.1 - 0.012) pi
     passage = 0.25 * (0.1 - 0.012) * math.pi
