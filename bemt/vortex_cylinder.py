@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 
+
 def on_axis(z_over_R: float) -> float:
     """Gain of the induced velocity on the axis behind a disk, s in v (1 + s); ahead of it v (1 - s) [1].
 

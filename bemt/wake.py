@@ -4,15 +4,15 @@ Without air from outside each streamtube would arrive with ``v (1 + s)`` more th
 far behind, and with the area that continuity gives, w / (V + v (1 + s) + v_lower).  ``w = V + v`` is the axial velocity
 in the disk, v_lower what the second rotor adds.  Measured wakes are wider: in hover they end at k R, k = 0.78
 (Landgrebe 1972, J. AHS 17(4)) to 0.82 (Leishman and Ananthan 2008, J. AHS 53(1), not checked), 0.707 by momentum
-theory.  Such a wake has taken air along: its area is larger by ``1 + (2 k^2 - 1) s``, and its velocity u so much smaller
-that its momentum, (V + u) u times area, stays.  In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its
-diameters the wake is a turbulent jet whose speed falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115,
-not checked).
+theory.  Such a wake has taken air along: its area is larger by ``1 + (2 k^2 - 1) s``, and its velocity u so much
+smaller that its momentum, (V + u) u times area, stays.  In a wind that factor counts by v / w (own choice).  Beyond 6.2
+of its diameters the wake is a turbulent jet whose speed falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans.
+ASCE 115, not checked).
 
 How fast the wake contracts: a cylinder, which is not let contract, gives v (1 + s) = 2 v - A, with A of
-:func:`bemt.vortex_cylinder.ahead`, and s = 0.2 at 0.1 diameters.  In hover the measured wake is all but contracted there
-(:func:`contracted`), so that s = 0.75.  Between the two, s goes linearly with v / w, from the cylinder of a lightly
-loaded rotor to the measured wake of hover (own choice).
+:func:`bemt.vortex_cylinder.ahead`, and s = 0.2 at 0.1 diameters.  In hover the measured wake is all but contracted
+there (:func:`contracted`), so that s = 0.75.  Between the two, s goes linearly with v / w, from the cylinder of a
+lightly loaded rotor to the measured wake of hover (own choice).
 """
 
 from __future__ import annotations
@@ -79,11 +79,11 @@ def streamtubes(
     v: Array, V: Array, w: Array, faster: Array, hovering: Array, drawn: Array, z_over_R: float,
     final: float = WAKE_RADIUS,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Streamtubes of a wake a distance z behind its disk: velocity above the wind [m/s], area over that in the disk [1].
+    """Streamtubes of a wake behind its disk: velocity above the wind [m/s], area over that in the disk [1].
 
-    Velocities, broadcast together: ``v`` induced in the disk, ``V`` of the wind, ``w`` through the disk, ``faster`` what
-    a cylinder adds behind it, ``drawn`` what a rotor at z adds [m/s]; ``hovering`` is :func:`hover_gain`. The third
-    result is what is left of a property per mass that the wake shares with the air that it takes along [1].
+    Velocities, broadcast together: ``v`` induced in the disk, ``V`` of the wind, ``w`` through the disk, ``faster``
+    what a cylinder adds behind it, ``drawn`` what a rotor there adds [m/s]; ``hovering`` is :func:`hover_gain`. The
+    third result is what is left of a property per mass that the wake shares with the air that it takes along [1].
     """
     if z_over_R <= 0.0:
         return v, np.ones_like(v), np.ones_like(v)
