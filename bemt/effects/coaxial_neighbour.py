@@ -70,22 +70,25 @@ class CoaxialNeighbour(Effect):
         other = self.load * own
         if "second_rotor_rad_s" in flow.extra:
             other = other * (np.nan_to_num(flow.extra["second_rotor_rad_s"]) / np.maximum(flow.omega, 1e-9)) ** 2
+        # in the helicopter convention; that of the neighbour is the same at any speed of its own
+        CT = own / (flow.rho * flow.area * np.maximum(flow.omega * flow.R, 1e-9) ** 2)
         if self.side == "downstream":
-            core, outside, share = self._wake(flow, V, own, other)
+            core, outside, share = self._wake(flow, V, CT, own, other)
             met = V + share * core + (1.0 - share) * outside
             flow.V = flow.V + _induced(flow, met, other) * _mean(_cylinder(self.z_over_R)[0])
         else:
-            core, outside, share = self._wake(flow, V, other, own)
+            core, outside, share = self._wake(flow, V, self.load * CT, other, own)
             flow.V = flow.V + _uniform(flow, V, core, outside, share)
 
-    def _wake(self, flow: Flow, V: Array, ahead_N: Array, behind_N: Array) -> tuple[Array, Array, Array]:
+    def _wake(
+        self, flow: Flow, V: Array, CT: Array, ahead_N: Array, behind_N: Array
+    ) -> tuple[Array, Array, Array]:  # fmt: skip
         """Speeds that the wake of a rotor adds inside and outside of its core at one behind it, and the core's share.
 
-        Each (P,); ``ahead_N`` and ``behind_N`` are the thrusts of both rotors.
+        Each (P,); ``ahead_N`` and ``behind_N`` are the thrusts of both rotors, ``CT`` is that of the one ahead.
         """
         inside, outside = _cylinder(self.z_over_R)
         v = _induced(flow, V, ahead_N)
-        CT = ahead_N / (flow.rho * flow.area * np.maximum(flow.omega * flow.R, 1e-9) ** 2)
         sigma = flow.B * flow.chord / (math.pi * flow.R)
         grown = hover_gain(contracted(self.z_over_R, CT, sigma, _TWIST, flow.B))
         faster = v * (1.0 - _mean(inside))
