@@ -21,16 +21,6 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 
-WAKE_RADIUS = 0.78
-"""Radius of the developed wake in hover over that of its rotor: Landgrebe 1972, J. American Helicopter Society 17(4),
-not checked; Leishman and Ananthan 2008, J. AHS 53(1), give 0.82 (not checked); momentum theory 0.707 [1]."""
-SWIRL = 0.5
-"""Share of the swirl behind a rotor that reaches one in its wake: all of it by the balance of angular momentum, none
-where motors and arms between the rotors straighten the flow; the middle, declared [1]."""
-MOUNT_DRAG = 0.03
-"""Drag of what carries a rotor in the wake of another one, over the thrust of that one: motor and arm cover 2 to 6 % of
-the disk, drag coefficient 1, dynamic pressure 0.6 to 1 of the disk loading; declared [1]."""
-
 
 def on_axis(z_over_R: float) -> float:
     """Gain of the induced velocity on the axis behind a disk, s in v (1 + s); ahead of it v (1 - s) [1].

@@ -15,12 +15,15 @@ import bemt
 from bemt.air import Air
 from bemt.base.errors import InputError
 from bemt.bem import coaxial, solver
+from bemt.bem import model as bem
 from bemt.bem.coaxial import Pair
 from bemt.case.load import with_changes
 from bemt.case.propagate import prepared
 from bemt.effects import standard, without
+from bemt.effects.coaxial_neighbour import CoaxialNeighbour
 from bemt.sections.polars import linear_polar
 from bemt.vortex_cylinder import ahead, on_axis
+from bemt.wake import contracted
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -113,7 +116,7 @@ def test_the_lower_rotor_in_the_developed_wake_is_that_of_leishman_and_ananthan(
 
 def test_a_hovering_wake_contracts_as_the_tip_vortex_of_landgrebe() -> None:
     z = np.linspace(0.0, 3.0, 301)
-    radius = np.array([coaxial.contracted(x, np.array([0.008]), 0.08, -12.0, 2)[0] for x in z])
+    radius = np.array([contracted(x, np.array([0.008]), 0.08, -12.0, 2)[0] for x in z])
     assert radius[0] == 1.0 and radius[-1] == pytest.approx(0.78, abs=1e-3) and np.all(np.diff(radius) < 0.0)
     # the next blade passes at psi = pi, when the vortex has sunk by 0.25 (0.1 - 0.012) pi
     passage = 0.25 * (0.1 - 0.012) * math.pi
@@ -278,6 +281,47 @@ def test_what_knows_one_rotor_only_refuses_a_pair() -> None:
     around = pair.replaced({"model.effects_on": ["coaxial_neighbour"]})
     with pytest.raises(InputError, match="coaxial_neighbour"):
         around.solve(5000.0)
+
+
+def beside(effect: CoaxialNeighbour, V: float | Array, **extra: Array) -> Array:
+    """Thrust with a neighbour over that alone, 15x5 at 5,000 rev/min."""
+    model = prepared(bemt.propeller("15x5").case)
+    assert isinstance(model, bem.Model)
+    flow = bem.flow_of(model.prep, 5000.0, V, AIR, extra)
+    found, _, ok = bem.respond(model.prepared, (*model.effects, effect), flow)
+    assert ok.all()
+    return np.asarray(found.T / flow.T0)
+
+
+def test_the_effect_of_an_unknown_neighbour_follows_the_solved_pair() -> None:
+    base = bemt.propeller("15x5")
+    bare = {"second_rotor.swirl": 0.0, "second_rotor.mount_drag": 0.0}
+    first = []
+    for z in (0.05, 0.2, 0.5, 1.0):
+        for V in (0.0, 6.0):
+            pair = base.coaxial(z).replaced(bare).solve(5000.0, V, bands=False)
+            upper, lower = pair["upper_thrust_ratio"][0], pair["lower_thrust_ratio"][0]
+            assert beside(CoaxialNeighbour("downstream", 2 * z, float(lower)), V)[0] == pytest.approx(upper, abs=0.015)
+            # one onset speed for the whole disk loses less than the core and its rim apart, by a tenth at most
+            found = beside(CoaxialNeighbour("upstream", 2 * z, float(upper)), V)[0]
+            assert lower < found < lower + 0.11
+            first.append(found)
+    assert np.all(np.diff(first[::2]) < 0.0) and np.all(np.diff(first[1::2]) < 0.0)  # the wake contracts
+
+
+def test_no_neighbour_no_effect_and_little_in_a_fast_wind() -> None:
+    V = np.array([0.0, 3.0, 6.0, 9.0])
+    for side in ("upstream", "downstream"):
+        none = beside(CoaxialNeighbour(side, 0.6, 0.0), V)
+        stopped = beside(CoaxialNeighbour(side, 0.6), V, second_rotor_rad_s=np.zeros(4))
+        np.testing.assert_allclose([none, stopped], 1.0, rtol=1e-9)
+        onset = dict.fromkeys((0.1, 1.0, 4.0), np.zeros(4))
+        for z in onset:
+            flow = bem.flow_of(bemt.propeller("15x5")._model.prep, 5000.0, V, AIR, {})
+            CoaxialNeighbour(side, z).flow(flow)
+            onset[z] = flow.V - V
+            assert np.all(onset[z] > 0.0) and np.all(np.diff(onset[z]) < 0.0)
+    assert np.all(onset[4.0] < 0.1 * onset[0.1])  # a suction fades with the distance
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ ROOMS: tuple[str, ...] = (
     "air",
     "coefficients",
     "vortex_cylinder",
+    "wake",
     "dataset|dataset.*",
     "sections|sections.*",
     "effects|effects.*",

@@ -9,17 +9,7 @@ of vortex cylinders", not checked).
 
 Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
 
-Lower rotor, inside the wake of the upper one: without air from outside each streamtube would arrive with ``v (1 + s)``
-more than the wind, s from 0 at the disk to 1 far behind, and with the area that continuity gives,
-w / (V + v (1 + s) + v_lower).  Measured wakes are wider: in hover they end at k R, k = 0.78 (Landgrebe 1972, J. AHS
-17(4)) to 0.82 (Leishman and Ananthan 2008, J. AHS 53(1), not checked), 0.707 by momentum theory.  Such a wake has taken
-air along: its area is larger by ``1 + (2 k^2 - 1) s``, and its velocity u so much smaller that its momentum,
-(V + u) u times area, stays.  In a wind that factor counts by v / w (own choice).  Beyond 6.2 of its diameters the wake
-is a turbulent jet whose speed falls as 1/z (Albertson, Dai, Jensen and Rouse 1950, Trans. ASCE 115, not checked).
-
-How fast the wake contracts: a cylinder, which is not let contract, gives v (1 + s) = 2 v - A, and s = 0.2 at 0.1
-diameters.  In hover the measured wake is all but contracted there (:func:`contracted`), so that s = 0.75.  Between the
-two, s goes linearly with v / w, from the cylinder of a lightly loaded rotor to the measured wake of hover (own choice).
+Lower rotor: inside the wake of the upper one it meets the streamtubes of :mod:`bemt.wake`.
 
 Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The swirl of the upper wake, twice that in
 its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
@@ -49,14 +39,13 @@ from bemt.bem import solver
 from bemt.bem.model import Model
 from bemt.dataset import Dataset
 from bemt.effects import to_text
-from bemt.vortex_cylinder import WAKE_RADIUS, ahead
+from bemt.vortex_cylinder import ahead
+from bemt.wake import WAKE_RADIUS, contracted, hover_gain, streamtubes
 
 if TYPE_CHECKING:
     from bemt.bem.solver import Prepared, Solution
     from bemt.effects import Effect
 
-JET = 6.2
-"""Length of a jet over its diameter from which its speed falls as 1/z (Albertson et al. 1950, Trans. ASCE 115) [1]."""
 _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
 _MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight
 _PASSES = 3  # through the radii of the streamtubes and what the lower rotor adds to their speed there
@@ -98,35 +87,8 @@ class Pair:
         half, end = np.interp([0.5 * rotor.R, rotor.R], self.upper.stations.r, self.upper.stations.beta)
         sigma = rotor.B * float(np.interp(0.75 * rotor.R, self.upper.stations.r, self.upper.stations.chord))
         twist = 2.0 * math.degrees(end - half)
-        square = contracted(self.spacing_m / rotor.R, CT, sigma / (math.pi * rotor.R), twist, rotor.B, k) ** 2
-        return np.asarray((1.0 - square) / (square - (2.0 * k * k - 1.0)))[:, None]
-
-
-def contracted(
-    z_over_R: float, CT: Array, sigma: float, twist_deg: float, blades: int, final: float = WAKE_RADIUS
-) -> Array:
-    """Radius of the wake of hovering rotors a distance z behind the disk, over theirs, (P,) [1].
-
-    Landgrebe 1972, J. AHS 17(4), tip vortex at wake age psi, CT in the helicopter convention (paper not checked; the
-    coefficients are those of several public codes)::
-
-        r/R = k + (1 - k) exp(-(0.145 + 27 CT) psi)                 k = 0.78, here ``final``
-        z/R = 0.25 (CT/sigma + 0.001 twist) psi                     up to the passage of the next blade, 2 pi / blades
-              ... + (1.41 + 0.0141 twist) sqrt(CT/2) (psi - 2 pi / blades)                             beyond
-
-    ``twist_deg`` is linear, tip less root; here twice that of the outer half of the blade. It is held within the -16 to
-    0 deg of usual helicopters, and the vortex at a quarter of its speed without twist or more (own choices).
-
-    >>> contracted(0.2, np.array([0.009]), 0.06, -12.0, 2).round(2)
-    array([0.82])
-    """
-    CT = np.maximum(CT, 1e-6)
-    twist = min(max(twist_deg, -16.0), 0.0)
-    first = 0.25 * np.maximum(CT / sigma + 0.001 * twist, 0.25 * CT / sigma)
-    later = (1.41 + 0.0141 * twist) * np.sqrt(0.5 * CT)
-    passage = 2.0 * math.pi / blades
-    age = np.minimum(z_over_R / first, passage) + np.maximum(z_over_R - first * passage, 0.0) / later
-    return np.asarray(final + (1.0 - final) * np.exp(-(0.145 + 27.0 * CT) * age))
+        radius = contracted(self.spacing_m / rotor.R, CT, sigma / (math.pi * rotor.R), twist, rotor.B, k)
+        return hover_gain(radius, k)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,9 +232,9 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
     v, V, w = upper.induced, upper.points[:, K.P_V, None], upper.onset + upper.induced
     own = _strengths(v)
     up, low, r = _edges(pair.upper), _edges(pair.lower), pair.lower.stations.r
-    drawn = np.zeros_like(v)
+    drawn, z_over_R = np.zeros_like(v), pair.spacing_m / pair.upper.rotor.R
     for _ in range(_PASSES):
-        add, area, kept = _streamtubes(pair, v, V, w, v - own @ inside.T, hovering, drawn)
+        add, area, kept = streamtubes(v, V, w, v - own @ inside.T, hovering, drawn, z_over_R, pair.wake_radius)
         area = np.diff(up**2) * area
         # radii on which streamtubes arrive, from the axis outwards; the hub's area shrinks as that of all
         hub = up[0] ** 2 * area.sum(axis=1, keepdims=True) / np.sum(np.diff(up**2))
@@ -292,33 +254,6 @@ def _exchange(pair: Pair, upper: _Rotor, lower: _Rotor) -> tuple[Array, Array, A
     sense = 1.0 if pair.opposite else -1.0
     f = pair.interference
     return f * (_strengths(lower.induced) @ suction.T), f * axial, f * pair.swirl * sense * whirl / r
-
-
-def _streamtubes(
-    pair: Pair, v: Array, V: Array, w: Array, faster: Array, hovering: Array, drawn: Array
-) -> tuple[Array, Array, Array]:
-    """Streamtubes of the upper wake at the lower disk: velocity above the wind [m/s], area over that in the disk [1].
-
-    ``faster`` is what a cylinder adds behind the disk [m/s], ``hovering`` (P, 1) the s of hover [1]. The third is what
-    is left of a property per mass that the wake shares with the air that it takes along [1].
-    """
-    if pair.spacing_m <= 0.0:
-        return v, np.ones_like(v), np.ones_like(v)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        grown = np.clip(np.where(v != 0.0, faster / v, 0.0), 0.0, 1.0)
-        slip = np.clip(np.where(w > 0.0, v / w, 0.0), 0.0, 1.0)
-    grown = grown + slip * np.maximum(hovering - grown, 0.0)
-    ideal = v * (1.0 + grown)
-    # area over that without air taken along: of the developed wake, then of a jet
-    jet = max(pair.spacing_m / (JET * 2.0 * pair.wake_radius * pair.upper.rotor.R), 1.0) ** 2
-    more = (1.0 + (2.0 * pair.wake_radius**2 - 1.0) * grown * slip) * (1.0 + (jet - 1.0) * slip)
-    momentum = (V + ideal) * ideal / more
-    add = np.where(ideal > 0.0, np.sqrt(np.maximum(0.25 * V * V + momentum, 0.0)) - 0.5 * V, ideal)
-    area = np.maximum(w, 1e-9) / np.maximum(V + ideal + drawn, 1e-9)
-    # at the ends of the blades, where nothing is induced, the flow of the neighbours would seem to spread it
-    area = np.where(v >= 0.0, np.minimum(area, 1.0), np.minimum(area, 4.0)) * more
-    kept = (V + ideal) / np.maximum((V + add) * more, 1e-9)
-    return add, area, kept
 
 
 def _collected(pair: Pair, upper: _Rotor, lower: _Rotor, settled: NDArray[np.bool_], steps: int) -> PairSolution:

@@ -18,7 +18,7 @@ from bemt.base.toml import Axis, FieldLimits, Table, axis_values, entry, expecte
 from bemt.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
 from bemt.sections.rule import DRAG_LEVEL, N_CRIT
-from bemt.vortex_cylinder import MOUNT_DRAG, SWIRL, WAKE_RADIUS
+from bemt.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)

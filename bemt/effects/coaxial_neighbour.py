@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from bemt.effects.base import Array, Effect, Flow, Parameter, choice
-from bemt.vortex_cylinder import on_axis
+from bemt.vortex_cylinder import ahead
+from bemt.wake import contracted, hover_gain, streamtubes
 
 _SIDES = ("upstream", "downstream")
+# Twist of a neighbour's blade: the middle of the -16 to -12 deg of propellers of P/D 0.35 and more [deg].
+_TWIST = -14.0
+# Middles of rings inside of the wake, over its radius, and outside of it.
+_INSIDE, _OUTSIDE = (np.arange(25) + 0.5) / 25.0, np.linspace(1.0, 3.0, 81)
 
 
 @dataclass(frozen=True)
@@ -18,14 +25,15 @@ class CoaxialNeighbour(Effect):
 
     Notes
     -----
-    On the axis of a semi-infinite vortex cylinder the induced speed is v (1 + s / sqrt(1 + s^2)), s = z/R counted
-    downstream (McCormick 1967, Aerodynamics of V/STOL Flight; not checked against the book). Continuity contracts the
-    wake to the share a^2 = 1 / (1 + s / sqrt(1 + s^2)) of the disk. A rotor downstream sees that speed inside the wake
-    and none outside. Its loads are computed at the mean, weighted by r^2 like blade loads (declared): v a. A rotor
-    upstream sees v (1 - s / sqrt(1 + s^2)). ``load`` is the neighbour's thrust over that of this rotor; its v follows
-    from momentum theory of the open disk, `Flow.induced`; where ``second_rotor_rad_s`` is recorded, ``load`` holds at
-    equal speeds, and the neighbour's thrust goes with the square of its own. The swirl of the neighbour is neglected; a
-    contra-rotating pair gains a few per cent from it.
+    The wake is that of a coaxial pair (:mod:`bemt.wake`), of a rotor with uniform load and blades like this one's. A
+    rotor downstream meets the faster stream inside the wake and its upwash outside, one upstream the suction of the
+    other (:func:`bemt.vortex_cylinder.ahead`). The solver knows one onset speed: that at which thrust is the mean over
+    both parts of the disk, by momentum theory and blades whose thrust falls linearly with the flow through the disk,
+    as in the closed form of Leishman and Ananthan (2008, J. AHS 53(1), not checked; here with the solver's slope).
+    ``load`` is the neighbour's thrust over that of this rotor alone; its induced speed follows from momentum theory,
+    of a neighbour downstream in the wake of this rotor. Where ``second_rotor_rad_s`` is recorded, ``load`` holds at
+    equal speeds, and the neighbour's thrust goes with the square of its own. Swirl is neglected: which way the
+    neighbour turns is not known.
     """
 
     side: str = "upstream"
@@ -58,28 +66,42 @@ class CoaxialNeighbour(Effect):
 
     def flow(self, flow: Flow) -> None:
         """Add what the neighbour induces."""
-        flow.V = flow.V + self.mean() * self._speed(flow)
-
-    def mean(self) -> float:
-        """Mean onset speed over the neighbour's own induced speed [1].
-
-        >>> CoaxialNeighbour("downstream", 1e9).mean(), round(CoaxialNeighbour("downstream", 1e-9).mean(), 3)
-        (0.0, 1.0)
-        """
-        s = on_axis(self.z_over_R)
-        if self.side == "downstream":
-            return float(1.0 - s)
-        # speed (1 + s) v inside the radius a R of the wake, weighted by r^2: (1 + s) a^3 = a
-        return float(1.0 / np.sqrt(1.0 + s))
-
-    def _speed(self, flow: Flow) -> Array:
-        """Induced speed of the neighbour, (P,) [m/s]."""
-        load: Array | float = self.load
+        V, own = np.maximum(flow.V, 0.0), np.maximum(flow.T0, 0.0)
+        other = self.load * own
         if "second_rotor_rad_s" in flow.extra:
-            load = load * (np.nan_to_num(flow.extra["second_rotor_rad_s"]) / np.maximum(flow.omega, 1e-9)) ** 2
-        disk = load * np.maximum(flow.T0, 0.0) / (2.0 * flow.rho * flow.area)
-        half = 0.5 * np.abs(flow.V)
-        return np.asarray(np.sqrt(half**2 + disk) - half)
+            other = other * (np.nan_to_num(flow.extra["second_rotor_rad_s"]) / np.maximum(flow.omega, 1e-9)) ** 2
+        # in the helicopter convention; that of the neighbour is the same at any speed of its own
+        CT = own / (flow.rho * flow.area * np.maximum(flow.omega * flow.R, 1e-9) ** 2)
+        if self.side == "downstream":
+            core, outside, share = self._wake(flow, V, CT, own, other)
+            met = V + share * core + (1.0 - share) * outside
+            flow.V = flow.V + _induced(flow, met, other) * _mean(_cylinder(self.z_over_R)[0])
+        else:
+            core, outside, share = self._wake(flow, V, self.load * CT, other, own)
+            flow.V = flow.V + _uniform(flow, V, core, outside, share)
+
+    def _wake(
+        self, flow: Flow, V: Array, CT: Array, ahead_N: Array, behind_N: Array
+    ) -> tuple[Array, Array, Array]:  # fmt: skip
+        """Speeds that the wake of a rotor adds inside and outside of its core at one behind it, and the core's share.
+
+        Each (P,); ``ahead_N`` and ``behind_N`` are the thrusts of both rotors, ``CT`` is that of the one ahead.
+        """
+        inside, outside = _cylinder(self.z_over_R)
+        v = _induced(flow, V, ahead_N)
+        sigma = flow.B * flow.chord / (math.pi * flow.R)
+        grown = hover_gain(contracted(self.z_over_R, CT, sigma, _TWIST, flow.B))
+        faster = v * (1.0 - _mean(inside))
+        core, drawn = v, np.zeros_like(v)
+        for _ in range(2):  # what the second rotor adds narrows the core, not its speed
+            core, area, _ = streamtubes(v, V, V + v, faster, grown, drawn, self.z_over_R)
+            drawn = _induced(flow, V + core, behind_N)
+        share = np.minimum(area, 1.0)
+        edge = np.maximum(np.sqrt(share), 1.0 / _OUTSIDE[-1])
+        middle = 0.5 * (_OUTSIDE[1:] + _OUTSIDE[:-1])
+        flux = np.concatenate([[0.0], np.cumsum(np.diff(_OUTSIDE**2) * np.interp(middle, _OUTSIDE, outside))])
+        upwash = v * edge**2 * np.interp(1.0 / edge, _OUTSIDE, flux) / np.maximum(1.0 - edge**2, 1e-9)
+        return core, -upwash, share
 
     def variants(self) -> tuple[dict[str, str | float], ...]:
         """Both sides, six distances and four loads in ratio."""
@@ -87,3 +109,42 @@ class CoaxialNeighbour(Effect):
             {"side": side, "z_over_R": z, "load": k}
             for side in _SIDES for z in (0.2, 0.4, 0.7, 1.2, 2.0, 4.0) for k in (0.5, 0.8, 1.0, 1.4)
         )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def _cylinder(z_over_R: float) -> tuple[Array, Array]:
+    """What a cylinder induces that far ahead of its disk, over the velocity in it, at `_INSIDE` and `_OUTSIDE` [1]."""
+    return ahead(_INSIDE, 1.0, z_over_R), ahead(_OUTSIDE, 1.0, z_over_R)
+
+
+def _mean(velocity: Array) -> float:
+    """Mean over the disk of a velocity at `_INSIDE`."""
+    return float(_INSIDE @ velocity / np.sum(_INSIDE))
+
+
+def _induced(flow: Flow, V: Array, thrust_N: Array) -> Array:
+    """Induced speed of a thrust by momentum theory of an open disk, (P,) [m/s]."""
+    half = 0.5 * V
+    return np.asarray(np.sqrt(half**2 + thrust_N / (2.0 * flow.rho * flow.area)) - half)
+
+
+def _uniform(flow: Flow, V: Array, core: Array, outside: Array, share: Array) -> Array:
+    """Uniform speed that changes thrust like one in a share of the disk and another one outside of it, (P,) [m/s].
+
+    With w the flow through the disk and m = 2 rho A, momentum says T = m w (w - V), the blades say T = T1 - S w. The
+    slope D = dT/dV of the solver gives S = -D m (2 w - V) / (m w + D).
+    """
+    m = 2.0 * flow.rho * flow.area
+    w = V + _induced(flow, V, np.maximum(flow.T0, 0.0))
+    D = np.clip(flow.dT_dV, -0.9 * m * w, 0.0)
+    S = -D * m * (2.0 * w - V) / np.maximum(m * w + D, 1e-12)
+    alone = m * w * (w - V) + S * w
+
+    def through(onset: Array) -> Array:
+        half = 0.5 * (onset - S / m)
+        return np.asarray(half + np.sqrt(half**2 + alone / m))
+
+    mean = share * through(V + core) + (1.0 - share) * through(V + outside)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        add = mean - (alone - S * mean) / (m * mean) - V
+    return np.asarray(np.where(mean > 0.0, add, 0.0))
