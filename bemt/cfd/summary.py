@@ -130,30 +130,16 @@ def _number(text: str) -> float:
     return float(text) if text else math.nan
 
 
-def summary_text(document: dict[str, Any], radial: bool = True) -> str:
+def summary_text(document: dict[str, Any]) -> str:
     """Give the summary as tables."""
     lines = []
     keys = ("points", "recorded", "converged", "balanced")
     counts = [[c["name"], *(str(c[key]) for key in keys)] for c in document["campaigns"]]
     counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3, 4))])
     lines.append(text_table(["campaign", "points", "run", "converged", "and balanced"], counts))
-    head = [
-        "run",
-        "solver",
-        "level",
-        "cells",
-        "rpm",
-        "J",
-        "other",
-        "T [N]",
-        "u",
-        "BEMT",
-        "Q [N m]",
-        "u",
-        "BEMT",
-        "y+",
-        "leak [%]",
-    ]  # the largest residual of mass, momentum and angular momentum; empty where none was written
+    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+",
+            "leak [%]"]  # fmt: skip
+    # leak: the largest residual of mass, momentum and angular momentum; empty where none was written
     for campaign in document["campaigns"]:
         rows = []
         for row in campaign["rows"]:
@@ -181,9 +167,7 @@ def summary_text(document: dict[str, Any], radial: bool = True) -> str:
                 words.append(f"{key} order {order}, limit {limit}, GCI {gci} %{said}")
             levels = ", ".join(f"{level:g}" for level in study["levels"])
             lines.append(f"  grid study {study['solver']} levels {levels}: {' | '.join(words)}")
-    if radial:
-        lines += _radial_text(document)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_radial_text(document)]) + "\n"
 
 
 def _percent(value: float | None) -> float:
