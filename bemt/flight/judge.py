@@ -352,28 +352,11 @@ def judge(
     windy: bool = False,
     beside: BesideBalance | None = None,
 ) -> FlightVerdict:
-    """Judge a flight by healthy ones.
+    """Judge the features of a flight, (B,), by those of healthy flights of the same vehicle [1].
 
-    Parameters
-    ----------
-    flight : (B,) float
-        Features of the flight [1].
-    healthy : sequence of (B,) float
-        Features of healthy flights of the same vehicle [1].
-    layout : (B, 3) float or None
-        Angles [rad], turning [1] and arms; None: no weights are tried, and every rotor stands for itself.
-    false_alarm : float
-        Accepted probability that a healthy flight is accused [1].
-    windy : bool
-        Whether the rotors met wind that they do not meet in the healthy flights: it tilts the body, so roll and pitch
-        may change in any way, and yaw does not.
-    beside : BesideBalance or None
-        What else the log shows.
-
-    Returns
-    -------
-    FlightVerdict
-        With the error rate of the same rules on the healthy flights.
+    Without a layout no weights are tried, and every rotor stands for itself. `false_alarm` is the accepted probability
+    that a healthy flight is accused [1]. `windy`: the rotors met wind that they do not meet in the healthy flights; it
+    tilts the body, so roll and pitch may change in any way, and yaw does not. `beside` is what else the log shows.
     """
     from scipy import stats
 
