@@ -17,11 +17,12 @@ from bemt.flight.balance import axes_of, features
 from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
 from bemt.flight.inflow import Inflow, inflow
-from bemt.flight.judge import FALSE_ALARM, BesideBalance, FlightVerdict, judge
+from bemt.flight.judge import FALSE_ALARM, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
+from bemt.flight.rules import BesideBalance
 from bemt.flight.simulator import simulator_constants
 from bemt.flight.vibration import Vibration, shaken, vibration
 from bemt.flight.wind import Wind, wind
