@@ -22,7 +22,8 @@ import numpy as np
 from bemt.base.tables import write_atomic
 from bemt.case import load_case
 from bemt.exports import exports
-from bemt.exports.base import Job, LoadsExport, entry
+from bemt.exports.base import Job, LoadsExport
+from bemt.exports.manifest import entry
 from bemt.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))

@@ -21,8 +21,9 @@ from bemt.base.tables import write_atomic
 from bemt.case import Case, load_case
 from bemt.commands.cli import main
 from bemt.exports import exports, target_ids
-from bemt.exports.base import FEATURES, Files, Job, LoadsExport, entry
+from bemt.exports.base import FEATURES, Files, Job, LoadsExport
 from bemt.exports.folder import export_case
+from bemt.exports.manifest import entry
 from bemt.exports.openfoam.write import Run, settings_of
 from bemt.exports.performance import solve_points
 from geometry import export as module
