@@ -13,8 +13,9 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.readers import load_text
-from bemt.readers._headings import heading, meanings, unit_for
+from bemt.readers._headings import heading, meanings
 from bemt.readers._split import decimal_mark, some, split_table
+from bemt.readers._unit_text import unit_for
 from bemt.readers.recording_toml import QUANTITIES, RecordingToml
 from bemt.recordings.cfd_options import pairs
 
