@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from bemt.bem.model import Model
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import parted
+from bemt.cfd.record import csv_rows
 from bemt.cfd.schema import Campaign, load_campaign
 
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
@@ -71,15 +71,8 @@ def _edges(r: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * r[0] - middle[0]], middle, [2 * r[-1] - middle[-1]]])
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
 def _radial(campaign: Campaign, run: str, found: solver.Solution) -> dict[str, Any] | None:
-    rows = [row for row in _rows(campaign.path.parent / "radial.csv") if row["run"] == run]
+    rows = [row for row in csv_rows(campaign.path.parent / "radial.csv") if row["run"] == run]
     if not rows:
         return None
     names = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
@@ -109,7 +102,7 @@ def summary(folder: str | Path) -> dict[str, Any]:
         manifest_path = path.parent / "manifest.json"
         manifest = json.loads(manifest_path.read_text(encoding="utf-8")) if manifest_path.is_file() else {}
         rows = []
-        for row in _rows(path.parent / "recording.csv"):
+        for row in csv_rows(path.parent / "recording.csv"):
             found = model.solve(campaign, row)
             rows.append({**row, "bemt_thrust_N": float(found.T[0]), "bemt_torque_Nm": float(found.Q[0]),
                          "radial": _radial(campaign, row["run"], found)})  # fmt: skip
