@@ -76,11 +76,11 @@ def plan_stator(duct: Duct, hub_back: float, hub_radius: float) -> StatorPlan | 
     return StatorPlan(stator, front, back, body, hub_radius, section)
 
 
-def centre_body(duct: Duct, plan: StatorPlan, n: int = 33) -> Array:
+def centre_body(duct: Duct, plan: StatorPlan) -> Array:
     """Outline of the body that carries the vanes: a cylinder, then an ellipse to the exit. [m]"""
     end, radius = duct.exit_hub_radius, plan.body_radius
     start = max(plan.body_front, 0.5 * (plan.front + plan.back))
-    t = np.linspace(0.0, np.pi / 2, n)[1:]
+    t = np.linspace(0.0, np.pi / 2, 33)[1:]
     x = start + (duct.length - start) * np.sin(t)
     r = end + (radius - end) * np.cos(t)
     r[-1] = end

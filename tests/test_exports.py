@@ -21,8 +21,9 @@ from bemt.base.tables import write_atomic
 from bemt.case import Case, load_case
 from bemt.commands.cli import main
 from bemt.exports import exports, target_ids
-from bemt.exports.base import FEATURES, Files, Job, LoadsExport, entry
+from bemt.exports.base import FEATURES, Files, Job, LoadsExport
 from bemt.exports.folder import export_case
+from bemt.exports.manifest import entry
 from bemt.exports.openfoam.write import Run, settings_of
 from bemt.exports.performance import solve_points
 from geometry import export as module
@@ -471,7 +472,7 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float, han
         pytest.skip("no OpenFOAM")
     case = load_case(project / "cases/prop_8x5/case.toml").replaced({"rotor.rotation": hand})
     job = Job(case, 20_000.0, speed)
-    ran = script(project, "read_back").rotor_disk(job, tmp_path)
+    ran = script(project, "simulators").rotor_disk(job, tmp_path)
     assert ran.sense == (1 if hand == "right" else -1)
     assert ran.thrust_N[0] == pytest.approx(job.loading.thrust_N, rel=1e-3)
     assert ran.torque_Nm[0] == pytest.approx(job.loading.torque_Nm, rel=5e-3)

@@ -22,11 +22,12 @@ from bemt.flight.balance import axes_of, blade, features
 from bemt.flight.change import change_in
 from bemt.flight.identify import identify
 from bemt.flight.inflow import inflow
-from bemt.flight.judge import BUILD, RULES, judge, weighed
+from bemt.flight.judge import judge, weighed
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.picture import flight_picture
 from bemt.flight.read import read_log
+from bemt.flight.rules import BUILD, RULES
 from bemt.flight.simulator import motor_lag, simulator_constants
 from bemt.flight.wind import wind
 from bemt.library.rotors import rotor_of

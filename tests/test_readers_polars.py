@@ -155,7 +155,7 @@ def test_csv_round_trip(mark: str, put: Callable[[str], Path]) -> None:
         same_data(p, Re)
     assert "column ignored: cm" in p.notes
     shared = p.on_grid()
-    assert shared.is_shared
+    assert shared.on_grid() is shared
     fine = ALPHA_GRID[np.isin(np.round(np.rad2deg(ALPHA_GRID), 6), ALPHA)]
     np.testing.assert_allclose(shared.lookup(fine, DEFAULT_RE[0])[0], cl_of(np.rad2deg(fine), 5e4), atol=1e-9)
 

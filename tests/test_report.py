@@ -35,6 +35,7 @@ from bemt.report.gather import attach_diagnoses, gather
 from bemt.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.report.rotor_view import viewer
 from bemt.report.verdicts import verdict
+from bemt.sweep.comparison import Comparison
 
 CASE = """
 schema = "bemt.case/1"
@@ -436,32 +437,19 @@ def test_broken_recordings_break_nothing(made: tuple[dict[str, Any], Path], tmp_
     assert_harmless(book_html(book))
 
 
-def comparison(E: float, u_val: float | None, source: str = "bench") -> dict[str, Any]:
-    return {
-        "model": "bemt",
-        "reference": "bench",
-        "source": source,
-        "quantity": "thrust_N",
-        "E": E,
-        "E_pct": E,
-        "u_num": 0.0,
-        "u_input": 1.0,
-        "u_val": u_val,
-    }
-
-
 @pytest.mark.parametrize(
-    ("E", "u_val", "kind", "words"),
+    ("E", "u_D", "kind", "words"),
     [
-        (1.0, 2.0, "same", "Not distinguishable from noise"),
-        (3.0, 2.0, "differs", "more than the validation uncertainty"),
+        (1.0, 1.7, "same", "Not distinguishable from noise"),
+        (3.0, 1.7, "differs", "more than the validation uncertainty"),
         (3.0, None, "unknown", "is at least this uncertain: bench 2.8 N"),
         (0.5, math.nan, "same", "whatever the uncertainty of the recording"),
     ],
 )
-def test_verdicts_follow_validation_uncertainty(E: float, u_val: float | None, kind: str, words: str) -> None:
+def test_verdicts_follow_validation_uncertainty(E: float, u_D: float | None, kind: str, words: str) -> None:
     rows = [{"source": "bemt", "thrust_N": 10.0, "u": 1.0}]
-    found, _, sentence = verdict({"rows": rows, "comparisons": [comparison(E, u_val)], "faults": []})
+    line = Comparison(reference="bench", source="bench", S=10.0, D=10.0 - E, u_input=1.0).document() | {"u_D": u_D}
+    found, _, sentence = verdict({"rows": rows, "comparisons": [line], "faults": []})
     assert found == kind and words in sentence
 
 

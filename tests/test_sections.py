@@ -106,7 +106,7 @@ def test_bad_tables_are_refused() -> None:
 def test_on_grid_is_idempotent_and_announces_what_it_holds() -> None:
     p = smooth_polar(np.array([5e4, 5e5]), np.array([0.0, 0.5]))
     q = p.on_grid()
-    assert q.is_shared and q.on_grid() is q and any("held constant" in n for n in q.notes)
+    assert q.on_grid() is q and any("held constant" in n for n in q.notes)
     np.testing.assert_allclose(q.lookup(0.2, 2e5, 0.2), p.lookup(0.2, 2e5, 0.2), rtol=2e-3)
 
 
@@ -118,7 +118,7 @@ def test_fixed_re_removes_reynolds_and_nothing_else() -> None:
     for Re in (1e3, 4e4, 1.3e5, 1e7):
         np.testing.assert_allclose(q.lookup(p.alpha, Re), want, atol=1e-12)
         np.testing.assert_allclose(q.lookup(a, Re), p.lookup(a, 1.3e5), atol=1e-12)
-    assert q.is_shared and q.key != p.key
+    assert q.on_grid() is q and q.key != p.key
 
 
 def test_blend_is_linear_and_meets_its_ends() -> None:
@@ -160,7 +160,7 @@ def section(request: pytest.FixtureRequest, own_cache: Path) -> tuple[str, Airfo
 
 def test_tunnel_polar_is_closed_and_positive(section: tuple[str, Airfoil, Polar]) -> None:
     _, shape, p = section
-    assert p.is_shared and p.M.tolist() == [0.0]
+    assert p.on_grid() is p and p.M.tolist() == [0.0]
     assert np.array_equal(p.cl[0], p.cl[-1]) and np.array_equal(p.cd[0], p.cd[-1])
     assert p.cd.min() > 0.0 and np.abs(p.cl).max() < 2.5
     assert p.confidence is not None and p.confidence.min() >= 0.0 and p.confidence.max() <= 1.0

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,8 @@ from bemt.commands.cli import main
 from bemt.rotors.k1k2 import U_MEASURED
 from bemt.sweep import batch, fingerprint, sweep
 from bemt.sweep import batch as sweep_module
-from bemt.sweep.agreement import agreement, known, needed
 from bemt.sweep.case import solve_case
+from bemt.sweep.comparison import Comparison
 from bemt.sweep.grid import run as grid_module
 from bemt.sweep.summary import summary
 
@@ -546,10 +547,10 @@ def test_no_flag_is_dropped_from_the_screen() -> None:
 def test_a_flagged_point_is_no_plain_agreement() -> None:
     from bemt.report.verdicts import stand
 
-    line = {"E": 1.0, "D": 100.0, "u_num": 0.0, "u_input": 5.0, "u_model": 0.0, "u_D": 0.5, "u_val": 5.1, "unit": "N"}
-    plain, flagged = line | {"doubts": []}, line | {"doubts": ["supersonic tip"]}
+    plain = Comparison(S=101.0, D=100.0, u_input=5.0, u_D=0.5)
+    flagged = replace(plain, doubts=("supersonic tip",))
     assert stand(plain)[0] == "same" and stand(flagged)[0] != "same" and "supersonic tip" in stand(flagged)[1]
-    assert "supersonic tip" in agreement(flagged) and "supersonic tip" not in agreement(plain)
+    assert "supersonic tip" in flagged.verdict and "supersonic tip" not in plain.verdict
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
@@ -584,14 +585,14 @@ def test_a_screen_of_many_cases_is_still_one_screen() -> None:
 
 @pytest.mark.parametrize("E", [-7.0, 0.3, 4.0])
 def test_agreement_hangs_on_the_uncertainty_that_is_needed(E: float) -> None:
-    c = {"E": E, "D": 20.0, "unit": "N", "u_num": 0.1, "u_input": 0.8, "u_model": 1.5, "u_D": None}
-    least = needed(c)
-    assert math.hypot(known(c), least) >= abs(E) * (1 - 1e-12)
-    assert "u_D unknown" in agreement(c)
-    assert agreement({**c, "u_D": 1.001 * least}) == "not distinguishable from noise"
+    c = Comparison(S=20.0 + E, D=20.0, u_num=0.1, u_input=0.8, u_model=1.5)
+    least = c.needed
+    assert math.hypot(c.known, least) >= abs(E) * (1 - 1e-12)
+    assert "u_D unknown" in c.verdict
+    assert replace(c, u_D=1.001 * least).verdict == "not distinguishable from noise"
     if least:
-        assert agreement({**c, "u_D": 0.999 * least}) == "differs"
-    assert math.isnan(needed({**c, "u_model": None})), "a model without an uncertainty decides nothing"
+        assert replace(c, u_D=0.999 * least).verdict == "differs"
+    assert math.isnan(replace(c, u_model=math.nan).needed), "a model without an uncertainty decides nothing"
 
 
 def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(solved: dict[str, Any]) -> None:

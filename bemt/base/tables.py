@@ -55,6 +55,11 @@ def plain(value: Any, digits: int = 10) -> Any:
     return value
 
 
+def or_null(value: float) -> float | None:
+    """None, which JSON has, for a number that it has not."""
+    return float(value) if math.isfinite(value) else None
+
+
 def json_text(document: Any) -> str:
     """Give a JSON text that depends on nothing but the document."""
     return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -180,9 +180,9 @@ class CampaignRecord:
     def _radial(self, source: Path, names: set[str], table: Any = None) -> None:
         """Put the loads along the radius of some runs into our file: from a table, or from another campaign's file."""
         path = self.folder / "radial.csv"
-        kept = [row for row in _lines(path) if row["run"] not in names]
+        kept = [row for row in csv_rows(path) if row["run"] not in names]
         if table is None:
-            rows: list[dict[str, Any]] = [dict(row) for row in _lines(source) if row["run"] in names]
+            rows: list[dict[str, Any]] = [dict(row) for row in csv_rows(source) if row["run"] in names]
         else:
             rows = _short([dict(zip(RADIAL, (*names, *map(float, row)), strict=True)) for row in table])
         if rows:
@@ -253,7 +253,8 @@ def _balances(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {"balanced": shown, "balance": each}
 
 
-def _lines(path: Path) -> list[dict[str, str]]:
+def csv_rows(path: Path) -> list[dict[str, str]]:
+    """Rows of a table of ours by column; none where there is no file."""
     if not path.is_file():
         return []
     with path.open(newline="", encoding="utf-8") as stream:

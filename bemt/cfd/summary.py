@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from bemt.bem.model import Model
 from bemt.case import Case
 from bemt.case.prepare import prepare_case
 from bemt.case.propagate import parted
+from bemt.cfd.record import csv_rows
 from bemt.cfd.schema import Campaign, load_campaign
 
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
@@ -71,15 +71,8 @@ def _edges(r: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * r[0] - middle[0]], middle, [2 * r[-1] - middle[-1]]])
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
-
-
 def _radial(campaign: Campaign, run: str, found: solver.Solution) -> dict[str, Any] | None:
-    rows = [row for row in _rows(campaign.path.parent / "radial.csv") if row["run"] == run]
+    rows = [row for row in csv_rows(campaign.path.parent / "radial.csv") if row["run"] == run]
     if not rows:
         return None
     names = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
@@ -109,7 +102,7 @@ def summary(folder: str | Path) -> dict[str, Any]:
         manifest_path = path.parent / "manifest.json"
         manifest = json.loads(manifest_path.read_text(encoding="utf-8")) if manifest_path.is_file() else {}
         rows = []
-        for row in _rows(path.parent / "recording.csv"):
+        for row in csv_rows(path.parent / "recording.csv"):
             found = model.solve(campaign, row)
             rows.append({**row, "bemt_thrust_N": float(found.T[0]), "bemt_torque_Nm": float(found.Q[0]),
                          "radial": _radial(campaign, row["run"], found)})  # fmt: skip
@@ -130,30 +123,16 @@ def _number(text: str) -> float:
     return float(text) if text else math.nan
 
 
-def summary_text(document: dict[str, Any], radial: bool = True) -> str:
+def summary_text(document: dict[str, Any]) -> str:
     """Give the summary as tables."""
     lines = []
     keys = ("points", "recorded", "converged", "balanced")
     counts = [[c["name"], *(str(c[key]) for key in keys)] for c in document["campaigns"]]
     counts.append(["all", *(str(sum(int(row[k]) for row in counts)) for k in (1, 2, 3, 4))])
     lines.append(text_table(["campaign", "points", "run", "converged", "and balanced"], counts))
-    head = [
-        "run",
-        "solver",
-        "level",
-        "cells",
-        "rpm",
-        "J",
-        "other",
-        "T [N]",
-        "u",
-        "BEMT",
-        "Q [N m]",
-        "u",
-        "BEMT",
-        "y+",
-        "leak [%]",
-    ]  # the largest residual of mass, momentum and angular momentum; empty where none was written
+    head = ["run", "solver", "level", "cells", "rpm", "J", "other", "T [N]", "u", "BEMT", "Q [N m]", "u", "BEMT", "y+",
+            "leak [%]"]  # fmt: skip
+    # leak: the largest residual of mass, momentum and angular momentum; empty where none was written
     for campaign in document["campaigns"]:
         rows = []
         for row in campaign["rows"]:
@@ -181,9 +160,7 @@ def summary_text(document: dict[str, Any], radial: bool = True) -> str:
                 words.append(f"{key} order {order}, limit {limit}, GCI {gci} %{said}")
             levels = ", ".join(f"{level:g}" for level in study["levels"])
             lines.append(f"  grid study {study['solver']} levels {levels}: {' | '.join(words)}")
-    if radial:
-        lines += _radial_text(document)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_radial_text(document)]) + "\n"
 
 
 def _percent(value: float | None) -> float:

@@ -100,7 +100,7 @@ def _table(args: argparse.Namespace) -> str | None:
     from bemt import readers
     from bemt.base.errors import InputError
     from bemt.readers.cfd_run import KIND as RUN
-    from bemt.recordings.cfd_run import PROGRAMS
+    from bemt.recordings.cfd_files import PROGRAMS
 
     others = ("sector", "zones", "axis", "airspeed", "density", "reference", "setup")
     if len(args.files) != 1 or any(getattr(args, name) for name in others) or Path(args.files[0]).is_dir():

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.tables import or_null
 from bemt.compare.drive_laws import FAMILY, Judgement, law
 from bemt.compare.matched import LOADS
 from bemt.compare.recordings import IN_WIND, RunChange
@@ -179,19 +180,15 @@ def document(change: RunChange) -> dict[str, Any]:
         },
         "ratios": {k: dict(v) for k, v in change.ratios.items()},
         "density": {
-            "A": _finite(change.a.density),
-            "B": _finite(change.b.density),
-            "ratio": _finite(change.density_ratio),
+            "A": or_null(change.a.density),
+            "B": or_null(change.b.density),
+            "ratio": or_null(change.density_ratio),
         },
-        "diameter_m": _finite(change.diameter_m),
+        "diameter_m": or_null(change.diameter_m),
         "points": {"A": len(change.a), "B": len(change.b)},
         "assumed": list(change.assumed),
         "notes": list(change.notes),
     }
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if math.isfinite(x) else None
 
 
 def _ranking(said: Judgement) -> list[dict[str, Any]]:

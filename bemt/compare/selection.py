@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.air import Air
-from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.dataset import Dataset
 from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
-from bemt.recordings.channels import MEASURED, in_one_step, named
+from bemt.recordings.channels import MEASURED, in_one_step, moves, named
 from bemt.recordings.windmilling import zero_thrust_speed
 
 _AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
@@ -187,12 +186,6 @@ def conditions_of(imported: Dataset) -> tuple[str, ...]:
     known |= {k for k in imported.values if k.startswith("u_") or {"err", "rpm", "vibration"} & set(k.split("_"))}
     numbers = [k for k, v in imported.values.items() if k not in known and moves(v)]
     return (*texts, *numbers)
-
-
-def moves(v: Array) -> bool:
-    """Whether a column has more than one value."""
-    finite = v[np.isfinite(v)]
-    return finite.size > 1 and float(np.ptp(finite)) > 0.0
 
 
 LOAD_CHANNELS = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "CQ")

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, moves, one_rotor, speed_in_doubt, wind_of
+from bemt.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
 from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.recordings.channels import named
+from bemt.recordings.channels import moves, named
 from bemt.recordings.reduce import reduce, reduction
 
 _WANTED = (

@@ -28,18 +28,8 @@ _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "CT", "CP
 def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[str] = ()) -> dict[str, Any] | None:
     """Answer for two recordings of CFD of which one has a single speed; None for all others.
 
-    Parameters
-    ----------
-    a, b : str
-        Recordings: run.toml, a folder of exports, or a table of CFD points.
-    rows_a, rows_b : sequence of str
-        Rows to use, as ``rpm=6000``.
-
-    Returns
-    -------
-    dict or None
-        ``bemt.comparison/1`` with the verdict ``insufficient`` and ``points``: at each equal speed and airspeed the
-        loads of both with their standard uncertainties, the difference, and both uncertainties together.
+    ``bemt.comparison/1`` with the verdict ``insufficient`` and ``points``: at each equal speed and airspeed the loads
+    of both with their standard uncertainties, the difference, and both uncertainties together.
     """
     from bemt.recordings.load import import_file
 

@@ -48,11 +48,9 @@ class Optimum:
     converged: bool  # Whether the optimum was reached within the tolerance
 
 
-def section_at_best(
-    model: Model, need: Requirement, r_over_R: float = 0.7
-) -> Callable[[Array], tuple[Array, Array, Array]]:
+def section_at_best(model: Model, need: Requirement) -> Callable[[Array], tuple[Array, Array, Array]]:
     """Lift coefficient, angle and drag over lift of the best lift-to-drag ratio within the stall margin, over Re."""
-    polar = min(model.polars, key=lambda p: abs(p[0] - r_over_R))[1]
+    polar = min(model.polars, key=lambda p: abs(p[0] - 0.7))[1]
     some = np.flatnonzero((polar.alpha >= math.radians(-4.0)) & (polar.alpha <= math.radians(16.0)))
     cl, cd = polar.cl[some, :, 0], polar.cd[some, :, 0]
     top = (1.0 - need.limits.stall_margin) * top_lift(polar)[1]
@@ -93,9 +91,7 @@ def first_speed(need: Requirement) -> float:
     return min(60.0 * tip / (2.0 * math.pi * need.R), 0.95 * need.slow)
 
 
-def problem_of(
-    model: Model, need: Requirement, blade: Blade, rpm0: float | None = None, variants: Sequence[Sequence[Effect]] = ()
-) -> tuple[BladeProblem, Array]:
+def problem_of(model: Model, need: Requirement, blade: Blade, rpm0: float | None = None) -> tuple[BladeProblem, Array]:
     """Problem around a blade, and the variables of that blade."""
     shape, x = Shape.around(blade, model.n_stations)
     guess = rpm0 or first_speed(need)
@@ -104,7 +100,7 @@ def problem_of(
     free = any(p.rpm is None for p in need.points)
     mach = need.limits.max_tip_mach if free else float(fast / need.air.a_sound)
     limited = replace(model, mach_max=min(1.2 * mach, model.mach_max))
-    problem = BladeProblem(need, limited, shape, rpm, tuple(variants) or (model.effects,), 1.0)
+    problem = BladeProblem(need, limited, shape, rpm, (model.effects,), 1.0)
     low, high = problem.chord_range
     nodes = [int(np.argmin(np.abs(np.r_[shape.Rhub, shape.r, shape.R] / shape.R - n))) for n in shape.nodes]
     x[:CONTROLS] = np.clip(x[:CONTROLS], low[nodes] + 1e-3, high[nodes])

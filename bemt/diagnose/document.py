@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt import __version__, effects
-from bemt.base.tables import text_table
+from bemt.base.tables import or_null, text_table
 from bemt.compare.change_document import document as change_document
 from bemt.compare.contrast_text import families
 from bemt.compare.contrast_text import headline as change_headline
@@ -54,10 +54,6 @@ _WORTH_SAYING = 0.05
 _PERCENT = (0.5, 2.0)
 
 
-def _number(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None
-
-
 def document(d: Diagnosis) -> dict[str, Any]:
     """Give the document."""
     found = d.found
@@ -82,7 +78,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "by_the_case": own | {"ranking": ranking} if d.by_ratios else None,
         "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
         "location": d.where.document(),
-        "fit": {c: {k: _number(v) for k, v in s.items()} for c, s in d.scores.items()},
+        "fit": {c: {k: or_null(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
         "sets": [list(s) for s in said.sets],
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
@@ -98,7 +94,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "rule": said.why,
         "rule_name": said.rule,
         "headline": headline(d),
-        "left_over": _number(d.decision.left_over),
+        "left_over": or_null(d.decision.left_over),
         "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
         "validity": list(d.problem.validity),

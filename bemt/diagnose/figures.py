@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank
+from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
 from bemt.base.tables import write_atomic
 from bemt.diagnose import figures_effects, figures_posterior
 from bemt.diagnose.document import headline
@@ -77,7 +77,7 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
                 (out / f"{name}.{kind}").unlink(missing_ok=True)
             if figure is not None:
                 written.append(out / f"{name}.png")
-                write_atomic(written[-1], _page(figure))
+                write_atomic(written[-1], slim(png(figure, DPI, optimize=True)))
     return written
 
 
@@ -87,23 +87,16 @@ def _views(answer: Diagnosis, cases: Sequence[Case]) -> list[PredictionView]:
     return first_picture(records, cases) if len(cases) in (1, len(records)) else []
 
 
-def _page(figure: Figure) -> bytes:
-    """PNG of a figure; the same figure gives the same bytes."""
-    png = io.BytesIO()
-    figure.savefig(png, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"optimize": True})
-    return slim(png.getvalue())
-
-
-def slim(png: bytes) -> bytes:
+def slim(whole: bytes) -> bytes:
     """PNG with fewer colours until it is small enough."""
     from PIL import Image
 
-    small = png
+    small = whole
     for colours in (256, 64, 16):
         if len(small) <= LARGEST:
             break
         page = io.BytesIO()
-        with Image.open(io.BytesIO(png)) as image:
+        with Image.open(io.BytesIO(whole)) as image:
             image.convert("RGB").quantize(colours).save(page, format="png", optimize=True)
         small = page.getvalue()
     return small

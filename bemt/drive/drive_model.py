@@ -237,9 +237,9 @@ class Drive:
         return Steady(pulse, used, kept(omega * 30.0 / math.pi), kept(thrust), kept(torque), kept(amps), kept(bus),
                       kept(volts), kept(power), kept(eta), used < duty, inside)  # fmt: skip
 
-    def pulse_for(self, thrust_N: float, soc: float = 1.0, temperature_C: float | None = None) -> float:
+    def pulse_for(self, thrust_N: float, soc: float = 1.0) -> float:
         """Pulse width that gives a thrust. [us]"""
-        return float(self.pulses_for(thrust_N, np.array([soc]), temperature_C)[0])
+        return float(self.pulses_for(thrust_N, np.array([soc]))[0])
 
     def pulses_for(self, thrust_N: float, soc: Array, temperature_C: float | None = None) -> Array:
         """Pulse widths that give a thrust at (N,) states of charge, NaN where none does. [us]"""

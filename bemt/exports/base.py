@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +14,6 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.exports.hub import CHECK_ANGLES, HubTable, hub_of
 from bemt.exports.performance import (
-    THINNER,
     Loading,
     Performance,
     StatedBand,
@@ -42,7 +40,6 @@ __all__ = [
     "Job",
     "LoadsExport",
     "SolidExport",
-    "entry",
 ]
 
 Files = Mapping[str, str | bytes]
@@ -479,74 +476,3 @@ class BladeExport(Export):
             "band": job.band_at_point.document(),
             "range": {"rpm": p.rpm, "airspeed_m_s": p.airspeed_m_s, "density_kg_m3": p.rho},
         }
-
-
-HUB_NOTE = (
-    "steady, stiff blades; moments come out too large, because the inflow that they cause themselves is left out; "
-    "neither H, Y nor the moments have been compared with a measurement"
-)
-
-
-def _lost(export: Export, job: Job) -> list[str]:
-    """What the target does not hold, for its notes: direction of rotation, Reynolds number, the end of a table."""
-    out = []
-    if "rotation" not in export.features:
-        out.append(f"the direction of rotation is not in the file: this rotor is {job.rotation}")
-    if export.kind != "loads":
-        return out
-    if "hub" not in export.features:
-        out.append("loads across the shaft are not in the file: no H force, no hub moments, thrust as in axial flow")
-    elif job.case.ducted:
-        out.append("a ducted rotor has no loads across the shaft here: its hub loads are 0")
-    else:
-        out.append(f"loads across the shaft: {HUB_NOTE}")
-    air, (thrust, torque) = job.case.air(), job.thinner
-    out.append(
-        f"the coefficients hold the Reynolds numbers of the case's air ({air.rho:.4g} kg/m3): at {THINNER:g} of that "
-        f"density, static CT would be {100 * thrust:+.2g} %, CP {100 * torque:+.2g} %"
-    )
-    if {"windmill", "reynolds"} <= export.features:
-        t = job.performance
-        out.append(
-            f"the table covers each speed up to {t.range_document()['airspeed_m_s_greatest']:.3g} m/s and descent to J "
-            f"{t.J[0]:.2g}; beyond, the last coefficient is held, so the drag of a windmill stops growing with airspeed"
-        )
-    return out
-
-
-def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
-    """Manifest entry of one target.
-
-    Parameters
-    ----------
-    export : Export
-        The target.
-    job : Job
-        What was asked.
-    files : mapping
-        What it wrote.
-
-    Returns
-    -------
-    dict
-        What a reader of the files must know, and a hash of each.
-    """
-    found: dict[str, Any] = {
-        "target": export.id,
-        "title": export.title,
-        "kind": export.kind,
-        "holds": export.holds,
-        "features": sorted(export.features),
-        "conventions": export.conventions,
-        "rotation": job.rotation,
-        "source": export.source,
-    }
-    found |= export.checked(job, files)
-    if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
-        found["full_throttle"] = job.full_throttle
-    found["notes"] = export.notes(job) + _lost(export, job)
-    found["files"] = [
-        {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
-        for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
-    ]
-    return found

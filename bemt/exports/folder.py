@@ -13,7 +13,8 @@ from bemt.base.tables import file_hash, number_text, plain, text_table, write_at
 from bemt.base.toml import shown
 from bemt.case import Case, find_cases, load_case, repeated_names
 from bemt.exports import exports
-from bemt.exports.base import FEATURES, Job, entry
+from bemt.exports.base import FEATURES, Job
+from bemt.exports.manifest import entry
 from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
 from bemt.exports.printing import Print, faults_of, printable
 from geometry.common import GeometryError

@@ -73,13 +73,7 @@ def _printed(request: Print, ducted: bool) -> Printed:
 
 
 def printable(case: Case, request: Print) -> tuple[list[tuple[str, Rotor]], Options]:
-    """Rotors with what their file names end in, and how they are made.
-
-    Raises
-    ------
-    GeometryError
-        Where the request and the case make no rotor.
-    """
+    """Rotors with what their file names end in, and how they are made; GeometryError where none can be made."""
     rotor = case.rotor()
     if request.hub_diameter_mm is not None:
         rotor = replace(rotor, blade=replace(rotor.blade, Rhub=0.5e-3 * request.hub_diameter_mm))

@@ -17,11 +17,12 @@ from bemt.flight.balance import axes_of, features
 from bemt.flight.change import FlightChange, change_in
 from bemt.flight.identify import Constant, Identified, identify
 from bemt.flight.inflow import Inflow, inflow
-from bemt.flight.judge import FALSE_ALARM, BesideBalance, FlightVerdict, judge
+from bemt.flight.judge import FALSE_ALARM, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
 from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
+from bemt.flight.rules import BesideBalance
 from bemt.flight.simulator import simulator_constants
 from bemt.flight.vibration import Vibration, shaken, vibration
 from bemt.flight.wind import Wind, wind
@@ -133,32 +134,11 @@ def answer_on(
     healthy_mass_kg: float | None = None,
     false_alarm: float = FALSE_ALARM,
 ) -> FlightAnswer:
-    """Identify and judge one flight.
+    """Identify and judge one flight, with healthy flights of the same vehicle.
 
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    healthy : sequence of FlightLog
-        Healthy flights of the same vehicle.
-    mass_kg : float or None
-        Mass of this flight with battery [kg].
-    layout : str
-        As :func:`bemt.flight.layout.layout_of` takes it; empty: the usual one of the format.
-    healthy_mass_kg : float or None
-        Mass of the healthy flights [kg]; gives the mass of this one.
-    false_alarm : float
-        Accepted probability that a healthy flight is accused [1].
-
-    Returns
-    -------
-    FlightAnswer
-        In SI units but for speeds [rev/min].
-
-    Raises
-    ------
-    InputError
-        When logs have another number of rotors, or the layout does not fit.
+    Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
+    `false_alarm` is the accepted probability that a healthy flight is accused [1]. InputError when logs have another
+    number of rotors, or the layout (as :func:`bemt.flight.layout.layout_of` takes it) does not fit.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
     if others:

@@ -16,20 +16,8 @@ BATCHES = 10
 
 
 def u_of_mean(values: ArrayLike) -> float:
-    """Standard uncertainty of the mean of a series.
+    """Standard uncertainty of the mean of a series in order of time, 10 values or more.
 
-    Parameters
-    ----------
-    values : (N,) float
-        In order of time, 10 or more.
-
-    Returns
-    -------
-    float
-        In their unit.
-
-    Examples
-    --------
     >>> u_of_mean(np.ones(40))
     0.0
     """
@@ -40,18 +28,6 @@ def u_of_mean(values: ArrayLike) -> float:
 def half_width(of_batches: ArrayLike) -> float:
     """Half width of the 95 % interval of a mean, from its value in each batch.
 
-    Parameters
-    ----------
-    of_batches : (n,) float
-        One value a batch.
-
-    Returns
-    -------
-    float
-        In their unit.
-
-    Examples
-    --------
     >>> round(half_width([1.0, 2.0, 3.0]), 3)
     2.484
     """
@@ -62,22 +38,8 @@ def half_width(of_batches: ArrayLike) -> float:
 
 
 def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares, with standard uncertainties from ten fits that each leave out a tenth of the time.
+    """Least squares of readings in order of time, with standard uncertainties from ten fits that each lack a tenth.
 
-    Parameters
-    ----------
-    X : (N, k) float
-        Columns.
-    y : (N,) float
-        Readings, in order of time.
-
-    Returns
-    -------
-    ((k,) float, (k,) float)
-        Coefficients and their standard uncertainties.
-
-    Examples
-    --------
     >>> x = np.linspace(0.0, 1.0, 50)
     >>> jackknifed(x[:, None], 2.0 * x)[0]
     array([2.])

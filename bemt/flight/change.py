@@ -35,23 +35,10 @@ class FlightChange:
 
 
 def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
-    """Find a change within a flight.
-
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    layout : (B, 3) float or None
-        As :func:`bemt.flight.layout.layout_of` gives it.
-
-    Returns
-    -------
-    FlightChange or None
-        The clearest one; None where there is none, or under 20 blocks of half a second in the air.
-    """
+    """The clearest change within a flight; None where there is none, or under 20 blocks in the air."""
     from scipy import stats
 
-    drive = log.command if log.command is not None else None if log.rpm is None else log.rpm**2
+    drive = log.drive
     if drive is None or log.rotors < 3:
         return None
     found = _blocks(log, drive)

@@ -43,20 +43,7 @@ class Identified:
 
 
 def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
-    """Identify what the flight shows.
-
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    mass_kg : float or None
-        Mass with battery [kg]; None: constants are per kilogram.
-
-    Returns
-    -------
-    Identified
-        Constants with bands, in SI units but for speeds [rev/min].
-    """
+    """Identify what the flight shows; without a mass with battery [kg] constants are per kilogram."""
     on = log.flying
     out: dict[str, Constant] = {}
     rotors: dict[str, tuple[float, ...]] = {}

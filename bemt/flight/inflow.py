@@ -35,18 +35,7 @@ class Inflow:
 
 
 def inflow(log: FlightLog) -> Inflow | None:
-    """Regress the thrust constant on the flow.
-
-    Parameters
-    ----------
-    log : FlightLog
-        With speeds, accelerometer, velocity and attitude.
-
-    Returns
-    -------
-    Inflow or None
-        None where a channel is missing or the flight is short.
-    """
+    """Regress the thrust constant on the flow; None where a channel is missing or the flight is short."""
     from scipy import stats
 
     on = log.flying

@@ -49,28 +49,11 @@ the same (src/lib/mixer/MultirotorMixer/geometries). px4-x and quad-x are one.
 
 
 def layout_of(text: str, rotors: int) -> Array | None:
-    """Angles, turning and arms.
+    """Angle [rad], turning (+1 or -1) and arm [unit of the text; 1] of each rotor of a log, (B, 3); None for no text.
 
-    Parameters
-    ----------
-    text : str
-        A name of :data:`LAYOUTS`, or angles with signs such as ``"-45+ 135+ 45- -135-"`` [deg], each with its arm where
-        arms differ: ``"-30@0.29+"`` [any unit]; empty: not known.
-    rotors : int
-        Number of rotors in the log.
+    `text` is a name of :data:`LAYOUTS`, or angles with signs such as ``"-45+ 135+ 45- -135-"`` [deg], each with its arm
+    where arms differ: ``"-30@0.29+"``. InputError for another number of rotors or an unknown word.
 
-    Returns
-    -------
-    (B, 3) float or None
-        Angle [rad], turning, +1 or -1 [1], arm [unit of the text; 1].
-
-    Raises
-    ------
-    InputError
-        For another number of rotors or an unknown word.
-
-    Examples
-    --------
     >>> layout_of("crazyflie", 4)[:, 1]
     array([ 1., -1.,  1., -1.])
     """
@@ -88,22 +71,8 @@ def layout_of(text: str, rotors: int) -> Array | None:
 
 
 def layout_text(ahead: ArrayLike, left: ArrayLike, turning: Sequence[float]) -> str:
-    """Layout from places, in the form that :func:`layout_of` reads.
+    """Layout from places [m] and turning (above zero: to the left, seen from above), as :func:`layout_of` reads it.
 
-    Parameters
-    ----------
-    ahead, left : (B,) float
-        Places [m].
-    turning : (B,) float
-        Above zero: to the left, seen from above.
-
-    Returns
-    -------
-    str
-        Angles [deg] with arms and signs.
-
-    Examples
-    --------
     >>> layout_text([0.1, -0.1], [0.0, 0.0], [1, -1])
     '0@0.1+ 180@0.1-'
     """
@@ -113,17 +82,9 @@ def layout_text(ahead: ArrayLike, left: ArrayLike, turning: Sequence[float]) -> 
 
 
 def effect_matrix(layout: Array) -> Array:
-    """Loads per rotor thrust, scaled to the mean arm.
+    """Loads per rotor thrust, scaled to the mean arm, (4, B) [1].
 
-    Parameters
-    ----------
-    layout : (B, 3) float
-        Angle [rad], turning [1], arm [any unit].
-
-    Returns
-    -------
-    (4, B) float
-        Rows: roll to the right, pitch nose up (rotors ahead lift the nose), yaw reaction, total [1].
+    Rows: roll to the right, pitch nose up (rotors ahead lift the nose), yaw reaction, total.
     """
     angle, turn, arm = layout.T
     arm = arm / arm.mean()

@@ -63,6 +63,11 @@ class FlightLog:
         return 0 if drive is None else drive.shape[1]
 
     @property
+    def drive(self) -> Array | None:
+        """What each rotor's thrust is in proportion to, (N, B): its command, else its squared speed."""
+        return self.command if self.command is not None else None if self.rpm is None else self.rpm**2
+
+    @property
     def flying(self) -> NDArray[np.bool_]:
         """Samples in the air, (N,): motors on, off the ground where a height is known, without the first moments."""
         drive = self.command if self.command is not None else self.rpm
@@ -83,20 +88,8 @@ class FlightLog:
 
 
 def thrust_axis(q: Array) -> Array:
-    """The body's z axis in axes of the world.
+    """The body's z axis in axes of the world, (N, 3), from unit quaternions body to world, scalar first, (N, 4).
 
-    Parameters
-    ----------
-    q : (N, 4) float
-        Unit quaternions from body to world, scalar first [1].
-
-    Returns
-    -------
-    (N, 3) float
-        Unit vectors [1].
-
-    Examples
-    --------
     >>> thrust_axis(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))[:, 2]
     array([ 1., -1.])
     """
@@ -127,25 +120,10 @@ class Stretches(Generic[T]):
 def joined(
     file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
 ) -> FlightLog:
-    """Put sources with clocks of their own on one time base, linearly.
+    """Put sources (times, values) with clocks of their own on one time base, linearly; units as in :class:`FlightLog`.
 
-    Parameters
-    ----------
-    file, kind : str
-        For the log.
-    sources : mapping of str to (times, values) or None
-        Times (M,) [s]; values (M,) or (M, k) in units of :class:`FlightLog`.
-    main : str
-        Source whose times are kept; of more than 200,000 as many, evenly spread.
-    raw : (times, values) or None
-        Accelerometer or gyro that keeps its own times.
-    **more : str
-        Further attributes of the log.
-
-    Raises
-    ------
-    InputError
-        When fewer than 20 whole samples remain.
+    The times of `main` are kept; of more than 200,000 as many, evenly spread. `raw` keeps its own. InputError when
+    fewer than 20 whole samples remain.
     """
     clean = {}
     for key, source in sources.items():

@@ -22,19 +22,9 @@ degrees of freedom it counts as, and the exponent with its uncertainty (an assum
 
 
 def speed_changes(log: FlightLog, healthy: Sequence[FlightLog]) -> tuple[tuple[int, float], ...]:
-    """Motors that turn faster or slower at their drive than in healthy flights.
+    """Motors (0 is the first) that turn faster or slower at their drive than in healthy flights, by what share [1].
 
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    healthy : sequence of FlightLog
-        Healthy flights of the same vehicle.
-
-    Returns
-    -------
-    tuple of (int, float)
-        Motor (0 is the first) and relative change of its speed [1]; empty without speeds and commands in all logs.
+    Empty without speeds and commands in all logs.
     """
     from scipy import stats
 

@@ -13,22 +13,7 @@ _HOVER = "hover 30 s in still air and judge that flight"
 
 
 def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
-    """Choose the next step.
-
-    Parameters
-    ----------
-    said : Decision
-        On the flight.
-    layout : (B, 3) float or None
-        As :func:`bemt.flight.layout.layout_of` gives it.
-    given : int
-        Healthy flights to compare with.
-
-    Returns
-    -------
-    Suggestion
-        A flight ("run"), healthy flights ("reference") or something to look at ("look").
-    """
+    """Choose the next step after a decision that compared with so many `given` healthy flights."""
     motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
     others = [i for i in said.effects if not i.startswith(BLADE)]
     several = "s" if len(motors) > 1 else ""

@@ -2,57 +2,38 @@
 
 from __future__ import annotations
 
-import io
 import re
 import textwrap
 from typing import Any
 
 import numpy as np
 
+from bemt.base import canvas
+from bemt.base.canvas import BLUE, GREEN, ORANGE
 from bemt.base.units import G0
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.text import headline
 
-_BLUE, _ORANGE, _GREEN = "#0072B2", "#E69F00", "#009E73"
-_LINES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
+_LINES = canvas.CYCLE[:6]
 
 
 def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
-    """Draw a flight.
-
-    Parameters
-    ----------
-    answer : FlightAnswer
-        The answer.
-    mass_kg : float or None
-        Mass [kg]; None: loads are per kilogram.
-
-    Returns
-    -------
-    bytes
-        PNG.
-    """
+    """Draw a flight, PNG; without a mass [kg] loads are per kilogram."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     with mpl.rc_context({"font.size": 10.5, "axes.labelsize": 10.0, "legend.fontsize": 9.0, "axes.titlesize": 10.5}):
-        figure = Figure(figsize=(7.6, 6.6), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = canvas.figure(7.6, 6.6)
         axes = figure.subplots(2, 2)
         for ax in axes.flat:
             ax.locator_params(axis="x", nbins=5)
-            ax.grid(True, alpha=0.3)
-            ax.spines[["top", "right"]].set_visible(False)
+            canvas.frame(ax)
         _thrust(axes[0, 0], answer, mass_kg)
         _flow(axes[0, 1], answer)
         _drives(axes[1, 0], answer)
         _balance(axes[1, 1], answer)
         title = f"{answer.log.format}, {answer.log.rotors} rotors\n{textwrap.fill(headline(answer.judged), 88)}"
         figure.suptitle(title, fontsize=11.0)
-        out = io.BytesIO()
-        figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
-    return out.getvalue()
+        return canvas.png(figure, dpi=130)
 
 
 def _empty(ax: Any, text: str) -> None:
@@ -69,8 +50,8 @@ def _flow(ax: Any, answer: FlightAnswer) -> None:
             "speeds,\naccelerometer, velocity and attitude",
         )
         return
-    parts = ((flow.axial, flow.bins[0], said.axial if said else None, _BLUE, "along the axis"),
-             (flow.inplane, flow.bins[1], said.inplane if said else None, _GREEN, "in the plane"))  # fmt: skip
+    parts = ((flow.axial, flow.bins[0], said.axial if said else None, BLUE, "along the axis"),
+             (flow.inplane, flow.bins[1], said.inplane if said else None, GREEN, "in the plane"))  # fmt: skip
     for got, bins, model, colour, name in parts:
         if got is None or not bins.size:
             continue
@@ -126,14 +107,14 @@ def _thrust(ax: Any, answer: FlightAnswer, mass_kg: float | None) -> None:
     power = 2 if speeds else 1
     c = answer.found.constants.get(name)
     if c is not None:
-        ax.plot(grid, c.value * grid**power, color=_BLUE, label="flight")
+        ax.plot(grid, c.value * grid**power, color=BLUE, label="flight")
         ax.fill_between(grid, (c.value - c.half) * grid**power, (c.value + c.half) * grid**power,
-                        color=_BLUE, alpha=0.25, lw=0)  # fmt: skip
+                        color=BLUE, alpha=0.25, lw=0)  # fmt: skip
     if answer.predicted is not None and speeds and mass_kg is not None:
         k, u = answer.predicted.constant, answer.predicted.u
-        ax.plot(grid, k * grid**2, color=_ORANGE, label="model")
-        ax.fill_between(grid, (k - 2 * u) * grid**2, (k + 2 * u) * grid**2, color=_ORANGE, alpha=0.2, lw=0)
-    ax.plot([x.mean()], [m * G0 / B], "D", color=_GREEN, label="weight over rotors")
+        ax.plot(grid, k * grid**2, color=ORANGE, label="model")
+        ax.fill_between(grid, (k - 2 * u) * grid**2, (k + 2 * u) * grid**2, color=ORANGE, alpha=0.2, lw=0)
+    ax.plot([x.mean()], [m * G0 / B], "D", color=GREEN, label="weight over rotors")
     ax.set_xlabel(
         "speed [rev/min]"
         if speeds

@@ -13,22 +13,9 @@ _READERS = (crazyflie, px4, ardupilot, table)
 
 
 def read_log(path: str | os.PathLike[str]) -> FlightLog:
-    """Read a flight log: Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV.
+    """Read a flight log by its content: Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV.
 
-    Parameters
-    ----------
-    path : path
-        File; its name does not matter.
-
-    Returns
-    -------
-    FlightLog
-        Commands, speeds and motion on one time base, in units of that class.
-
-    Raises
-    ------
-    InputError
-        For a file that is no flight log, or damaged before its first twenty samples.
+    InputError for a file that is no flight log, or damaged before its first twenty samples.
     """
     if Path(path).is_dir():
         raise InputError(Fault(os.fspath(path), "", "a folder", "one flight log", "Name the file in it"))

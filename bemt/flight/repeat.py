@@ -18,20 +18,10 @@ SCATTER_FREE = 3
 
 
 def flight_scatter(values: ArrayLike) -> tuple[float, float]:
-    """Relative standard deviation between flights, and Student's factor of its 95 % interval.
+    """Relative standard deviation of a constant between flights, and Student's factor of its 95 % interval.
 
-    Parameters
-    ----------
-    values : (n,) float
-        The constant in each flight of the same vehicle; one value, or none, leaves the prior.
+    One value, or none, leaves the prior.
 
-    Returns
-    -------
-    (float, float)
-        Relative standard deviation [1]; two-sided 95 % factor [1].
-
-    Examples
-    --------
     >>> flight_scatter([1.0])[0]
     0.007
     >>> flight_scatter([1.0, 1.0, 1.0, 1.0])[0] < 0.007

@@ -22,29 +22,11 @@ AIR = 0.03
 
 
 def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Identified]) -> AsMeasured:
-    """Condition the rotor of a case on hovering flights, one point a flight.
+    """Condition the rotor of a case on hovering flights, one point a flight, by the names of their logs.
 
     Thrust is that of the rotor where it sits: body in its wash and neighbours included. Flights differ by what
-    :func:`bemt.flight.repeat.flight_scatter` says; all share the uncertainty of the density.
-
-    Parameters
-    ----------
-    case : Case
-        Case of the propeller.
-    files : sequence of str
-        Names of the logs.
-    flights : sequence of Identified
-        What was identified of each, with the mass.
-
-    Returns
-    -------
-    AsMeasured
-        As :func:`bemt.compare.as_measured.as_measured` gives it.
-
-    Raises
-    ------
-    InputError
-        When a flight has no thrust constant in N/rpm^2, or one that is not of this propeller.
+    :func:`bemt.flight.repeat.flight_scatter` says; all share the uncertainty of the density. InputError when a flight
+    has no thrust constant in N/rpm^2, or one that is not of this propeller.
     """
     faults, k, own, rpm = [], [], [], []
     for file, flight in zip(files, flights, strict=True):

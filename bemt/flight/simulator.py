@@ -18,21 +18,11 @@ _SLOWEST_S, _LEAST_SEEN = 0.5, 0.5  # longest lag tried [s]; share of the varian
 
 
 def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant]:
-    """Constants in the units of simulators.
+    """Constants in the units of simulators, those that the flight shows.
 
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    found : Identified
-        What was identified of it.
-
-    Returns
-    -------
-    dict of str to Constant
-        Thrust constant [N/(rad/s)^2], hover speed [rad/s], hover command, torque constant over yaw inertia
-        [(rad/s^2)/(rad/s)^2], motor time constant [s]; those that the flight shows. The band of the thrust constant
-        holds what flights of one vehicle differ by; the others are of this flight.
+    Thrust constant [N/(rad/s)^2], hover speed [rad/s], hover command, torque constant over yaw inertia
+    [(rad/s^2)/(rad/s)^2], motor time constant [s]. The band of the thrust constant holds what flights of one vehicle
+    differ by; the others are of this flight.
     """
     out: dict[str, Constant] = {}
     k = found.constants.get("thrust constant")
@@ -63,21 +53,12 @@ def simulator_constants(log: FlightLog, found: Identified) -> dict[str, Constant
 
 
 def motor_lag(log: FlightLog) -> Constant | None:
-    """Time constant of a first-order lag from command (times voltage) to speed, all motors together.
+    """Time constant of a first-order lag from command (times voltage) to speed, all motors together [s].
 
-    The lag whose response to the logged command fits the logged speed best (output error, Ljung, System
-    Identification, 2nd ed., section 4.2), apart from level, gain and trend of each motor.
-
-    Parameters
-    ----------
-    log : FlightLog
-        With commands and speeds.
-
-    Returns
-    -------
-    Constant or None
-        With the 95 % half width from ten blocks [s]; None where the log does not show it: no speeds, sampled too
-        slowly, hardly any motion, or another cause of most of the change of speed.
+    The lag whose response to the logged command fits the logged speed best (output error, Ljung, System Identification,
+    2nd ed., section 4.2), apart from level, gain and trend of each motor. The 95 % half width is from ten blocks. None
+    where the log does not show it: no speeds, sampled too slowly, hardly any motion, or another cause of most of the
+    change of speed.
     """
     from scipy.optimize import minimize_scalar
 

@@ -7,7 +7,8 @@ import numpy as np
 from bemt.diagnose.verdict import BESIDE_IT, Decision
 from bemt.flight.answer import FlightAnswer
 from bemt.flight.identify import Constant
-from bemt.flight.judge import IN_FLIGHT, FlightVerdict
+from bemt.flight.judge import FlightVerdict
+from bemt.flight.rules import IN_FLIGHT
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 

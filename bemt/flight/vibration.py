@@ -47,17 +47,9 @@ class Vibration:
 
 
 def vibration(log: FlightLog) -> Vibration:
-    """Amplitudes at the rotors' frequencies, in flight.
+    """Amplitudes at the rotors' frequencies in flight, in the unit of the sensor: raw accelerations, or rates.
 
-    Parameters
-    ----------
-    log : FlightLog
-        With raw accelerations (or rates), and speeds where the rotors are to be told apart.
-
-    Returns
-    -------
-    Vibration
-        In the unit of the sensor.
+    Rotors are told apart where their speeds are logged.
     """
     on = log.flying
     speeds = None if log.rpm is None else log.rpm / 60.0
@@ -171,18 +163,8 @@ def _line(power: Array, low: int, high: int) -> float:
 def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, float, bool], ...]:
     """Rotors that shake more than in healthy flights, or than the others where none is given.
 
-    Parameters
-    ----------
-    mine : Vibration
-        Of the flight.
-    healthy : sequence of Vibration
-        Of healthy flights of the same vehicle.
-
-    Returns
-    -------
-    tuple of (int, float, bool)
-        Rotor (0 is the first; -1: all together, where they cannot be told apart), ratio of its amplitude at the shaft
-        frequency [1], whether healthy flights say so.
+    Rotor (0 is the first; -1: all together, where they cannot be told apart), ratio of its amplitude at the shaft
+    frequency [1], whether healthy flights say so.
     """
     from scipy import stats
 

@@ -49,19 +49,9 @@ class Wind:
 
 
 def wind(log: FlightLog, calm: Sequence[FlightLog]) -> Wind:
-    """Estimate the mean wind.
+    """Estimate the mean wind from velocity and a residual force or the attitude, against flights without wind.
 
-    Parameters
-    ----------
-    log : FlightLog
-        With velocity, and a residual force or the attitude.
-    calm : sequence of FlightLog
-        Flights of the same vehicle without wind.
-
-    Returns
-    -------
-    Wind
-        Median and interval of the posterior; NaN with the reason where the log does not show it [m/s].
+    Median and interval of the posterior [m/s]; NaN with the reason where the log does not show it.
     """
     by_force = any(one.axis is None for one in (log, *calm))
     mine = _horizontal(log, by_force)

@@ -9,22 +9,11 @@ from bemt.base.arrays import Array
 
 
 def smooth(*axes: tuple[Array, float], to: tuple[Array, ...] | None = None) -> Array:
-    """Squared-exponential kernel of unit variance (Rasmussen and Williams 2006, eq. 4.9).
+    """Squared-exponential kernel of unit variance (Rasmussen and Williams 2006, eq. 4.9), (N, N), or (N, P) to others.
 
-    Parameters
-    ----------
-    *axes : ((N,) float, float)
-        Coordinate and its length scale, of the same unit.
-    to : tuple of (P,) float, optional
-        Coordinates of other points; the same points by default.
+    exp(-sum of squared distances over lengths / 2); each axis is a coordinate (N,) and its length scale, of the same
+    unit.
 
-    Returns
-    -------
-    (N, N) or (N, P) float
-        exp(-sum of squared distances over lengths / 2) [1].
-
-    Examples
-    --------
     >>> np.round(smooth((np.array([0.0, 2.0]), 2.0)), 6).tolist()
     [[1.0, 0.606531], [0.606531, 1.0]]
     """

@@ -68,19 +68,9 @@ class Whitener:
 
 
 def whitener(covariance: Array, u: Array | None = None) -> Whitener:
-    """Factor a covariance, (M, M).
+    """Factor a covariance, (M, M), symmetric and positive definite, else numpy.linalg.LinAlgError.
 
-    Parameters
-    ----------
-    covariance : (M, M) float
-        Symmetric, positive definite.
-    u : (M,) float, optional
-        Standard deviations of the readings; 1e-4 of them is added, so that a singular one has a factor.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the covariance is not positive definite.
+    1e-4 of the standard deviations of the readings `u` (M,) is added, so that a singular one has a factor.
     """
     if u is not None:
         covariance = covariance + np.diag((_JITTER * u) ** 2)

@@ -63,9 +63,7 @@ def _sign(rng: np.random.Generator) -> float:
     return float(rng.choice((-1.0, 1.0)))
 
 
-def _world(
-    name: str, size: float, parameter: str = "", unit: str = "1", signed: bool = False, turned: bool = False
-) -> Make:
+def _world(name: str, size: float, parameter: str = "", unit: str = "1", signed: bool = False) -> Make:
     """Make a field of the world of this size."""
 
     def make(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:

@@ -10,7 +10,6 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -79,12 +78,7 @@ def follow(out: Path, jobs: int = 2, say: Callable[[str], None] | None = None) -
         told = {"set": entry["set"], "rig": entry["rig"], "before": before, "step": step, "after": after}
         return told | {"said": said, "error": "" if answer else error[-500:]}
 
-    found = []
-    with ThreadPoolExecutor(jobs) as pool:
-        for k, row in enumerate(pool.map(one, todo), 1):
-            found.append(row)
-            if say:
-                say(f"followed {k}/{len(todo)}")
+    found = prove.on_threads(one, todo, jobs, prove.teller("followed", say))
     document = {"schema": SCHEMA, "followed": found}
     write_atomic(out / "followed.json", json_text(document))
     write_atomic(out / "followed.txt", text(document) + "\n")

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,8 +24,10 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
-__all__ = ["SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "proof", "prove"]
+__all__ = ["SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "teller"]
 
+T = TypeVar("T")
+R = TypeVar("R")
 SCHEMA, KEY_SCHEMA = "bemt.proof/1", "bemt.key/1"
 REAL = "real"
 """Size of the run on published recordings."""
@@ -50,7 +52,7 @@ def conceal(
     entries = []
     drawn: Iterable[items.Item] = (
         real.draw_real(np.random.default_rng(seed)) if size == REAL
-        else draw.draw_items(draw.SIZES[size], seed, known, standard, _teller("concealed", say), jobs)
+        else draw.draw_items(draw.SIZES[size], seed, known, standard, teller("concealed", say), jobs)
     )  # fmt: skip
     for k, item in enumerate(drawn):
         name = f"{k:04d}"
@@ -68,8 +70,19 @@ def conceal(
                            "items": entries})  # fmt: skip
 
 
-def _teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
+def teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
+    """Progress by number as a line of words."""
     return lambda done, n: say(f"{what} {done}/{n}") if say else None
+
+
+def on_threads(one: Callable[[T], R], todo: Sequence[T], jobs: int, tell: Callable[[int, int], None]) -> list[R]:
+    """Results of tasks, in order; each is told of once it and all before it are done."""
+    found = []
+    with ThreadPoolExecutor(jobs) as pool:
+        for result in pool.map(one, todo):
+            found.append(result)
+            tell(len(found), len(todo))
+    return found
 
 
 def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
@@ -113,9 +126,9 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
 
     Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
     """
-    _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, _teller("diagnosed", say))
+    _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, teller("diagnosed", say))
     asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.answer(out / "answers" / f"{f.name}.json"))]
-    _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, _teller("reference given", say))
+    _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, teller("reference given", say))
 
 
 def asks(answer: Mapping[str, Any] | None) -> bool:
@@ -138,9 +151,7 @@ def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: C
         document = {"answer": answer, "error": "" if answer else words[-2000:], "seconds": time.monotonic() - began}
         write_atomic(answers / f"{folder.name}.json", json.dumps(document))
 
-    with ThreadPoolExecutor(jobs) as pool:
-        for k, _ in enumerate(pool.map(one, todo), 1):
-            tell(k, len(todo))
+    on_threads(one, todo, jobs, tell)
 
 
 def proof(out: Path, digest: str | None = None) -> dict[str, Any]:

@@ -12,55 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from bemt.base import units
+from bemt.readers._unit_text import FORCES, TWO_MEANINGS, WEIGHTS, si_name, unit_for, unit_of, weight_of
 from bemt.readers._words import english, plain, quantities
 
-_SAME = {
-    "sec": "s", "seconds": "s", "msec": "ms", "rev/min": "rpm", "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm",
-    "r/min": "rpm", "u/min": "rpm", "rad/s": "rad_s", "rev/s": "rev_s", "rps": "rev_s", "m/s": "m_s", "km/h": "km_h",
-    "kn": "kt", "knots": "kt", "ft/s": "ft_s", "%": "pct", "degc": "C", "celsius": "C", "degf": "F",
-    "kg/m3": "kg_m3", "kg/m^3": "kg_m3", "inch": "in", "inches": "in", "degrees": "deg", "degree": "deg",
-    "volts": "V", "amps": "A", "watts": "W", "pa s": "Pa_s", "m^2": "m2", "n m": "Nm", "n-m": "Nm", "n cm": "Ncm",
-    "n mm": "Nmm", "mn m": "mNm", "kgf cm": "kgf_cm", "gf cm": "gf_cm", "lbf in": "lbf_in", "in lbf": "lbf_in",
-    "in-lbf": "lbf_in", "lbf ft": "lbf_ft", "ft lbf": "lbf_ft", "ft-lbf": "lbf_ft", "ozf in": "ozf_in",
-    "in ozf": "ozf_in", "kgf m": "kgf_m", "microseconds": "us", "rpm": "rpm", "volt": "V", "watt": "W", "amp": "A",
-    "newton": "N", "newtons": "N", "newton metre": "Nm", "newton meter": "Nm", "gram force": "gf", "milliseconds": "ms",
-    "kilogram force": "kgf", "pound force": "lbf", "g f": "gf", "kg f": "kgf", "second": "s", "ampere": "A",
-    "amperes": "A", "rad/sec": "rad_s", "m/sec": "m_s", "rev/sec": "rev_s", "percent": "pct", "tr/min": "rpm",
-    "t/min": "rpm", "rad/seg": "rad_s", "vueltas/min": "rpm", "umdr/min": "rpm", "upm": "rpm", "tr mn": "rpm",
-    "rev/minute": "rpm", "revs/min": "rpm", "k rpm": "krpm", "krpm": "krpm", "in hg": "inHg", "inhg": "inHg",
-    "mm hg": "mmHg", "mmhg": "mmHg", "torr": "mmHg", "millibar": "mbar", "mb": "mbar",
-    "giri/min": "rpm", "giri/1'": "rpm", "об/мин": "rpm", "转/分": "rpm", "轉/分": "rpm", "r/m": "rpm",
-    "omw/min": "rpm",
-    "obr/min": "rpm", "ot/min": "rpm", "tours/min": "rpm", "trs/min": "rpm", "rpm/min": "rpm", "rot/min": "rpm",
-    "min -1": "rpm", "kts": "kt", "fps": "ft_s", "kph": "km_h", "kmh": "km_h", "kilowatt": "kW", "millivolt": "mV",
-    "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "秒": "s", "с": "s",
-    "в": "V", "а": "A", "вт": "W", "н": "N", "нм": "Nm", "н м": "Nm", "安": "A", "伏": "V", "瓦": "W", "牛": "N",
-    "pct.": "pct", "prozent": "pct", "kg/cubic metre": "kg_m3", "kp cm": "kgf_cm", "kpcm": "kgf_cm", "kgcm": "kgf_cm",
-}  # fmt: skip
-_TWO_MEANINGS = {
-    "g": "gram-force, gram or standard gravity: write gf, or say it in recording.toml",
-    "G": "gram-force or standard gravity: write gf, or say it in recording.toml",
-    "kg": "a mass: write kgf for a force",
-    "lb": "a mass: write lbf for a force", "lbs": "a mass: write lbf for a force",
-    "oz": "a mass: write ozf for a force", "Hz": "revolutions, blades or electrical periods: say it in recording.toml",
-    "kg cm": "a mass times a length: write kgf_cm", "g cm": "a mass times a length: write gf_cm",
-    "G cm": "a mass times a length: write gf_cm", "oz in": "a mass times a length: write ozf_in",
-    "lb in": "a mass times a length: write lbf_in", "in lb": "a mass times a length: write lbf_in",
-    "lb ft": "a mass times a length: write lbf_ft", "ft lb": "a mass times a length: write lbf_ft",
-    "in oz": "a mass times a length: write ozf_in", "kg m": "a mass times a length: write kgf_m",
-    "1/s": "revolutions or radians per second: write rev/s or rad/s", "grams": "a mass: write gf for a force",
-    "s-1": "revolutions or radians per second: write rev/s or rad/s", "pounds": "a mass: write lbf for a force",
-    "s^-1": "revolutions or radians per second: write rev/s or rad/s",
-    "g/W": "a mass per power: write gf/W", "G/W": "a mass per power: write gf/W",
-}  # fmt: skip
-_COMPOUND = {
-    "gf/W": units.Unit("N_W", "efficacy", units.KGF * 1e-3), "kgf/W": units.Unit("N_W", "efficacy", units.KGF),
-    "N/W": units.Unit("N_W", "efficacy", 1.0), "lbf/W": units.Unit("N_W", "efficacy", units.LBF),
-    "m/s2": units.Unit("m_s2", "acceleration", 1.0), "m/s^2": units.Unit("m_s2", "acceleration", 1.0),
-    "daN": units.Unit("", "force", 10.0), "cN": units.Unit("", "force", 0.01), "kp": units.UNITS["kgf"],
-    "uNm": units.Unit("", "torque", 1e-6), "PS": units.Unit("", "power", 75.0 * units.KGF),
-    "ch": units.Unit("", "power", 75.0 * units.KGF),
-}  # fmt: skip
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
     r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor"
@@ -86,14 +40,6 @@ _WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves
     "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
     "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
-WEIGHTS = {
-    "g": "gf", "G": "gf", "grams": "gf", "gram": "gf", "gr": "gf", "gramm": "gf", "kg": "kgf", "Kg": "kgf", "KG": "kgf",
-    "kgs": "kgf", "kilograms": "kgf", "lb": "lbf", "lbs": "lbf", "pounds": "lbf", "oz": "ozf", "ounces": "ozf",
-    "grammes": "gf", "grammi": "gf", "gramos": "gf", "gramas": "gf", "г": "gf", "гр": "gf", "克": "gf", "кг": "kgf",
-    "公斤": "kgf", "GRAMS": "gf", "GRAM": "gf", "LB": "lbf", "LBS": "lbf", "OZ": "ozf", "kilogram": "kgf",
-}  # fmt: skip
-"""Units of mass in which stands state a force: that which the mass weighs."""
-_FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
 _THRUSTS = re.compile(
     r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
     r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
@@ -110,8 +56,6 @@ _QUALIFIED = re.compile(
 )
 """Words that a thrust or a torque goes with and that make no other quantity of it."""
 _SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
-_MOJIBAKE = (("Âµ", "µ"), ("Î¼", "µ"), ("Â·", "·"), ("â‹…", "·"), ("Â°", "°"), ("Â²", "²"), ("Â³", "³"))
-"""UTF-8 that a program took for Latin-1 or its Windows form."""
 _SHAFT_LETTERS = {"n", "ω"}
 _SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
 _SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
@@ -159,46 +103,7 @@ class Heading:
         """Unit of the channel after conversion: SI, ``rpm``, "-" without dimension, "" unknown."""
         if self.unit is None:
             return ""
-        return _si_name(self.unit)
-
-
-def _si_name(unit: units.Unit) -> str:
-    if unit.dimension in ("none", "fraction"):
-        return "-"
-    if unit.dimension in ("efficacy", "acceleration"):
-        return {"efficacy": "N/W", "acceleration": "m/s2"}[unit.dimension]
-    if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):  # "": already made to give rev/min
-        return "rpm"
-    return units.suffixes(unit.dimension)[0]
-
-
-def unit_of(text: str) -> units.Unit | str:
-    """Unit that a text states.
-
-    >>> unit_of("N·m").suffix, unit_of("µs").suffix, unit_of("1/min").suffix
-    ('Nm', 'us', 'rpm')
-    >>> unit_of("kg")
-    'a mass: write kgf for a force'
-    """
-    t = text.strip()
-    for wrong, right in _MOJIBAKE:
-        t = t.replace(wrong, right)
-    t = unicodedata.normalize("NFKC", t.replace("º", "°").replace("⁻", "^-", 1)).replace("\u2212", "-")
-    t = re.sub(r"[·⋅∙•×*]|(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", t).replace("µ", "u").replace("μ", "u")
-    t = " ".join(re.sub("[°˚]", "deg", t).split()).replace("^^", "^")
-    power = re.fullmatch(r"(\w+) (\w+)\^?-([123])", t)  # m s^-1
-    if power:
-        t = f"{power[1]}/{power[2]}" + (power[3] if power[3] != "1" else "")
-    if t in _COMPOUND:
-        return _COMPOUND[t]
-    if t in _TWO_MEANINGS:
-        return _TWO_MEANINGS[t]
-    if t in units.UNITS:
-        return units.UNITS[t]
-    key = _SAME.get(t.lower())
-    if key is not None:
-        return units.UNITS[key]
-    return ""
+        return si_name(self.unit)
 
 
 def known(text: str, base: str, unit: str) -> Heading:
@@ -214,7 +119,7 @@ def known(text: str, base: str, unit: str) -> Heading:
 
 def _channel(base: str, unit: units.Unit) -> str:
     """Name of a channel with its unit in SI."""
-    si = _si_name(unit).replace("/", "_")
+    si = si_name(unit).replace("/", "_")
     return base if si == "-" else f"{base}_{si}"
 
 
@@ -315,7 +220,7 @@ def heading(text: str) -> Heading:
     unit = WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
         found = heading(f"{parts[1]} ({unit})")
-        told = f"{text!r} is read as {_FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
+        told = f"{text!r} is read as {FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
         return replace(found, text=text, told=told)
     if parts and parts[2] in ("Hz", "1/s") and (said := _spoken(parts[1])[1]) & _TURNS and "electrical" not in said:
         turns = units.Unit("", "angular_speed", 60.0)
@@ -324,7 +229,7 @@ def heading(text: str) -> Heading:
         return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
     if parts and (qualified := _QUALIFIED.fullmatch(plain(parts[1]))):
         name = next(word for word in qualified.groups() if word)
-        unit = _weight(parts[2]) if name == "torque" else ""
+        unit = weight_of(parts[2]) if name == "torque" else ""
         found = _heading(f"{name} ({unit or parts[2]})")
         if found.unit is not None and unit:
             told = f"{text!r} is read as {unit.replace(' ', ' times ')}: a weight, as stands mean it"
@@ -348,28 +253,6 @@ def _splits(text: str) -> Iterator[tuple[str, str]]:
                 if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
                     yield text[: found.start()], unit
     yield text, ""
-
-
-_ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kgf": "kgf", "lbf": "lbf", "s": "s",
-             "kw": "kW", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "c": "C", "f": "F", "k": "K", "ncm": "Ncm", "hp": "hp",
-             "us": "us", "kn": "kN", "m/s": "m_s"}  # fmt: skip
-"""Units that capitals do not change where the quantity is known."""
-
-
-def unit_for(dimension: str, text: str) -> tuple[units.Unit, str] | None:
-    """Unit of a quantity of known dimension ("": any), and what was taken for granted."""
-    found = unit_of(text)
-    if not dimension:
-        return (found, "") if isinstance(found, units.Unit) else None
-    if dimension == "force" and (weight := WEIGHTS.get(unicodedata.normalize("NFKC", text))):
-        return units.UNITS[weight], f"{_FORCES[weight]}: 1 {text} weighs {units.UNITS[weight].factor:.4g} N"
-    if dimension == "torque" and isinstance(found, str) and (weight := _weight(text)):
-        made = unit_of(weight)
-        assert isinstance(made, units.Unit)
-        return made, f"{weight.replace(' ', ' times ')}: a weight, as stands mean it"
-    if not isinstance(found, units.Unit):
-        found = units.UNITS.get(_ANY_CASE.get(text.lower(), ""), "")
-    return (found, "") if isinstance(found, units.Unit) and found.dimension == dimension else None
 
 
 _COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
@@ -407,17 +290,6 @@ def _by_words(text: str) -> Heading | None:
                 return Heading(text, "rpm", made)
             return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
-
-
-def _weight(text: str) -> str:
-    """Unit of a torque that is written as a mass times a length, with the weight for the mass; "" for any other."""
-    words = re.split(r"[\s·⋅*.\-/]+", text.strip())
-    if len(words) != 2:
-        return ""
-    masses = [w for w in words if w in WEIGHTS]
-    lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
-    unit = f"{WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
-    return unit if isinstance(unit_of(unit), units.Unit) else ""
 
 
 def _unit_at_end(text: str) -> str:
@@ -469,7 +341,7 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
     if suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
         return text, None, f"{suffix.suffix!r} does not go with {name}"
     if suffix is not None and suffix.dimension == "mass" and not re.search(r"weight|mass", name, re.IGNORECASE):
-        return text, None, f"{suffix.suffix!r} is {_TWO_MEANINGS[suffix.suffix]}"
+        return text, None, f"{suffix.suffix!r} is {TWO_MEANINGS[suffix.suffix]}"
     if suffix is not None and (name or suffix.dimension == "mass"):
         return name, suffix, ""
     pure = units.Unit("", "none", 1.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bemt.base import units
 from bemt.base.errors import Fault
 from bemt.readers import SourceText, number
-from bemt.readers._headings import unit_of
+from bemt.readers._unit_text import unit_of
 from bemt.readers._words import english, quantities
 
 DELIMITERS = (";", "\t", ",", "|")

@@ -12,8 +12,8 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.readers import SourceText, load_text
-from bemt.readers._headings import unit_of
 from bemt.readers._split import decimal_mark, split_table
+from bemt.readers._unit_text import unit_of
 from bemt.readers._words import plain
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"

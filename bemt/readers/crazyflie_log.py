@@ -68,21 +68,10 @@ def _text(data: bytes, at: int) -> tuple[str, int]:
 
 
 def log_tables(data: bytes, partly: bool = False) -> tuple[dict[str, dict[str, NDArray[np.float64]]], int]:
-    """Variables of each event of a log.
+    """Event to variable to (N,) values in the units of the log, and the place at which reading ended.
 
-    Parameters
-    ----------
-    data : bytes
-        The file without its checksum.
-    partly : bool
-        Keep what stands before a damaged record instead of raising.
-
-    Returns
-    -------
-    tables : dict
-        Event to variable to (N,) values in the units of the log; `time_s` in seconds of the log's clock [s].
-    int
-        Place at which reading ended; `len(data)` when all is whole.
+    `data` is the file without its checksum; `time_s` is in seconds of the log's clock. `partly`: keep what stands
+    before a damaged record instead of raising.
     """
     version, events = struct.unpack_from("<HH", data, 1)
     at, known = 5, {}

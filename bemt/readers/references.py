@@ -30,7 +30,7 @@ import numpy as np
 from bemt.base import units
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers._headings import WEIGHTS, unit_of
+from bemt.readers._unit_text import WEIGHTS, unit_of
 
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")

@@ -15,7 +15,7 @@ from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.readers._cfd import unit_of
 from bemt.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
-from bemt.recordings.cfd_run import DUCT
+from bemt.recordings.cfd_loads import DUCT
 
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")

@@ -222,6 +222,12 @@ def _command(values: dict[str, Array], names: dict[str, str], notes: list[str]) 
         notes.append(THROTTLE_IS_PULSE)
 
 
+def moves(v: Array) -> bool:
+    """Whether a column has more than one value."""
+    finite = v[np.isfinite(v)]
+    return finite.size > 1 and float(np.ptp(finite)) > 0.0
+
+
 def shaft_power(values: Mapping[str, Array]) -> Array | None:
     """Shaft power, torque times speed, (N,) [W]."""
     if "torque_Nm" not in values or "rpm" not in values:

@@ -27,13 +27,13 @@ HELD, STEPS = 6, 2
 """Rows for which a command is held after a step; steps that are looked at, at least. [1]"""
 
 
-def _varies(v: Array, share: float = 0.05) -> bool:
-    """Whether a channel changes by more than a share of its size."""
+def _varies(v: Array) -> bool:
+    """Whether a channel changes by more than 5 % of its size."""
     v = v[np.isfinite(v)]
     if v.size < 3:
         return False
     low, high = np.percentile(v, [5.0, 95.0])
-    return bool(high - low > share * max(abs(high), abs(low)))
+    return bool(high - low > 0.05 * max(abs(high), abs(low)))
 
 
 def _same(a: Array, b: Array) -> float | None:

@@ -74,9 +74,9 @@ class Facts:
         v = self.values.get("density_kg_m3", np.full(len(self), np.nan))
         return np.where((v > 0.2) & (v < 2.0), v, LIKELY_RHO)
 
-    def sampled(self, most: int = ENOUGH) -> Facts:
+    def sampled(self) -> Facts:
         """Every nth row of a long log: medians need no more."""
-        step = -(-len(self) // most)
+        step = -(-len(self) // ENOUGH)
         if step == 1:
             return self
         values, raw = ({k: v[::step] for k, v in part.items()} for part in (self.filled, self.raw))

@@ -39,6 +39,7 @@ from bemt.readers.cfd_run import KIND as RUN
 from bemt.readers.cfd_run import RunHead, RunToml
 from bemt.recordings import cfd_run
 from bemt.recordings.adapt import adapt, damaged_export, recognised
+from bemt.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.recordings.choice import Choice, averaged
 from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.recordings.reduce import reduction
@@ -100,7 +101,7 @@ def _run_in(folder: Path) -> Dataset | RunToml | None:
         return import_file(folder / "run.toml")
     if any(hasattr(m, "sniff_folder") and m.sniff_folder(folder) for m in importers.importers().values()):
         return None
-    files = cfd_run.cfd_files(folder)
+    files = cfd_files(folder)
     return RunToml.model_validate({"run": {"files": tuple(map(str, files))}}) if files else None
 
 
@@ -136,7 +137,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
         for other in _earlier(Path(path), paths, records):
             text = f"next to {other}: not joined"
             if other in records:
-                how = relation(cfd_run.clock_of(records[other]), cfd_run.clock_of(record))
+                how = relation(clock_of(records[other]), clock_of(record))
                 text = f"restart of {other} ({how}): not joined"
                 if how == "other clock":
                     text += "; the same steps mean other times"
@@ -175,7 +176,7 @@ def document(
     names = [os.fspath(path) for path in paths]
     runs, to_do = _runs(names, run, insist)
     if runs or to_do:
-        names = [name for name in names if not (Path(name).is_dir() and cfd_run.cfd_files(Path(name)))]
+        names = [name for name in names if not (Path(name).is_dir() and cfd_files(Path(name)))]
     records: dict[str, Dataset] = {}
     errors: dict[str, str] = {}
     for name in names:
@@ -199,10 +200,10 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
     for name in names:
         try:
             if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
-                exports += map(str, cfd_run.cfd_files(Path(name)))
+                exports += map(str, cfd_files(Path(name)))
             elif Path(name).is_dir() or importers.detect(name) == RUN:
                 runs.append(cfd_run.document(import_file(name)))
-            elif importers.detect(name) in cfd_run.PROGRAMS:
+            elif importers.detect(name) in PROGRAMS:
                 exports.append(name)
         except (InputError, OSError):
             if insist:
@@ -223,7 +224,7 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
             raise
         if not isinstance(error, InputError):  # the file's own entry says it
             return runs, None
-        fields = {importers.detect(e) for e in exports} <= cfd_run.FIELDS  # values at points are no run
+        fields = {importers.detect(e) for e in exports} <= FIELDS  # values at points are no run
         return runs, None if fields and any(f.expected == cfd_run.NO_LOAD for f in error.faults) else str(error)
 
 

@@ -77,10 +77,10 @@ def ranges(lines: Iterable[tuple[int, int]]) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
 
 
-def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
+def points_text(found: Mapping[str, Any]) -> list[str]:
     """Steady points, what was dropped and the notes, as lines of text."""
     if found["error"] is not None:
-        return [f"{indent}not reduced: {found['error']}"]
+        return [f"  not reduced: {found['error']}"]
     points = found["points"]
     names = [k for k in SHOWN if any(_number(p.get(k)) is not None for p in points)]
     names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
@@ -97,8 +97,8 @@ def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
         rows.append([*row, ", ".join(p["flags"]) or "-"])
     many = "" if len(points) <= MOST else f", the first {MOST} of them"
     what = "one per row" if found["mode"] == "points" else "means of plateaus"
-    out = [f"{indent}{len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
-    out.append(tables.text_table([*head, "flags"], rows, (len(head),), indent + "  "))
+    out = [f"  {len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
+    out.append(tables.text_table([*head, "flags"], rows, (len(head),), "    "))
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
     for lost in found["dropped"]:
         what = "rows" if not lost["channel"] else f"values of {lost['channel']}"
@@ -106,11 +106,11 @@ def points_text(found: Mapping[str, Any], indent: str = "  ") -> list[str]:
     for (what, reason), lines in reasons.items():
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
-        out.append(f"{indent}dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
+        out.append(f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
     for channel, parts in found["correlated"].items():
         words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
-        out.append(f"{indent}shared by all points, {channel}: {words}")
-    return out + [f"{indent}. {note}" for note in found["notes"]]
+        out.append(f"  shared by all points, {channel}: {words}")
+    return out + [f"  . {note}" for note in found["notes"]]
 
 
 def _number(value: object) -> float | None:

@@ -32,7 +32,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._samples import MISREAD, against_load
 from bemt.recordings import plateaus
-from bemt.recordings.channels import LOADS, Lost, file_name, lost, runs_of, stated
+from bemt.recordings.channels import LOADS, Lost, file_name, lost, moves, runs_of, stated
 
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
@@ -202,7 +202,7 @@ def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
 def from_samples(rec: Dataset, name: str) -> Found:
     """Plateaus of every run."""
     found = Found()
-    signal = next((s for s in SIGNALS if s in rec.values and _moves(rec.values[s])), None)
+    signal = next((s for s in SIGNALS if s in rec.values and moves(rec.values[s])), None)
     if signal is None:
         signal = next((s for s in SIGNALS if s in rec.values and np.any(np.isfinite(rec.values[s]))), None)
     if signal is None:
@@ -254,11 +254,6 @@ def from_samples(rec: Dataset, name: str) -> Found:
                 values["time_s"] = middle
             found.points.append(Point(values, u, own_rows, middle, run, p.direction, p.flags))
     return found
-
-
-def _moves(v: Array) -> bool:
-    finite = v[np.isfinite(v)]
-    return finite.size > 1 and float(np.ptp(finite)) > 0.0
 
 
 def _spikes(rec: Dataset, data: dict[str, Array], found: Found) -> None:
@@ -340,7 +335,7 @@ def _wild(rec: Dataset, data: dict[str, Array], rest: NDArray[np.bool_], found: 
     The misreading is of the one load where the other agrees with the speed, else of the speed.
     """
     speed, v = data.get("rpm"), data.get("airspeed_m_s")
-    loads = {k: np.abs(data[k]) for k in ("thrust_N", "torque_Nm") if k in data and _moves(data[k])}
+    loads = {k: np.abs(data[k]) for k in ("thrust_N", "torque_Nm") if k in data and moves(data[k])}
     if speed is None or not loads or (v is not None and np.any(np.abs(np.nan_to_num(v)) > 0.5)):
         return
     good = np.isfinite(speed) & (speed > 0.0) & ~rest

@@ -13,8 +13,9 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.readers import load_text
-from bemt.readers._headings import heading, meanings, unit_for
+from bemt.readers._headings import heading, meanings
 from bemt.readers._split import decimal_mark, some, split_table
+from bemt.readers._unit_text import unit_for
 from bemt.readers.recording_toml import QUANTITIES, RecordingToml
 from bemt.recordings.cfd_options import pairs
 
@@ -32,24 +33,10 @@ def _unit(quantity: str, text: str) -> str | None:
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = ()
 ) -> Path:
-    """Write a recording.toml beside a table of measurements; all faults of the options at once.
+    """Write a recording.toml beside a table of measurements, in the same folder; all faults of the options at once.
 
-    Parameters
-    ----------
-    file, out : str
-        Table, and the file to write, in the same folder.
-    unit, column, sign : iterable of str
-        ``NAME=UNIT``, of a quantity or a heading; ``QUANTITY=HEADING``; ``QUANTITY=-1``.
-
-    Returns
-    -------
-    path
-        The file written.
-
-    Raises
-    ------
-    InputError
-        On what is no column, unit or quantity, and where `out` exists.
+    `unit` ``NAME=UNIT``, of a quantity or a heading; `column` ``QUANTITY=HEADING``; `sign` ``QUANTITY=-1``. InputError
+    on what is no column, unit or quantity, and where `out` exists.
     """
     import tomlkit
 

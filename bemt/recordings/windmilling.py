@@ -12,22 +12,10 @@ _SMALL, _FEWEST, _ASTRAY, _JUMP = 0.05, 3, 0.2, 0.75
 
 
 def zero_thrust_speed(rpm: Array, thrust: Array) -> float | None:
-    """Find the speed of rotation at which thrust changes its sign as it does in wind.
+    """Speed at which thrust changes its sign as in wind; None if it has one sign or does not follow the speed.
 
-    At one airspeed CT falls with 1/n, through zero; the speed that divides the signs best is taken.
+    At one airspeed CT falls with 1/n, through zero; the speed that divides the signs best is taken; NaN is left out.
 
-    Parameters
-    ----------
-    rpm, thrust : (N,) float
-        Speed of rotation [rev/min] and thrust in any unit; NaN is left out.
-
-    Returns
-    -------
-    float or None
-        Speed of no thrust [rev/min]; None where thrust has one sign, or its sign does not follow the speed.
-
-    Examples
-    --------
     >>> n = np.linspace(2000.0, 6000.0, 9)
     >>> zero_thrust_speed(n, n**2 - 3700.0 * n)
     3750.0

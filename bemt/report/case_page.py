@@ -16,6 +16,7 @@ from bemt.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.report.rotor_view import viewer
 from bemt.report.values import Section, sections, uri
 from bemt.report.verdicts import headline, stand
+from bemt.sweep.comparison import Comparison
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
@@ -212,13 +213,13 @@ def _verification(page: Mapping[str, Any]) -> Section:
 
 def _validation(result: Mapping[str, Any]) -> Section:
     """Every comparison, BEMT's first; a column of uncertainties that nobody knows is left out."""
-    found = [c for c in result["comparisons"] if c["source"] != "k1k2_printed" or c["model"] == "k1k2"]
-    us = [u for u in US if any(c.get(u) is not None and math.isfinite(c[u]) for c in found)]
+    found = [c for c in Comparison.of(result) if c.source != "k1k2_printed" or c.model == "k1k2"]
+    us = [u for u in US if any(math.isfinite(getattr(c, u)) for c in found)]
     rows: list[Sequence[object]] = []
-    for c in sorted(found, key=lambda c: list(MODELS).index(c["model"]) if c["model"] in MODELS else len(MODELS)):
+    for c in sorted(found, key=lambda c: list(MODELS).index(c.model) if c.model in MODELS else len(MODELS)):
         kind, word = stand(c)
-        rows.append([MODELS.get(c["model"], c["model"]), c["reference"], _quantity(c), num(c["S"]), num(c["D"]),
-                     num(c["E_pct"], signed=True), *(num(c.get(u), 2, none="unknown") for u in us),
+        rows.append([MODELS.get(c.model, c.model), c.reference, _quantity(c), num(c.S), num(c.D),
+                     num(c.E_pct, signed=True), *(num(getattr(c, u), 2, none="unknown") for u in us),
                      Cell(word, badge=kind)])  # fmt: skip
     words = (
         "After ASME V&V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². The two agree where |E| ≤ u_val. "
@@ -228,12 +229,12 @@ def _validation(result: Mapping[str, Any]) -> Section:
     return "Validation", [("words", words), ("table", table(head, rows))]
 
 
-def _quantity(c: Mapping[str, Any]) -> str:
+def _quantity(c: Comparison) -> str:
     """Name of a channel with its unit: thrust [N]."""
-    name, unit = str(c["quantity"]), str(c["unit"])
+    name = c.quantity
     for suffix in ("_m_s", "_Nm", "_N", "_W"):
         name = name.removesuffix(suffix)
-    return f"{name.replace('_', ' ')} [{unit}]"
+    return f"{name.replace('_', ' ')} [{c.unit}]"
 
 
 def reproduction_table(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:

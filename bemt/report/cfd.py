@@ -20,7 +20,7 @@ from bemt.report.found_files import read_json, safe_files
 from bemt.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
 from bemt.report.values import Part, Section, picture, sections
 from bemt.rotors.validity import serious
-from bemt.sweep.agreement import agreement
+from bemt.sweep.comparison import Comparison
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
@@ -199,13 +199,12 @@ def attach(book: dict[str, Any]) -> None:
             continue
         share = run["audit"]["u_relative"] if run["audit"] else math.nan
         S, D, u_D = bemt["thrust_N"], run["thrust_N"], abs(run["thrust_N"]) * share
-        parts = {k: math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input", "u_model")}
-        line = {"model": "bemt", "reference": f"own CFD, {run['solver']}", "source": "openfoam", "quantity": "thrust_N",
-                "unit": "N", "S": S, "D": D, "E": S - D, "E_pct": 100 * (S - D) / D if D else None, **parts,
-                "u_D": u_D, "u_val": math.hypot(*parts.values(), u_D),
-                "doubts": list(serious(bemt.get("flags", ())))}  # fmt: skip
-        line["verdict"] = agreement(line)
-        page["result"] = {**result, "comparisons": [*result["comparisons"], line]}
+        u_num, u_input, u_model = (
+            math.nan if bemt.get(k) is None else bemt[k] for k in ("u_num", "u_input", "u_model")
+        )
+        line = Comparison("bemt", f"own CFD, {run['solver']}", "openfoam", "thrust_N", "N", S, D, u_num, u_input,
+                          u_model, u_D, tuple(serious(bemt.get("flags", ()))))  # fmt: skip
+        page["result"] = {**result, "comparisons": [*result["comparisons"], line.document()]}
 
 
 FIDELITY_WORDS = (

@@ -20,11 +20,11 @@ REFINED = (10, 20, 40, 80)
 CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")
 
 
-def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
+def geometry_curves(case: Case) -> dict[str, Any]:
     """Chord, blade angle and thickness over the radius."""
     rotor = case.rotor()
     blade = rotor.blade
-    r = np.linspace(blade.Rhub, blade.R, n)
+    r = np.linspace(blade.Rhub, blade.R, 41)
     chord, beta = blade.at(r)
     x = [a for a, _ in blade.anchors]
     t = [section.thickness for _, section in blade.anchors]
@@ -33,7 +33,7 @@ def geometry_curves(case: Case, n: int = 41) -> dict[str, Any]:
         "chord_over_R": chord / rotor.R,
         "chord_mm": 1e3 * chord,
         "beta_deg": np.degrees(beta),
-        "thickness": np.interp(r / rotor.R, x, t) if x else np.full(n, np.nan),
+        "thickness": np.interp(r / rotor.R, x, t) if x else np.full(r.size, np.nan),
     }
 
 

@@ -43,8 +43,6 @@ D_OVER_P_USABLE = (0.5, 2.5)
 """Usable range of D/p stated by [1] [-]."""
 D_OVER_P_BEST = (0.8, 1.8)
 """Best range of D/p stated by [1] [-]."""
-U_CLAIMED = 0.13
-"""Relative standard uncertainty claimed by [1]: 68 % of static points within 13 % [-]."""
 U_MEASURED = 0.196
 """Standard deviation of F/measured on 4122 static points of 248 UIUC propellers, nominal D and p, nothing fitted [-];
 `reports/studies/reproduce.py` recomputes it where the data are."""

@@ -64,9 +64,9 @@ class Prediction:
         return pair_half_width(level, self.latent_sd, still, sizes, weights)
 
 
-def zero_thrust(solve: Solve, z: Array, rpm: float, which: int = 0) -> float:
+def zero_thrust(solve: Solve, z: Array, rpm: float) -> float:
     """Advance ratio at which the solver's thrust vanishes; that of the largest one tried where it never does [1]."""
-    at = np.full(_SCAN.size, which, dtype=np.intp)
+    at = np.zeros(_SCAN.size, dtype=np.intp)
     CT = solve(z, np.full(_SCAN.size, rpm), _SCAN, at)[0]
     down = np.flatnonzero((CT[:-1] > 0.0) & (CT[1:] <= 0.0))
     if not down.size:

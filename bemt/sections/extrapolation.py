@@ -108,12 +108,11 @@ def from_tables(
     *,
     name: str = "",
     source: str = "",
-    ar: float = 10.0,
     cd_max: float | None = None,
     notes: Sequence[str] = (),
 ) -> Polar:
     """Polar from single-Re tables, each continued to +-180 deg where its data stop."""
-    top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
+    top = viterna_cd_max(10.0) if cd_max is None else float(cd_max)
     re, mach = (np.unique([getattr(t, k) for t in tables]) for k in ("Re", "M"))
     if len(tables) != re.size * mach.size or len({(t.Re, t.M) for t in tables}) != len(tables):
         raise ValueError(

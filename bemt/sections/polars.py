@@ -96,11 +96,6 @@ class Polar:
         """Content hash of the tables (names and notes do not count)."""
         return cache.content_key(self.alpha, self.Re, self.M, self.cl, self.cd)
 
-    @property
-    def is_shared(self) -> bool:
-        """Whether alpha and Re are the shared grids that kernels index by arithmetic."""
-        return np.array_equal(self.alpha, ALPHA_GRID) and np.array_equal(self.Re, DEFAULT_RE)
-
     def lookup(self, alpha: ArrayLike, Re: ArrayLike, M: ArrayLike = 0.0) -> tuple[Array, Array]:
         """Interpolated cl and cd: linear in alpha [rad], ln Re and M; the reference for the compiled kernel."""
         a, r, m = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (alpha, Re, M)))

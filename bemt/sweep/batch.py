@@ -192,9 +192,9 @@ def _in_processes(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _bar(share: float, width: int = 20) -> str:
-    filled = round(width * min(max(share, 0.0), 1.0))
-    return f"[{'#' * filled}{'.' * (width - filled)}]"
+def _bar(share: float) -> str:
+    filled = round(20 * min(max(share, 0.0), 1.0))
+    return f"[{'#' * filled}{'.' * (20 - filled)}]"
 
 
 def sweep(

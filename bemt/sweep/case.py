@@ -26,7 +26,7 @@ from bemt.recordings import audit_remarks
 from bemt.recordings.cfd_setup import references_of
 from bemt.recordings.load import import_file
 from bemt.rotors.validity import serious
-from bemt.sweep.agreement import agreement
+from bemt.sweep.comparison import Comparison
 
 if TYPE_CHECKING:
     from bemt.bem.model import Model
@@ -69,24 +69,18 @@ def _part(values: Dataset, origin: str, channel: str, at: int) -> float:
 
 def _compare(
     model: str, values: Dataset, at: int, channel: str, row: Mapping[str, Any], u_D: float
-) -> dict[str, Any] | None:
-    """One line of the validation: model minus recording, beside its uncertainty."""
+) -> Comparison | None:
+    """One model at a point against one recorded value."""
     recorded = row.get(channel)
     if channel not in values or recorded is None or math.isnan(recorded):
         return None
     S = float(values[channel][at])
     if model == "k1k2" and math.isnan(S):  # oblique flow
         return None
-    E = S - recorded
     u_num, u_input, u_model = (_part(values, origin, channel, at) for origin in ("numerics", "input", "model"))
-    u_val = math.sqrt(u_num**2 + u_input**2 + u_model**2 + u_D**2)
-    line = {
-        "model": model, "reference": row["label"], "source": row["source"], "quantity": channel,
-        "unit": COMPARED[channel], "S": S, "D": recorded, "E": E, "E_pct": 100.0 * E / recorded if recorded else None,
-        "u_num": u_num, "u_input": u_input, "u_model": u_model, "u_D": u_D, "u_val": u_val,
-        "doubts": list(serious(values.flags[at])),
-    }  # fmt: skip
-    return line | {"verdict": agreement(line)}
+    doubts = tuple(serious(values.flags[at]))
+    return Comparison(model, row["label"], row["source"], channel, COMPARED[channel], S, recorded, u_num, u_input,
+                      u_model, u_D, doubts)  # fmt: skip
 
 
 def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
@@ -219,10 +213,10 @@ def _comparisons(recorded: list[dict[str, Any]], models: Mapping[str, Dataset]) 
                 if channel in measured:
                     line = _compare(name, model, at, channel, row, u_D.get(channel, math.nan))
                     if line is not None:
-                        out.append(line)
+                        out.append(line.document())
                         if channel == "thrust_N" and name in ROW_SOURCES:
-                            row[f"{name}_error_pct"] = line["E_pct"]
-                            row[f"{name}_u_val"] = line["u_val"]
+                            row[f"{name}_error_pct"] = out[-1]["E_pct"]
+                            row[f"{name}_u_val"] = line.u_val
     return out
 
 

@@ -6,16 +6,31 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from bemt.base.tables import number_text, text_table
 from bemt.rotors.validity import kind, serious
-from bemt.sweep.agreement import known, needed
 from bemt.sweep.case import ROW_SOURCES
+from bemt.sweep.comparison import Comparison, State
 from bemt.sweep.text import with_nan
 
 WIDTH, ROWS, SCREEN = 80, 20, 45
 """Columns of the screen, rows of the table and lines of the screen: the rest is counted."""
+
+
+class _Thrust(NamedTuple):
+    """BEMT against one recorded thrust of a case, at its operating point."""
+
+    c: Comparison
+    case: Mapping[str, Any]
+    share: float  # of the largest recorded thrust [1]
+    rpm: float
+    airspeed_m_s: float
+
+    @property
+    def rank(self) -> float:
+        """Largest first, no result before all."""
+        return self.share if math.isfinite(self.share) else 9e9
 
 
 def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cut: bool = True) -> str:
@@ -27,7 +42,7 @@ def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cu
     where = [f" ({path.as_posix()})" for path in files] or [""] * len(results)
     failed = [(r["name"] + place, len(r["faults"])) for r, place in zip(results, where, strict=True) if not r["rows"]]
     lines: list[str] = []
-    found = sorted((c for r in solved for c in _compared(r)), key=lambda c: -c["rank"])
+    found = sorted((c for r in solved for c in _compared(r)), key=lambda c: -c.rank)
     if solved:
         lines += _table(solved, found)
     for name, n in failed[:6]:
@@ -41,76 +56,63 @@ def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cu
     return "\n".join([*lines, *(["", *flags] if flags else []), *end])
 
 
-def _compared(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _compared(result: Mapping[str, Any]) -> list[_Thrust]:
     """BEMT against each recorded thrust of a case; equal values of one kind count once."""
     rows = [
-        c
-        for c in result["comparisons"]
-        if c["model"] == "bemt" and c["quantity"] == "thrust_N" and c["source"] in ROW_SOURCES
+        c for c in Comparison.of(result) if (c.model, c.quantity) == ("bemt", "thrust_N") and c.source in ROW_SOURCES
     ]
-    largest = max((abs(c["D"]) for c in rows), default=0.0)
-    out: dict[tuple[str, str, float], dict[str, Any]] = {}
+    largest = max((abs(c.D) for c in rows), default=0.0)
+    out: dict[tuple[str, str, float], _Thrust] = {}
     for c in rows:
-        share = abs(c["E"]) / largest if largest > 0.0 else 0.0
-        row = next(r for r in result["rows"] if r["label"] == c["reference"])
-        out.setdefault((c["source"], number_text(c["D"], 3), row["rpm"]), {
-            **c, "case": result, "known": known(c), "share": share, "rank": share if math.isfinite(share) else 9e9,
-            "rpm": row["rpm"], "airspeed_m_s": row["airspeed_m_s"],
-        })  # fmt: skip
+        share = abs(c.E) / largest if largest > 0.0 else 0.0
+        row = next(r for r in result["rows"] if r["label"] == c.reference)
+        out.setdefault(
+            (c.source, number_text(c.D, 3), row["rpm"]), _Thrust(c, result, share, row["rpm"], row["airspeed_m_s"])
+        )
     return list(out.values())
 
 
-def _agreement(c: Mapping[str, Any]) -> str:
+def _agreement(c: Comparison) -> str:
     """Whether model and recording agree, or how good the recording would have to be; "!" where a flag forbids it."""
-    return _judged(c) + (" !" if c.get("doubts") else "")
+    words: dict[State, str] = {"model unknown": "BEMT's u unknown", "inside": "agrees",
+                               "open": f"u > {number_text(c.needed, 2)}"}  # fmt: skip
+    return words.get(c.state, c.state) + (" !" if c.doubts else "")
 
 
-def _judged(c: Mapping[str, Any]) -> str:
-    if not math.isfinite(c["E"]):
-        return "no result"
-    if not math.isfinite(c["known"]):
-        return "BEMT's u unknown"
-    if abs(c["E"]) <= c["known"]:
-        return "agrees"
-    if math.isfinite(c["u_D"]):
-        return "agrees" if abs(c["E"]) <= math.hypot(c["known"], c["u_D"]) else "differs"
-    return f"u > {number_text(needed(c), 2)}"
-
-
-def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r["airspeed_m_s"] for result in solved for r in result["rows"] if r["source"] == "bemt")
     header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
-    keep = {id(c) for c in found[: max(ROWS - len(solved), 4)]}
+    keep = {id(t) for t in found[: max(ROWS - len(solved), 4)]}
     body: list[list[str]] = []
     for result in solved:
         points = [r for r in result["rows"] if r["source"] == "bemt"]
         formula = {(r["rpm"], r["airspeed_m_s"]): r for r in result["rows"] if r["source"] == "k1k2"}
         first = True
         for k, row in enumerate(points):
-            own = [c for c in found if c["case"] is result and c["rpm"] == row["rpm"]
-                   and c["airspeed_m_s"] == row["airspeed_m_s"] and id(c) in keep]  # fmt: skip
+            own = [t for t in found if t.case is result and t.rpm == row["rpm"]
+                   and t.airspeed_m_s == row["airspeed_m_s"] and id(t) in keep]  # fmt: skip
             if k and not own:
                 continue
             u = "" if not math.isfinite(row["u"]) else f" ± {number_text(row['u'], 2)}"
             simple = formula.get((row["rpm"], row["airspeed_m_s"]), {}).get("thrust_N")
             at = [f"{row['rpm']:.0f}", *([f"{row['airspeed_m_s']:g}"] if moving else [])]
             cells = [*at, f"{number_text(row['thrust_N'], 3)}{u}", number_text(simple, 3)]
-            some: list[Mapping[str, Any] | None] = [*own] if own else [None]
-            for c in some:
-                told = ["-", "", ""] if c is None else [
-                    f"{number_text(c['D'], 3)} {c['source']}", f"{c['E']:+.3g} ({100 * c['share']:.0f} %)",
-                    _agreement(c)]  # fmt: skip
+            some: list[_Thrust | None] = [*own] or [None]
+            for t in some:
+                told = ["-", "", ""] if t is None else [
+                    f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g} ({100 * t.share:.0f} %)",
+                    _agreement(t.c)]  # fmt: skip
                 body.append([result["name"][:16] if first else "", *cells, *told])
                 cells, first = [""] * len(cells), False
     shown = body[:ROWS]
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
-    left = len({id(c) for c in found}) - sum(1 for row in shown if row[-3] != "-")
+    left = len(found) - sum(1 for row in shown if row[-3] != "-")
     if left > 0 or len(body) > len(shown):
         lines.append(f"and {max(left, len(body) - len(shown))} more rows (--details shows all)")
     if found:
         lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the largest")
         lines.append("recorded value; u > X: they agree only if the recording's own u exceeds X N")
-        if any(c.get("doubts") for c in found):
+        if any(t.c.doubts for t in found):
             lines.append("!: do not take it for agreement; the flag below says why")
     return lines
 
@@ -124,19 +126,16 @@ def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     return lines + ([f"and {len(told) - 4} more cases with a motor (--details)"] if len(told) > 4 else [])
 
 
-def _worst(found: Sequence[Mapping[str, Any]]) -> list[str]:
+def _worst(found: Sequence[_Thrust]) -> list[str]:
     if not found:
         return []
-    c = found[0]
-    case = c["case"]
-    words = (
-        f"Largest difference: {case['name']}, BEMT {number_text(c['S'], 3)} N minus {c['reference']}: {c['E']:+.3g} N."
-    )
-    if abs(c["E"]) <= c["known"]:
+    c, case = found[0].c, found[0].case
+    words = f"Largest difference: {case['name']}, BEMT {number_text(c.S, 3)} N minus {c.reference}: {c.E:+.3g} N."
+    if abs(c.E) <= c.known:
         words += " This is within the uncertainty of BEMT."
-    elif not math.isfinite(c["u_D"]) and math.isfinite(needed(c)):
-        words += f" The recording states no u: they agree only if it exceeds {number_text(needed(c), 2)} N."
-    audit = next((a for a in case.get("audit", []) if a["reference"] == c["reference"]), None)
+    elif c.state == "open":
+        words += f" The recording states no u: they agree only if it exceeds {number_text(c.needed, 2)} N."
+    audit = next((a for a in case.get("audit", []) if a["reference"] == c.reference), None)
     faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
     if faults:
         words += f" Faults of its set-up: {'; '.join(faults)}."

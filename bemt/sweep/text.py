@@ -9,6 +9,7 @@ from typing import Any
 
 from bemt.base.tables import csv_text, number_text, text_table
 from bemt.sweep.case import ROW_SOURCES
+from bemt.sweep.comparison import Comparison
 
 WIDTH = 118
 CSV_COLUMNS = (
@@ -90,12 +91,11 @@ def _assumption_table(result: Mapping[str, Any]) -> str:
 def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
     """BEMT against every recorded value, with uncertainties."""
     rows = []
-    for c in result["comparisons"]:
-        if c["model"] != "k1k2" and c["source"] in ROW_SOURCES:
-            error = "-" if math.isnan(c["E"]) else f"{c['E']:+.4g}"
-            us = [_n(c["u_num"], 2), _n(c["u_input"], 2), _n(c["u_model"], 2), _u(c["u_D"]), _u(c["u_val"])]
-            values = [_n(c["S"]), _n(c["D"]), error, _pct(c["E_pct"])]
-            rows.append([c["model"], c["reference"], c["quantity"], *values, *us, c["verdict"]])
+    for c in Comparison.of(result):
+        if c.model != "k1k2" and c.source in ROW_SOURCES:
+            error = "-" if math.isnan(c.E) else f"{c.E:+.4g}"
+            us = [_n(c.u_num, 2), _n(c.u_input, 2), _n(c.u_model, 2), _u(c.u_D), _u(c.u_val)]
+            rows.append([c.model, c.reference, c.quantity, _n(c.S), _n(c.D), error, _pct(c.E_pct), *us, c.verdict])
     if not rows:
         return []
     us = ["u_num", "u_input", "u_model", "u_D", "u_val"]

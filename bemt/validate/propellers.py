@@ -14,7 +14,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
-from bemt.base.tables import json_text, write_atomic
+from bemt.base.tables import json_text, or_null, write_atomic
 from bemt.rotors.population import population
 from bemt.validate.built import Pool, expect, observe
 from bemt.validate.points import J_SHARE, Rows, Stations, compare, read_folders, statistics
@@ -178,7 +178,7 @@ def validate(
         row: dict[str, Any] = {
             "name": p.name, "family": p.family, "diameter_in": p.diameter_in, "pitch_in": p.pitch_in,
             "blades": p.blades, "stations": p.geometry.origin if p.geometry is not None else "apc_pe0",
-            "J0": _number(points.J0), "J0_bemt": _number(points.J0_bemt), **statistic,
+            "J0": or_null(points.J0), "J0_bemt": or_null(points.J0_bemt), **statistic,
         }  # fmt: skip
         if match_J0:
             fit = matched(p, eff, fixed_re, stations, points.J0)
@@ -208,10 +208,6 @@ def validate(
     doc["skipped"] = [{"name": name, "reason": why} for name, why in found.skipped]
     doc["faults"] = list(found.faults)
     return doc
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def effects_without(off: Sequence[str]) -> tuple[Effect, ...]:

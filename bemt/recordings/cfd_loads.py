@@ -1,0 +1,308 @@
+"""Which columns of the files of a CFD run are which load: by name, unit and zone, in SI, with the sign that was stated.
+
+Nothing is guessed that changes a number without saying so: a unit that no file states is asked for, so are the zones
+that count. A load of which the sign is not given is turned to positive, and the note says it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bemt.base.arrays import Array
+from bemt.base.errors import Fault
+from bemt.dataset import Dataset
+from bemt.readers._cfd import unit_of
+from bemt.readers._headings import may_be_shaft_speed
+from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
+from bemt.recordings.cfd_files import Settled, settled, zone_of
+
+_ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
+DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)
+"""Name of a zone that is the duct."""
+_NET = ("net", "total", "")
+_FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
+_MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
+_PART = re.compile(r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)")  # parts of a total
+_WORDS: dict[str, str] = {
+    "thrust": r"thrust|\bforce|^f[xyz]?$|axial[_ -]?load|schub|traction|empuje",
+    "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
+    "power": r"power|leistung",
+    "duct_thrust": r"duct|shroud|nozzle",
+    "airspeed": r"air_?speed|inlet[-_ ]?velocity|free_?stream|^[vu]_?inf|advance[-_ ](speed|velocity)|flight[-_ ]speed",
+    "density": r"density|^rho\b|^rho_kg",
+}
+"""Heading of a quantity."""
+_NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
+CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
+"""Channel of a load."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadColumn:
+    """One column of one file of the run."""
+
+    file: str
+    name: str  # as the file has it
+    stem: str  # without its zone
+    zone: str
+    axis: str  # of a vector
+    part: str  # force, moment, or "" where only the heading tells
+    unit: str
+    record: Dataset
+
+
+def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
+    """Columns of one file that may be loads or say something of them."""
+    form = str(record.provenance["format"])
+    home = zone_of(Path(file), form) if several else ""
+    clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
+    out = []
+    for name in record.values:
+        if name in clock or name.startswith(("center_of_pressure", "force_coefficient", "moment_coefficient")):
+            continue
+        if _PART.match(name):
+            continue
+        match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
+        if form == "fluent_transcript" and match is None:  # residuals
+            continue
+        stem, zone = (match[1], match[2]) if match else (name, home)
+        part, axis = "", ""
+        for word, pattern in (("force", _FORCE), ("moment", _MOMENT)):
+            if (m := pattern.fullmatch(stem)) and (m[3] is None or form in ("su2_history", "flow360_forces")):
+                part, axis = word, m[1] or m[3] or ""
+        out.append(LoadColumn(file, name, stem, zone, axis, part, record.unit(name), record))
+    return out
+
+
+def _recorded(found: list[LoadColumn]) -> list[LoadColumn]:
+    """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
+    written = [c for c in found if c.record.provenance["format"] != "fluent_transcript"]
+    return written or found
+
+
+@dataclass
+class OpenRun:
+    """A run while it is put together."""
+
+    run: RunToml
+    name: str
+    columns: list[LoadColumn]
+    complete: bool = True  # whether all its files could be read
+    period: float = math.nan
+    end: float = math.inf
+    notes: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+
+    def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
+        """Note a fault of a column's file, or of the run."""
+        self.faults.append(Fault(self.name if at is None else at.file, where, got, expected, hint))
+
+    def fact(self, quantity: str) -> RunColumn:
+        """What the user said of a quantity."""
+        return getattr(self.run.columns, quantity) or RunColumn()
+
+    def named(self, quantity: str) -> list[LoadColumn]:
+        """Columns that may be a quantity: by the name that was given, by unit, or by the words of the heading."""
+        told = self.fact(quantity).column
+        if told is not None:
+            hits = [c for c in self.columns if told in (c.name, c.stem)]
+            if not hits and self.complete:
+                known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
+                self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
+            return hits
+        dimension = QUANTITIES[quantity][0]
+        taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
+        out = []
+        for c in self.columns:
+            unit = unit_of(c.unit)
+            if c.name in taken or c.stem in taken or c.axis or (unit is not None and unit.dimension != dimension):
+                continue
+            if _NOT.search(c.stem) and unit is None:
+                continue
+            word = re.sub(r"-op$|-rfile$", "", c.stem)
+            if quantity == "rpm":
+                fits = may_be_shaft_speed(word) or unit is not None
+            else:
+                part = {"thrust": "force", "torque": "moment"}.get(quantity)
+                fits = c.part == part or re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
+            if fits:
+                out.append(c)
+        return _recorded(out)
+
+    def si(self, quantity: str, c: LoadColumn) -> Array | None:
+        """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
+        told = self.fact(quantity).unit
+        unit = unit_of(told) if told else unit_of(c.unit)
+        stated = unit_of(c.unit)
+        if told and stated is not None and unit is not None and stated.suffix != unit.suffix:
+            got = f"{told}, where the file says {c.unit}"
+            self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=...")
+            return None
+        if c.part and c.axis and not c.unit and not told:
+            factor = self._reference(c)
+            return None if factor is None else c.record[c.name] * factor
+        if unit is None:
+            usual = QUANTITIES[quantity][1]
+            hint = f'--unit {quantity}="{usual}" if that is its unit; '
+            hint += f'run.toml: [columns] {quantity} = {{ unit = "{usual}" }}'
+            got = f"no unit ({c.unit!r} is none that is known)" if c.unit else "no unit"
+            self.fault(c, c.name, got, f"the unit of the {quantity}", hint)
+            return None
+        scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
+        return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
+
+    def _reference(self, c: LoadColumn) -> float | None:
+        """Newtons, or newton metres, for one of a coefficient."""
+        ref, head = self.run.reference, self.run.run
+        rho = ref.density_kg_m3 or head.density_kg_m3
+        force = float(c.record["RefForce"][-1]) if "RefForce" in c.record else math.nan
+        if math.isnan(force) and rho and ref.area_m2 and ref.speed_m_s:
+            force = 0.5 * rho * ref.speed_m_s**2 * ref.area_m2
+        length = 1.0 if c.part == "force" else ref.length_m
+        if math.isnan(force) or length is None:
+            hint = "--reference area=A,length=L,speed=V,density=RHO in m2, m, m/s, kg/m3, as set in the solver"
+            self.fault(c, c.name, "a coefficient", "the reference values it rests on", hint)
+            return None
+        return force * length
+
+    def sign(self, quantity: str, values: Array, others: Mapping[str, float]) -> float:
+        """Sign of a load: as told, that of the whole for the duct's part, else the one that makes it positive."""
+        told = self.fact(quantity).sign
+        if told is not None:
+            return float(told)
+        if quantity == "duct_thrust":
+            return others.get("thrust", 1.0)
+        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
+        if middle < 0:
+            name = CHANNEL[quantity]
+            self.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
+        return -1.0 if middle < 0 else 1.0
+
+    def mean(self, quantity: str, c: LoadColumn) -> Settled | None:
+        """Settled value of one column."""
+        values = self.si(quantity, c)
+        if values is None:
+            return None
+        found = settled(values, c.record, self.period, self.run.run.revolutions, self.end)
+        if isinstance(found, str):
+            hint = "--revolutions N, or run on" if "revolution" in found else "Run on, or leave the file out"
+            self.fault(c, c.name, found, "a history with an average", hint)
+            return None
+        return found
+
+    def speed(self) -> Array:
+        """Speed of rotation, (N,), from the files or as given."""
+        head = self.run.run
+        own = self.named("rpm")
+        told = self.fact("rpm")
+        if own and head.rpm is not None and told.column is None:
+            stated = [c for c in own if unit_of(c.unit) is not None]
+            own = stated or [
+                c for c in own if np.unique(c.record[c.name]).size > 1 and c.record.provenance.get("clock") == "none"
+            ]
+            if own:
+                v = np.unique(own[0].record[own[0].name])
+                got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
+                usual = '--unit rpm=rpm, or --unit rpm="rad/s", says its unit' if not stated else "Leave out --rpm"
+                self.fault(own[0], own[0].name, got, "one source of the speed", usual)
+        if own and head.rpm is None:
+            values = self.si("rpm", own[0])
+            if values is not None:
+                found = (
+                    settled(values, own[0].record, math.nan, None)
+                    if own[0].record.provenance.get("clock") != "time"
+                    else None
+                )
+                return np.abs(found.values if isinstance(found, Settled) else values[-1:])
+            return np.array([math.nan])
+        if head.rpm is None:
+            self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
+        return np.array([math.nan if head.rpm is None else head.rpm])
+
+
+def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
+    """Axis of the shaft: as given, else that of the largest force."""
+    if run.run.run.axis:
+        return run.run.run.axis
+    lead = forces or moments
+    size: dict[str, float] = {}
+    for c in lead:
+        tail = c.record[c.name][-max(1, len(c.record) // 5) :]
+        size[c.axis] = size.get(c.axis, 0.0) + abs(float(np.nanmean(tail)))
+    axis = max(size, key=lambda a: size[a])
+    side = max((v for a, v in size.items() if a != axis), default=0.0)
+    if size[axis] < _ALONG * side:
+        got = ", ".join(f"{a} {v:.4g}" for a, v in size.items())
+        run.fault(lead[0], "axis", got, "one component that stands out", "Name the shaft's: --axis z")
+    return axis
+
+
+def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
+    """Columns of a load by their zone."""
+    part = {"thrust": "force", "torque": "moment"}.get(quantity, "")
+    vectors = {p: _recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
+    found = run.named(quantity)
+    if not found and part and vectors[part] and run.fact(quantity).column is None:
+        zones = run.run.run.zones
+        forces = [c for c in vectors["force"] if not zones or c.zone in zones]
+        axis = _axis(run, forces, vectors["moment"])
+        found = [c for c in vectors[part] if c.axis == axis]
+        run.notes.append(f"{quantity} along {axis}" + (", the largest force" if not run.run.run.axis else ""))
+    total = [
+        c
+        for c in found
+        if re.fullmatch(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", c.stem, re.IGNORECASE) and not c.zone
+    ]
+    labels = [
+        c.zone or (c.stem if len({(f.stem, f.zone) for f in found}) > 1 and c not in total[:1] else "") for c in found
+    ]
+    out: dict[str, LoadColumn] = {}
+    twice = 0
+    for label, c in zip(labels, found, strict=True):
+        twice += label in out
+        if label in out and twice == 1:
+            got = f"{out[label].name} ({Path(out[label].file).name}) and {c.name} ({Path(c.file).name})"
+            option = f"--column {quantity}=NAME" if out[label].name != c.name else "Give one of the files"
+            run.fault(c, quantity, got, "one column", option)
+        out.setdefault(label, c)
+    return out
+
+
+def counted_zones(
+    run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn]
+) -> tuple[list[tuple[float, str]], list[str]]:
+    """Zones whose loads are added (with their sign), and those of them that are the duct."""
+    head = run.run.run
+    ducts = [z for z in pool if (z in head.duct_zones if head.duct_zones is not None else bool(DUCT.search(z)))]
+    torque = quantity == "torque"
+    if head.zones is not None:
+        known = [z for z in head.zones if z in pool]
+        if "Net" in head.zones and len(head.zones) > 1:
+            run.fault(None, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
+        if torque and not known and list(pool) == [""]:
+            return [(1.0, "")], []
+        if absent := [z for z in head.zones if z not in pool]:
+            if not torque or not known:
+                hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
+                run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
+            elif bare := [z for z in absent if not DUCT.search(z)]:
+                run.notes.append(f"torque: no column for {', '.join(bare)}")
+        duct = [z for z in known if z in ducts]
+        return [(1.0, z) for z in known if not (torque and z in duct and len(duct) < len(known))], duct
+    net = next((z for z in pool if z.lower() in _NET), None)
+    if net is not None:
+        less = ducts if torque else []
+        if less:
+            run.notes.append(f"torque: {net or 'the whole'} less {', '.join(less)}: the shaft's own")
+        return [(1.0, net), *((-1.0, z) for z in less)], ducts
+    if len(pool) > 1:
+        names = ",".join(pool)
+        hint = f"--zones {names} (leave out what does not count)"
+        run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
+    return [(1.0, z) for z in pool], [z for z in ducts if len(pool) > 1]
