@@ -202,7 +202,7 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     if decision.verdict == "none":
         return suggestion.nothing_called_for(found)
     if mend := wrong_rotor_check.to_mend(found.problem, decision):
-        return suggestion.Suggestion(mend, (), (), 0.0, 0.0, "mend")
+        return suggestion.mended(found, mend)
     if decision.verdict in ("insufficient", "unknown") and wrong_rotor_check.another_label(found.problem):
         return suggestion.Suggestion(suggestion.ROTOR, (), (), 0.0, 0.0, "rotor")
     if not singles:

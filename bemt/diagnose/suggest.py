@@ -96,7 +96,7 @@ class Suggestion:
     checks: str = ""  # Effect that a check looks for
     minutes: float = 0.0  # Time that it takes on a stand [min]
     gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
-    otherwise: Suggestion | None = None  # What to do if there can be no such reference
+    otherwise: Suggestion | None = None  # What to do if there can be no such reference, or nothing to mend
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -218,6 +218,12 @@ def nothing_called_for(found: Evidence) -> Suggestion:
         return Suggestion(text, (), (), 0.0, 0.0, "reference")
     text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
     return Suggestion(text, (), (), 0.0, 0.0, "reference")
+
+
+def mended(found: Evidence, what: str) -> Suggestion:
+    """Put the recording right; where nothing is wrong with it, only a reference shows what else it may be."""
+    reference = None if _referenced(found) else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
+    return Suggestion(what, (), (), 0.0, 0.0, "mend", otherwise=reference)
 
 
 def weather(found: Evidence) -> Suggestion | None:
