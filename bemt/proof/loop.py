@@ -37,8 +37,6 @@ from bemt.proof.rigs import Rig
 
 SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
-# Sets in the order of work: what the targets speak of comes first.
-_FIRST = ("pair", "single", "sensor", "null", "mismatch", "unlisted")
 _DONE = ("named", "sensor")
 _NEW, _REFERENCE, _CASE = "new_run.csv", "reference.csv", "case.toml"
 _FIXED_POINTS = 6
@@ -311,52 +309,63 @@ def loop(
     return document
 
 
-def _rank(entry: Mapping[str, Any]) -> tuple[bool, int]:
-    """Place of an item in the order of work: what is to be found first."""
-    kind = str(entry["set"])
-    hidden = bool(entry["causes"]) and kind != "unlisted" and not score.judge(entry, None).visible
-    return hidden, _FIRST.index(kind) if kind in _FIRST else len(_FIRST)
+def _rank(entry: Mapping[str, Any]) -> int:
+    """Place of an item in the order of work: visible pairs, the others in mixed order, last what no plan can see."""
+    if not entry["causes"] or entry["set"] == "unlisted":
+        return 1
+    return (0 if entry["set"] == "pair" else 1) if score.judge(entry, {}).separation >= score.VISIBLE else 2
 
 
-def judge(entry: Mapping[str, Any], course: Course, runs: int) -> score.Judged:
-    """Judge what a course has said after so many runs: what was put aside, and the last answer."""
-    at = course.after(runs)
+def _named(entry: Mapping[str, Any], course: Course, at: int) -> list[str]:
+    """What a course has named up to an answer; of names for one cause, which the plan cannot tell apart, one."""
     last = course.answers[at]
-    before = list(dict.fromkeys(n for names in course.aside[:at] for n in names))
-    if not before:
-        return score.judge(entry, last)
-    claimed = [*before, *last["effects"]] if last["verdict"] in _DONE else before
-    names = list(dict.fromkeys(claimed))
+    said = [*(n for some in course.aside[:at] for n in some), *(last["effects"] if last["verdict"] in _DONE else ())]
+    names = list(dict.fromkeys(said))
     allowed = [{c, *alike} for c, alike in zip(entry["causes"], entry["alike"], strict=True)]
-    if all(any(n in a for a in allowed) for n in names):  # two names for one cause, which look alike, are one
-        one_each = [[n for n in names if n in a] or [""] for a in allowed]
-        names = max((list(filter(None, dict.fromkeys(some))) for some in product(*one_each)), key=len)
-    named = score.judge(entry, {**last, "verdict": "named", "effects": names})
-    if last["verdict"] != "class":
-        return replace(named, answer={**named.answer, "sets": [[n] for n in names]})
-    sets = [list(s) for s in last.get("sets") or [last["effects"]]]
-    sets = [*([n] for n in names if not any(n in s for s in sets)), *sets]
-    wrong = not all(any(n in a for a in allowed) for n in names)
-    more = any(c in last["effects"] for c in entry["causes"] if c not in names)
-    said = {**last, "effects": [*names, *last["effects"]], "sets": sets}
-    return replace(named, right=more and not wrong, answer=said)
+    if not all(any(n in a for a in allowed) for n in names):
+        return names
+    of_each = [[n for n in names if n in a] or [""] for a in allowed]
+    return max((list(filter(None, dict.fromkeys(some))) for some in product(*of_each)), key=len)
+
+
+def judge(entry: Mapping[str, Any], course: Course, runs: int) -> tuple[score.Judged, bool]:
+    """Judge what a course has said after so many runs, and whether what it named is what is at work.
+
+    Everything that was named counts, and so does the class of the last answer: where nothing is left to find, that is a
+    wrong claim, but what was named before stays found.
+    """
+    at = course.after(runs)
+    last, names = course.answers[at], _named(entry, course, at)
+    if not names:
+        return score.judge(entry, last), False
+    named = score.judge(entry, {**last, "verdict": "named", "effects": names, "sets": [[n] for n in names]})
+    # a class with what was put aside in it asks for no second cause
+    if last["verdict"] != "class" or set(names) & set(last["effects"]):
+        return named, named.right
+    there = {c for c, alike in zip(entry["causes"], entry["alike"], strict=True) if not {c, *alike} & set(names)}
+    known = {i for c, alike in zip(entry["causes"], entry["alike"], strict=True) for i in (c, *alike)}
+    right = bool(there & set(last["effects"])) and known >= set(names)
+    said = {**last, "effects": [*names, *last["effects"]], "sets": [*([n] for n in names), last["effects"]]}
+    return replace(named, right=right, answer=said), named.right
 
 
 def _scored(entries: Sequence[Mapping[str, Any]], courses: Sequence[Course], runs: int, fixed: bool) -> dict[str, Any]:
     """What was found after each number of runs, and what it cost."""
     after = []
     for k in range(runs + 1):
-        judged = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
-        visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible]
-        pairs = [j for j in judged if j.entry["set"] == "pair" and j.visible]
+        pairs_of = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
+        judged = [j for j, _ in pairs_of]
+        visible = [(j, exact) for j, exact in pairs_of if j.entry["set"] in ("single", "sensor") and j.visible]
+        pairs = [(j, exact) for j, exact in pairs_of if j.entry["set"] == "pair" and j.visible]
         nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch")]
         caused = [j for j in judged if j.entry["causes"] and j.entry["set"] != "unlisted" and j.claims]
         spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e["causes"]]
         after.append({
             "runs": k,
-            "found": _count(j.right and j.answer["verdict"] != "class" for j in visible),
-            "found_or_class": _count(j.right for j in visible),
-            "pairs": _count(score.in_sets(j) for j in pairs),
+            "found": _count(exact for _, exact in visible),
+            "found_or_class": _count(exact or j.right for j, exact in visible),
+            "pairs_named": _count(exact for _, exact in pairs),
+            "pairs": _count(exact or score.in_sets(j) for j, exact in pairs),
             "right_when_claimed": _count(j.right for j in caused),
             "nulls_accused": _count(j.claims for j in nothing),
             "unlisted_named": _count(j.claims for j in judged if j.entry["set"] == "unlisted"),
@@ -380,9 +389,9 @@ def text(document: Mapping[str, Any]) -> str:
     def share(pair: Sequence[int]) -> str:
         return f"{pair[0]}/{pair[1]} ({100 * pair[0] / pair[1]:.0f} %)" if pair[1] else "-"
 
-    keys = ("found", "found_or_class", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
+    keys = ("found", "found_or_class", "pairs_named", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
     rows = [[str(a["runs"]), *(share(a[k]) for k in keys), f"{a['minutes']:.0f}"] for a in document["after"]]
-    header = ["runs", "named", "named or in class", "pairs in sets", "right when it claims", "nulls accused",
+    header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims", "nulls accused",
               "unlisted named", "stand [min]"]  # fmt: skip
     title = {"fixed": "the fixed programme: a reference, a sweep at rest, a sweep in wind",
              "recommended": "the step that follows from each answer"}[document["programme"]]  # fmt: skip
