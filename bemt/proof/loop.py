@@ -391,8 +391,8 @@ def text(document: Mapping[str, Any]) -> str:
 
     keys = ("found", "found_or_class", "pairs_named", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
     rows = [[str(a["runs"]), *(share(a[k]) for k in keys), f"{a['minutes']:.0f}"] for a in document["after"]]
-    header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims", "nulls accused",
-              "unlisted named", "stand [min]"]  # fmt: skip
+    header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims",
+              "nulls accused", "unlisted named", "stand [min]"]  # fmt: skip
     title = {"fixed": "the fixed programme: a reference, a sweep at rest, a sweep in wind",
              "recommended": "the step that follows from each answer"}[document["programme"]]  # fmt: skip
     ends = ", ".join(f"{k} {n}" for k, n in document["ends"].items())
