@@ -548,20 +548,27 @@ def test_no_answer_is_no_virtue() -> None:
 # The promise of the loop: what an answer recommends is done on the hidden stand, and nothing else changes there.
 
 
-def _followed(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, there: dict[str, Any], answers: list[dict[str, Any]], runs: int = 3
-) -> tuple[loop.Course, list[list[str]], list[dict[str, Any]]]:  # fmt: skip
-    """Course of a sealed item whose answers are given: with the commands and the recordings that were seen."""
-    monkeypatch.setattr(items.Bench, "signatures", lambda self: {})
+@pytest.fixture(scope="module")
+def weighed(patched: Any) -> tuple[items.Bench, Item]:
+    """Item whose thrust cell is 10 % off, without a reference of its own."""
     bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
-    made = items.make_item(bench, tuple(there["causes"]), (2.0,) * len(there["causes"]), 5, there["set"])
-    out = tmp_path / "proof"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(items, "_REFERENCED", 0.0)
+        return bench, items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
+
+
+def _followed(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[dict[str, Any]],
+    runs: int = 3,
+) -> tuple[loop.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
+    """Course of the item whose answers are given, with the commands and the files that were seen."""
+    bench, made = weighed
     for home, more in (("items", {}), (prove.ASKED, {"reference.csv": made.reference})):
         (out / home / "0000").mkdir(parents=True)
         for name, words in {**made.files, **more}.items():
             (out / home / "0000" / name).write_text(words, encoding="utf-8")
     asked: list[list[str]] = []
-    seen: list[dict[str, Any]] = []
+    seen = [dict(made.files)]
 
     def spy(folder: Path, words: list[str]) -> tuple[dict[str, Any], str]:
         if "--out" in words:  # a name goes into the case
@@ -574,34 +581,36 @@ def _followed(
         return answers[len(asked)], ""
 
     monkeypatch.setattr(prove, "asked", spy)
-    sealed_entry = {**there, **made.entry, "folder": "0000"}
-    course = loop._course(out, sealed_entry, bench, answers[0], runs, fixed=False)
-    return course, asked, [dict(made.files), *seen]
+    monkeypatch.setattr(items, "_REFERENCED", 0.0)
+    course = loop._course(out, {**made.entry, "folder": "0000"}, bench, answers[0], runs, fixed=False)
+    return course, asked, seen
 
 
 def _median(text: str, column: str) -> float:
     return float(np.median(np.genfromtxt(text.splitlines(), delimiter=",", names=True)[column]))
 
 
-REFERENCE_STEP = {"kind": "reference", "commands": ["bemt diagnose recording.csv --reference reference.csv --case c"]}
+REFERENCE_STEP = {"kind": "reference", "commands": ["bemt diagnose recording.csv --reference reference.csv --case case.toml"]}
 
 
-def test_a_none_that_recommends_a_reference_is_followed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(items, "_REFERENCED", 0.0)
+def test_a_none_that_recommends_a_reference_is_followed(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     said = [answer("none", next_measurement=REFERENCE_STEP), answer("none", next_measurement={"kind": ""})]
-    course, asked, seen = _followed(monkeypatch, tmp_path, entry("null"), said)
+    course, asked, seen = _followed(weighed, monkeypatch, tmp_path, said)
     assert course.steps == ["reference"] and course.end == "none"
     assert "reference.csv" in asked[0] and "reference.csv" in seen[1]
 
 
-def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A thrust cell 10 % off: mended, it reads as the reference does; the torque cell mended instead, as before."""
-    monkeypatch.setattr(items, "_REFERENCED", 0.0)
+def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A thrust cell 10 % off: mended, it reads a tenth less; the torque cell mended instead, as before."""
     there = entry("sensor", "thrust_gain")
     ratio, found = {}, {}
     for k, name in enumerate(("thrust_gain", "torque_gain")):
         said = [answer("sensor", name), answer("none")]
-        course, asked, seen = _followed(monkeypatch, tmp_path / str(k), there, said)
+        course, asked, seen = _followed(weighed, monkeypatch, tmp_path / str(k), said)
         assert course.steps == ["mend"] and asked[0][-2:] == ["--ruled-out", name]
         before, after = (files["recording.csv"] for files in seen)
         assert before != after
@@ -614,18 +623,15 @@ def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(monkeypatch: pyte
 
 
 def test_a_pair_is_found_one_after_the_other_and_a_model_is_no_run(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(items, "_REFERENCED", 0.0)
     there = entry("pair", "untwist", "thrust_gain")
-    said = [answer("named", "untwist"), answer("sensor", "thrust_gain"), answer("none", next_measurement=REFERENCE_STEP),
-            answer("none")]  # fmt: skip
-    course, asked, _ = _followed(monkeypatch, tmp_path, there, said, runs=2)
-    assert course.steps == ["model", "mend", "reference"] and course.after(0) == 1
-    assert asked[0][asked[0].index("--case") + 1] != "case.toml" and "--reference-case" not in asked[1]
-    assert [loop.judge(there, course, k)[1] for k in (0, 1, 2)] == [True] * 3
-    first = loop.Course("0000", said[:1])
-    assert not loop.judge(there, first, 0)[1]
+    said = [answer("named", "untwist"), answer("none", next_measurement=REFERENCE_STEP),
+            answer("sensor", "thrust_gain")]  # fmt: skip
+    course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said, runs=1)
+    assert course.steps == ["model", "reference"] and course.end == "used up"
+    assert asked[0][asked[0].index("--case") + 1] != "case.toml"
+    assert [loop.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
 
 
 def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> None:
