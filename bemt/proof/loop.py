@@ -164,8 +164,8 @@ def _recommended(item: _Item, answer: Mapping[str, Any]) -> _Taken | str:
     step = answer.get("next_measurement") or {}
     if answer["verdict"] in _DONE:
         return _put_aside(item, answer["effects"], bool(answer.get("confirmed")))
-    if step.get("kind") == "look" and not step.get("checks"):  # of a class, the one that is sure is to be put right
-        return _put_aside(item, [s[0] for s in answer.get("sets", ()) if len(s) == 1], False)
+    if step.get("kind") == "look" and not step.get("checks"):  # of a class, the fault that is sure is to be put right
+        return _put_aside(item, [s[0] for s in answer.get("sets", ()) if len(s) == 1 and _at_the_stand(s[0])], False)
     taken = _step(item, step)
     if taken in ("no reference", "mend") and step.get("otherwise"):
         taken = _step(item, step["otherwise"])
@@ -177,8 +177,7 @@ def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | st
     new = [n for n in names if n not in item.aside]
     if not new:
         return "named again" if names else "no run"
-    known = effects.catalogue()
-    faults = [n for n in new if n in _SET_UP or (n in known and known[n].kind == "stand")]
+    faults = [n for n in new if _at_the_stand(n)]
     if faults and not item.left:
         return "used up"
     others = [n for n in new if n not in faults]
@@ -193,6 +192,12 @@ def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | st
         return "no run"
     # what was put right is known to be right
     return _Taken("mend", minutes("look", 0) + minutes("run", points), [*words, "--ruled-out", *faults], new)
+
+
+def _at_the_stand(name: str) -> bool:
+    """Whether somebody at the stand can put a cause right."""
+    known = effects.catalogue()
+    return name in _SET_UP or (name in known and known[name].kind == "stand")
 
 
 def _step(item: _Item, step: Mapping[str, Any]) -> _Taken | str:
