@@ -20,6 +20,7 @@ from bemt.proof import (
     causes,
     draw,
     items,
+    loop,
     proof_text,
     prove,
     real,
@@ -542,6 +543,107 @@ def test_no_answer_is_no_virtue() -> None:
     assert rows["failed"].met is False
     assert rows["claims on nulls, noise"].met is None
     assert rows["top 1, visible"].value == 0.0
+
+
+# The promise of the loop: what an answer recommends is done on the hidden stand, and nothing else changes there.
+
+
+@pytest.fixture(scope="module")
+def weighed(patched: Any) -> tuple[items.Bench, Item]:
+    """Item whose thrust cell is 10 % off, without a reference of its own."""
+    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(items, "_REFERENCED", 0.0)
+        return bench, items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
+
+
+def _followed(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[dict[str, Any]],
+    runs: int = 3,
+) -> tuple[loop.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
+    """Course of the item whose answers are given, with the commands and the files that were seen."""
+    bench, made = weighed
+    for home, more in (("items", {}), (prove.ASKED, {"reference.csv": made.reference})):
+        (out / home / "0000").mkdir(parents=True)
+        for name, words in {**made.files, **more}.items():
+            (out / home / "0000" / name).write_text(words, encoding="utf-8")
+    asked: list[list[str]] = []
+    seen = [dict(made.files)]
+
+    def spy(folder: Path, words: list[str]) -> tuple[dict[str, Any], str]:
+        if "--out" in words:  # a name goes into the case
+            home = folder / words[words.index("--out") + 1]
+            home.mkdir()
+            (home / "case.toml").write_text("", encoding="utf-8")
+            return answers[0], ""
+        asked.append(list(words))
+        seen.append({f.name: f.read_text("utf-8") for f in folder.glob("*.csv")})
+        return answers[len(asked)], ""
+
+    monkeypatch.setattr(prove, "asked", spy)
+    monkeypatch.setattr(items, "_REFERENCED", 0.0)
+    course = loop._course(out, {**made.entry, "folder": "0000"}, bench, answers[0], runs, fixed=False)
+    return course, asked, seen
+
+
+def _median(text: str, column: str) -> float:
+    return float(np.median(np.genfromtxt(text.splitlines(), delimiter=",", names=True)[column]))
+
+
+REFERENCE_STEP = {"kind": "reference", "commands": ["bemt diagnose recording.csv --reference reference.csv --case case.toml"]}
+
+
+def test_a_none_that_recommends_a_reference_is_followed(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    said = [answer("none", next_measurement=REFERENCE_STEP), answer("none", next_measurement={"kind": ""})]
+    course, asked, seen = _followed(weighed, monkeypatch, tmp_path, said)
+    assert course.steps == ["reference"] and course.end == "none"
+    assert "reference.csv" in asked[0] and "reference.csv" in seen[1]
+
+
+def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A thrust cell 10 % off: mended, it reads a tenth less; the torque cell mended instead, as before."""
+    there = entry("sensor", "thrust_gain")
+    ratio, found = {}, {}
+    for k, name in enumerate(("thrust_gain", "torque_gain")):
+        said = [answer("sensor", name), answer("none")]
+        course, asked, seen = _followed(weighed, monkeypatch, tmp_path / str(k), said)
+        assert course.steps == ["mend"] and asked[0][-2:] == ["--ruled-out", name]
+        before, after = (files["recording.csv"] for files in seen)
+        assert before != after
+        ratio[name] = _median(before, "thrust_N") / _median(after, "thrust_N")
+        found[name] = loop.judge(there, course, 3)
+    assert abs(ratio["thrust_gain"] - 1.0) > 0.05
+    assert ratio["torque_gain"] == pytest.approx(1.0, abs=0.02)
+    assert found["thrust_gain"][1] and found["thrust_gain"][0].right
+    assert not found["torque_gain"][1] and found["torque_gain"][0].claims and not found["torque_gain"][0].right
+
+
+def test_a_pair_is_found_one_after_the_other_and_a_model_is_no_run(
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    there = entry("pair", "untwist", "thrust_gain")
+    said = [answer("named", "untwist"), answer("none", next_measurement=REFERENCE_STEP),
+            answer("sensor", "thrust_gain")]  # fmt: skip
+    course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said, runs=1)
+    assert course.steps == ["model", "reference"] and course.end == "used up"
+    assert asked[0][asked[0].index("--case") + 1] != "case.toml"
+    assert [loop.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
+
+
+def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> None:
+    there = entry("sensor", "thrust_gain")
+    said = [answer("sensor", "thrust_gain"), answer("class", "duct", "nacelle")]
+    course = loop.Course("0000", said, ["mend"], [15.0], [["thrust_gain"]], "used up")
+    judged, exact = loop.judge(there, course, 1)
+    assert exact and judged.claims and not judged.right
+    wrong = replace(course, answers=[*said[:1], answer("named", "duct")])
+    assert loop.judge(there, wrong, 1)[1] is False
+    nothing = loop.judge(entry("null"), replace(course, answers=[said[0], answer("none")]), 1)[0]
+    assert nothing.claims and not nothing.right
 
 
 # The promise of the proof's real part: published recordings, registered causes, and files that do not tell them.

@@ -31,6 +31,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--off", metavar="EFFECT", help=off, **_options.REPEATABLE)
     known = "recordings without the cause; show how far model and stand differ anyway"
     parser.add_argument("--reference", default=[], metavar="RECORDING", help=known, **_options.MANY)
+    theirs = "case of the references where it differs: without an effect that was put into the case (default: CASE)"
+    parser.add_argument("--reference-case", metavar="CASE", help=theirs)
     model = "model to compare with the recordings (default bemt; k1k2: thrust only)"
     parser.add_argument("--baseline", choices=("bemt", "k1k2"), default="bemt", help=model)
     only = "consider only these effects (default: all)"
@@ -71,20 +73,24 @@ def run(args: argparse.Namespace) -> int:
     from bemt.diagnose.along_blade import along
     from bemt.diagnose.chain import diagnose
     from bemt.diagnose.document import document, text
-    from bemt.diagnose.load import load_all
+    from bemt.diagnose.load import cases_of, load_all
 
     args.case, args.recordings = _options.sorted_out(args.case, args.recordings)
     _both_there(args)
+    known = cases_of([args.reference_case], args.off, 1)[0] if args.reference_case else None
     cases, recordings = load_all(args.recordings, args.case, args.reference, args.off, args.only or (),
                                  before=lambda found: folder.check(args.out, found), rpm=args.rpm,
-                                 airspeed_m_s=args.airspeed, ruled_out=args.ruled_out)  # fmt: skip
+                                 airspeed_m_s=args.airspeed, ruled_out=args.ruled_out,
+                                 reference_case=known)  # fmt: skip
+    chosen = cases * len(args.recordings) if len(cases) == 1 else cases
+    each = cases if known is None else [*chosen, *[known] * len(args.reference)]
     if args.repeatability is not None:
         recordings = [replace(r, repeatability=args.repeatability) for r in recordings]
     with _terminal.progress(args.quiet or args.json) as say:
         channels = [_CHANNELS[c] for c in args.channels or ()] or None
         try:
             answer = diagnose(
-                recordings, cases, args.only or None, say, baseline=args.baseline, given=_given(args), channels=channels
+                recordings, each, args.only or None, say, baseline=args.baseline, given=_given(args), channels=channels
             )
         except InputError as error:
             if len(args.recordings) > 1 or any(f.where != "readings" for f in error.faults):
@@ -108,6 +114,8 @@ def _both_there(args: argparse.Namespace) -> None:
     from bemt.base.errors import Fault, InputError
 
     faults = [] if args.recordings else [Fault("RECORDING", "", "none", "one or more tables or logs")]
+    if args.reference_case and not args.reference:
+        faults.append(Fault("--reference-case", "", "no reference", "--reference RECORDING beside it"))
     faults += [] if args.case else [Fault("--case", "", "no case", "the case of the rotor, as in cases/prop_8x5")]
     if faults:
         raise InputError(faults)
@@ -133,6 +141,8 @@ def _given(args: argparse.Namespace) -> Given:
     words = ["--case", *args.case]
     for option, values in (("--off", args.off), ("--only", args.only or ())):
         words += [w for v in values for w in (option, v)] if option == "--off" else [option, *values] if values else []
+    if args.reference_case:
+        words += ["--reference-case", args.reference_case]
     if args.repeatability is not None:
         words += ["--repeatability", f"{100.0 * args.repeatability:g}"]
     if args.baseline != "bemt":

@@ -199,10 +199,17 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     """Run against the strongest rival of the leading explanation, "nothing" included where no name is given."""
     single = {i: found.probability[Explanation.of(i)] for i in found.spans}
     singles = sorted(single, key=lambda i: -single[i])
+
+    def rivals_of(ids: Sequence[str]) -> list[suggestion.Rival]:
+        settings = {i: fitting.fit(found, Explanation.of(i)).settings[0] for i in ids if i}
+        return [suggestion.Rival(i, settings.get(i, {}), weight[i]) for i in ids]
+
+    weight = single | {"": found.probability[NONE]}
     if decision.verdict == "none":
-        return suggestion.nothing_called_for(found)
+        faint = rivals_of(["", *singles][:_MOST_RIVALS])
+        return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
     if mend := wrong_rotor_check.to_mend(found.problem, decision):
-        return suggestion.Suggestion(mend, (), (), 0.0, 0.0, "mend")
+        return suggestion.mended(found, mend)
     if decision.verdict in ("insufficient", "unknown") and wrong_rotor_check.another_label(found.problem):
         return suggestion.Suggestion(suggestion.ROTOR, (), (), 0.0, 0.0, "rotor")
     if not singles:
@@ -226,11 +233,6 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
         rivals.insert(0, "")
     else:
         rivals.append("")
-    weight = single | {"": none}
     order = [lead, rivals[0], *sorted(rivals[1:], key=lambda i: -weight[i])][:_MOST_RIVALS]
     open_ = decision.verdict in ("class", "unknown", "insufficient")
-    return suggestion.suggest(
-        found,
-        [suggestion.Rival(i, fitting.fit(found, Explanation.of(i)).settings[0] if i else {}, weight[i]) for i in order],
-        found.probability[UNKNOWN], reference=open_,
-    )  # fmt: skip
+    return suggestion.suggest(found, rivals_of(order), found.probability[UNKNOWN], reference=open_)

@@ -231,8 +231,13 @@ def load_all(
     recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
     rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), ruled_out: Sequence[str] = (),
+    reference_case: Case | None = None,
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
-    """Cases and recordings, the references last; ``before`` may refuse the cases before any recording is read."""
+    """Cases of the recordings, and recordings with the references last.
+
+    ``before`` may refuse the cases before any recording is read. References have the case of the recordings unless
+    they have one of their own.
+    """
     _told_twice([*recordings, *references], only, ruled_out)
     found = _together(
         lambda: cases_of(cases, off, len(recordings)), *(partial(_there, p) for p in (*recordings, *references))
@@ -244,9 +249,11 @@ def load_all(
     chosen = found * len(recordings) if len(found) == 1 else found
     counts = (len(recordings), len(recordings) + len(references))
     speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed", airspeed_m_s, *counts)
-    files = list(zip([*recordings, *references], [*chosen, *found[:1] * len(references)], speeds, winds, strict=True))
-    if references and len(found) > 1:
-        raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all when there are references"))
+    of_each = [*chosen, *[reference_case or found[0]] * len(references)]
+    files = list(zip([*recordings, *references], of_each, speeds, winds, strict=True))
+    if references and len(found) > 1 and reference_case is None:
+        hint = "--reference-case states that of the references"
+        raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all, or theirs", hint))
     read = _together(*(partial(load, p, c, None, n, v) for p, c, n, v in files))
     known = [replace(r, reference=True) for r in read[len(recordings) :]]
     return found, [*read[: len(recordings)], *known]

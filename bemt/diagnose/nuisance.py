@@ -74,9 +74,13 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             names.append(name)
             solver.append(own)
 
-    def everywhere(extra: Effect) -> Array:
-        """Readings with an effect that reference recordings have too."""
-        full = [p.predict((*(e for e in p.baseline if e.id != extra.id), extra)) for p in problem.parts]
+    def everywhere(extra: Effect, where_on: bool = False) -> Array:
+        """Readings with an effect that reference recordings have too, or only in the parts whose case has it."""
+        full = []
+        for p in problem.parts:
+            others = [e for e in p.baseline if e.id != extra.id]
+            off = where_on and len(others) == len(p.baseline)
+            full.append(p.predict(p.baseline if off else (*others, extra)))
         return np.concatenate(full)[problem.kept]
 
     blade, offset = problem.blade, np.zeros_like(y)
@@ -145,7 +149,7 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
             value = float(getattr(e, parameter.name))
             value = value + step if value + step <= parameter.high else value - step
-            changed = everywhere(replace(e, **{parameter.name: value})) - f0  # type: ignore[type-var]
+            changed = everywhere(replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
     for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]

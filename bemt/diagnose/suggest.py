@@ -96,7 +96,7 @@ class Suggestion:
     checks: str = ""  # Effect that a check looks for
     minutes: float = 0.0  # Time that it takes on a stand [min]
     gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
-    otherwise: Suggestion | None = None  # What to do if there can be no such reference
+    otherwise: Suggestion | None = None  # What to do if there can be no such reference, or nothing to mend
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -208,16 +208,26 @@ def _relative(u: Array, y: Array) -> float:
     return float(np.median(u[known] / np.maximum(np.abs(y[known]), 1e-12))) if known.any() else float("nan")
 
 
-def nothing_called_for(found: Evidence) -> Suggestion:
-    """What is left to say after "none": nothing to do, and what would show fainter causes."""
+def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float) -> Suggestion:
+    """What is left to say after "none": nothing to do, and what would show fainter causes.
+
+    Nobody can take friction or compressibility away for a reference: a run that removes doubt is the other way.
+    """
     if _referenced(found):
         return weather(found) or Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
+    best = suggest(found, rivals, unknown, reference=True)
+    run = next((s for s in (best, best.otherwise) if s and s.kind == "run" and s.gain), None)
     level = max((abs(v) for v in found.problem.level.values()), default=0.0)
+    text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
     if level > LEVEL:
         text = f"{REFERENCE}; it shows whether the level comes from blade, stand or model"
-        return Suggestion(text, (), (), 0.0, 0.0, "reference")
-    text = "no further run is needed; with a reference run (the same rotor before the change) weaker causes would show"
-    return Suggestion(text, (), (), 0.0, 0.0, "reference")
+    return Suggestion(text, (), (), 0.0, 0.0, "reference", otherwise=run)
+
+
+def mended(found: Evidence, what: str) -> Suggestion:
+    """Put the recording right; where nothing is wrong with it, only a reference shows what else it may be."""
+    reference = None if _referenced(found) else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
+    return Suggestion(what, (), (), 0.0, 0.0, "mend", otherwise=reference)
 
 
 def weather(found: Evidence) -> Suggestion | None:
@@ -310,15 +320,18 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     able.sort(key=lambda c: -c.gain / c.minutes)
     certain = before >= _ENOUGH and not reference
     look = _look(names, part.record)
+    worth = [c for c in choices if c.kind == "run" and c.gain * total >= _WORTH]
+    # without a reference, one that tells only the others apart is better than nothing
+    instead = look or max(worth, key=lambda c: c.gain / c.minutes, default=None)
     if able and not (look and certain):
-        run = next((c for c in able if c.kind == "run"), look)
+        run = next((c for c in able if c.kind == "run"), instead)
         return replace(able[0], otherwise=run) if able[0].kind == "reference" else able[0]
     if look:
         return replace(look, before=before, after=before)
     if certain:
         return Suggestion("no further run is needed; none would tell more", (), (), before, before, "")
     if reference and not _referenced(found):
-        return replace(choices[-1], otherwise=look)
+        return replace(choices[-1], otherwise=instead)
     return Suggestion("more repeats of the same points; no other practical run separates them better", (), (), before,
                       before)  # fmt: skip
 

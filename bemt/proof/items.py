@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
@@ -140,8 +141,10 @@ class Hidden:
     more: np.random.Generator
 
 
-def hidden(bench: Bench, ids: Sequence[str], strengths: Sequence[float], seed: int, kind: str) -> Hidden:
-    """Draw rotor and stand of an item from its seed; the same whenever it is asked."""
+def hidden(
+    bench: Bench, ids: Sequence[str], strengths: Sequence[float], seed: int, kind: str, mended: Collection[str] = ()
+) -> Hidden:  # fmt: skip
+    """Draw rotor and stand of an item from its seed; the same whenever it is asked, but for causes that were mended."""
     rng = np.random.default_rng(seed)
     causes = [CAUSES[i] for i in ids]
     changes = [c.make(f, bench.rig, bench.rows, rng) for c, f in zip(causes, strengths, strict=True)]
@@ -162,7 +165,9 @@ def hidden(bench: Bench, ids: Sequence[str], strengths: Sequence[float], seed: i
         section = replace(world.section, camber=_CAMBER_OFF * float(camber))
         world = replace(world, section=section, pitch_offset=world.pitch_offset + _BLADE_OFF * float(turn))
     own_world, own_stand = world, stand
-    for change in changes:
+    for cause, change in zip(causes, changes, strict=True):
+        if cause.id in mended:
+            continue
         own, shape = dict(change.world), dict(change.section)
         if "pitch_offset" in own:
             own["pitch_offset"] += world.pitch_offset
@@ -263,21 +268,40 @@ def _shown(
     return shown
 
 
-def further_run(bench: Bench, entry: Mapping[str, Any], runs: Sequence[Sequence[Mapping[str, float]]]) -> str:
-    """The last of the runs that were asked for, as CSV, on the rotor and stand of an item; "" if it has no solution."""
-    h = hidden(bench, entry["causes"], entry["strengths"], int(entry["seed"]), entry["set"])
+def further_run(
+    bench: Bench, entry: Mapping[str, Any], runs: Sequence[Sequence[Mapping[str, float]]],
+    mended: Collection[str] = (), day: int = 0,
+) -> str:  # fmt: skip
+    """The last of the runs that were asked for, as CSV, on the rotor and stand of an item; "" if it has no solution.
+
+    ``mended`` are causes that are no longer there; each ``day`` has noise of its own.
+    """
     rows = bench.rows
     for points in runs:
         rows = extended(rows, points)
-    wider = Bench(bench.rig, bench.plan, rows)
+    own = np.arange(rows.rpm.size) >= rows.rpm.size - len(runs[-1])
+    told = any("pressure_Pa" in p for p in runs[-1])
+    return _measured_again(Bench(bench.rig, bench.plan, rows), bench, entry, own, mended, (2, len(runs), day), told)
+
+
+def recorded_again(bench: Bench, entry: Mapping[str, Any], mended: Collection[str], day: int) -> str:
+    """The points of an item once more on another day, as CSV, without the causes that were mended; "" if unsolved."""
+    return _measured_again(bench, bench, entry, np.ones(bench.rows.rpm.size, dtype=bool), mended, (3, day), False)
+
+
+def _measured_again(
+    wider: Bench, bench: Bench, entry: Mapping[str, Any], own: NDArray[np.bool_], mended: Collection[str],
+    draw: tuple[int, ...], air_told: bool,
+) -> str:  # fmt: skip
+    """Own rows of a bench on rotor and stand of an item."""
+    h = hidden(bench, entry["causes"], entry["strengths"], int(entry["seed"]), entry["set"], mended)
     # each cell keeps the full scale that it had
     scales = full_scales(bench.measure(h.world, h.stand)[0])
-    rng = np.random.default_rng((int(entry["seed"]), 2, len(runs)))
+    rng = np.random.default_rng((int(entry["seed"]), *draw))
     real, columns = wider.measure(h.world, h.stand, rng, scales=scales)
-    air_known = "air_density" not in entry["causes"] and any("pressure_Pa" in p for p in runs[-1])
-    shown = _shown(wider, real, columns, h.stand, air_known or bool(entry.get("air_known")), rng, h.stated)
-    last = np.arange(rows.rpm.size) >= rows.rpm.size - len(runs[-1])
-    good = last & np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
+    air_known = (air_told and "air_density" not in entry["causes"]) or bool(entry.get("air_known"))
+    shown = _shown(wider, real, columns, h.stand, air_known, rng, h.stated)
+    good = own & np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
 
 

@@ -1,9 +1,16 @@
-"""The judge asks for a run, the hidden stand makes it, the judge answers again: up to so many times.
+"""The judge asks for a run, the hidden stand makes it, the judge answers again: up to so many runs.
 
-The command that an answer recommends is run as printed. A reference is the run that was sealed with the item; a run of
-new points is measured on the item's own rotor and stand; a check by hand ("hang dead weights on the cells") says if it
-is there. The other road is the fixed programme: a reference, then runs at rest, then runs in wind, whatever the
-first answer was.
+The command that an answer recommends is run as printed, after "none" as after any other answer. A reference is the run
+that was sealed with the item; a run of new points, or of the same once more, is measured on the item's own rotor and
+stand; a check by hand ("hang dead weights on the cells") says if it is there.
+
+A cause that was named is put aside, and the same is asked again: is there a second one? A fault of stand or set-up is
+mended, then everything is recorded once more, which is a run. Any other cause stays and goes into the case of the
+recordings (``diagnose --out``), which is none. A name that is not at work changes nothing on the hidden stand and
+stays wrong. The course ends where nothing is left to find, where the same is named again, or without runs.
+
+The other road is the fixed programme: a reference, then runs at rest, then runs in wind, whatever the first answer
+was. Its answers stand each for itself.
 """
 
 from __future__ import annotations
@@ -14,23 +21,28 @@ import shlex
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import count, pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bemt import effects
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.diagnose.suggest import minutes
 from bemt.proof import draw, prove, score, seal
-from bemt.proof.items import Bench, further_run
+from bemt.proof.items import Bench, further_run, recorded_again
 from bemt.proof.rigs import Rig
 
 SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
 _DONE = ("named", "sensor")
-_NEW, _REFERENCE = "new_run.csv", "reference.csv"
+_NEW, _REFERENCE, _CASE = "new_run.csv", "reference.csv", "case.toml"
 _FIXED_POINTS = 6
+_MODEL = "model"
+# Effects of the air that somebody at the stand sets wrong, and right again: barometer, blade angle and alignment.
+_SET_UP = ("air_density", "pitch_offset", "oblique_inflow")
 
 
 @dataclass(frozen=True)
@@ -38,23 +50,46 @@ class Course:
     """How one item went."""
 
     folder: str  # Item
-    answers: list[dict[str, Any]]  # First answer, then one after each run
-    steps: list[str] = field(default_factory=list)  # What each step was: ``reference``, ``run`` or ``look``
-    minutes: list[float] = field(default_factory=list)  # Time of the stand for each run. [min]
-    # Why it ended: "named", "confirmed" by a check, a kind of step that is none of the above, "no run", "used up",
-    # "failed"
+    answers: list[dict[str, Any]]  # First answer, then one after each step
+    # What each step was: ``reference``, ``run``, ``look``, ``mend`` (recorded once more without what was named) or
+    # ``model`` (into the case, no run)
+    steps: list[str] = field(default_factory=list)
+    minutes: list[float] = field(default_factory=list)  # Time of the stand for each step. [min]
+    aside: list[list[str]] = field(default_factory=list)  # Causes that each step put aside
+    # Why it ended: "none" is left to find, "named" and nothing to be done about it, "named again", a kind of step that
+    # the loop cannot take, "no run", "used up", "failed"
     end: str = ""
+
+    def after(self, runs: int) -> int:
+        """Place of the last answer that so many runs gave."""
+        used = np.cumsum([0, *(step != _MODEL for step in self.steps)])
+        return int(np.count_nonzero(used[: len(self.answers)] <= runs)) - 1
+
+
+@dataclass(frozen=True)
+class _Taken:
+    """A step that was taken."""
+
+    kind: str  # As in ``Course.steps``
+    minutes: float  # [min]
+    words: list[str]  # Command to run; none where the check has found the cause
+    aside: list[str] = field(default_factory=list)  # Causes put aside
 
 
 @dataclass
 class _Item:
-    """An item at work: its files, its bench, and the runs made so far."""
+    """An item at work: its files, its bench, the runs made so far, and the command that was answered last."""
 
     out: Path
     entry: Mapping[str, Any]
     bench: Bench
     box: Path
+    left: int  # Runs
+    words: list[str] = field(default_factory=list)
     runs: list[list[Mapping[str, float]]] = field(default_factory=list)
+    repeats: int = 0
+    aside: list[str] = field(default_factory=list)
+    mended: list[str] = field(default_factory=list)
 
     def reference(self) -> int:
         """Bring the reference that was sealed with the item; how many points it has, 0 if there is none."""
@@ -69,7 +104,7 @@ class _Item:
         """Measure new points; name of the file, "" if the stand cannot."""
         if self.bench.rows.transient or not points:
             return ""
-        words = further_run(self.bench, self.entry, [*self.runs, points])
+        words = further_run(self.bench, self.entry, [*self.runs, points], self.mended, len(self.mended))
         if not words:
             return ""
         self.runs.append(list(points))
@@ -77,34 +112,112 @@ class _Item:
         write_atomic(self.box / name, words)
         return name
 
+    def repeat(self) -> tuple[str, int]:
+        """Measure the points of the recording once more: name of the file and its points, "" if the stand cannot."""
+        words = recorded_again(self.bench, self.entry, self.mended, self._day())
+        if words:
+            write_atomic(self.box / f"repeat_{self.repeats}.csv", words)
+        return (f"repeat_{self.repeats}.csv", words.count("\n") - 1) if words else ("", 0)
 
-def _recommended(item: _Item, answer: Mapping[str, Any]) -> tuple[str, int, list[str]] | str:
-    """Take the step that an answer recommends: its kind, points and the command to run; else why there is none."""
-    if answer["verdict"] in _DONE:
-        return "named"
+    def _day(self) -> int:
+        self.repeats += 1
+        return self.repeats
+
+    def mend(self, names: Sequence[str]) -> int:
+        """Take causes away, those that are there, and record everything once more; how many points that is."""
+        self.mended += [n for n in names if n in self.entry["causes"]]
+        day, points = self._day(), 0
+        texts = {"recording.csv": recorded_again(self.bench, self.entry, self.mended, day)}
+        for k in range(1, len(self.runs) + 1):
+            texts[f"run_{k}.csv"] = further_run(self.bench, self.entry, self.runs[:k], self.mended, day)
+        for file in self.box.glob("repeat_*.csv"):
+            texts[file.name] = recorded_again(self.bench, self.entry, self.mended, self._day())
+        for name, words in texts.items():
+            if not words:
+                return 0
+            write_atomic(self.box / name, words)
+            points += words.count("\n") - 1
+        return points
+
+    def model(self, only: Sequence[str]) -> list[str]:
+        """Command with what was named in the case of the recordings, as ``diagnose --out`` writes it; [] if it is not.
+
+        ``only`` are effects that a check has found, where the answer did not name them.
+        """
+        home = f"improved_{len(self.aside)}"
+        asked = [*self.words, *(["--only", *only] if only else []), "--out", home, "--no-figures"]
+        prove.asked(self.box, asked)
+        file = f"{home}/{_CASE}"
+        if not (self.box / file).exists():
+            return []
+        return [file if before == "--case" else w for before, w in pairwise(["", *self.words])]
+
+    def of_its_own(self, words: Sequence[str]) -> list[str]:
+        """Command whose reference keeps the first case: it was made without what was put into the other one."""
+        if "--reference" in words and "--reference-case" not in words and _CASE not in words:
+            return [*words, "--reference-case", _CASE]
+        return list(words)
+
+
+def _recommended(item: _Item, answer: Mapping[str, Any]) -> _Taken | str:
+    """Take the step that follows from an answer; else say why there is none."""
     step = answer.get("next_measurement") or {}
-    if answer["verdict"] == "none":
-        return str(step.get("kind") or "no run")
+    if answer["verdict"] in _DONE:
+        return _put_aside(item, answer["effects"], bool(answer.get("confirmed")))
+    if step.get("kind") == "look" and not step.get("checks"):  # of a class, the fault that is sure is to be put right
+        return _put_aside(item, [s[0] for s in answer.get("sets", ()) if len(s) == 1 and _at_the_stand(s[0])], False)
     taken = _step(item, step)
-    if taken == "no reference" and step.get("otherwise"):
-        return _step(item, step["otherwise"])
-    return taken
+    if taken in ("no reference", "mend") and step.get("otherwise"):
+        taken = _step(item, step["otherwise"])
+    return "none" if answer["verdict"] == "none" and taken == "no run" else taken
 
 
-def _step(item: _Item, step: Mapping[str, Any]) -> tuple[str, int, list[str]] | str:
+def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | str:
+    """Mend or model what was named, as far as it is new."""
+    new = [n for n in names if n not in item.aside]
+    if not new:
+        return "named again" if names else "no run"
+    faults = [n for n in new if _at_the_stand(n)]
+    if faults and not item.left:
+        return "used up"
+    others = [n for n in new if n not in faults]
+    words = item.model(new if by_check else []) if others else list(item.words)
+    if not words:
+        return "named"
+    item.aside += new
+    if not faults:
+        return _Taken(_MODEL, 0.0, words, new)
+    points = item.mend(faults)
+    if not points:
+        return "no run"
+    # what was put right is known to be right
+    return _Taken("mend", minutes("look", 0) + minutes("run", points), [*words, "--ruled-out", *faults], new)
+
+
+def _at_the_stand(name: str) -> bool:
+    """Whether somebody at the stand can put a cause right."""
+    known = effects.catalogue()
+    return name in _SET_UP or (name in known and known[name].kind == "stand")
+
+
+def _step(item: _Item, step: Mapping[str, Any]) -> _Taken | str:
     """Take one step."""
     kind, commands = str(step.get("kind", "")), step.get("commands") or ()
     if kind not in ("run", "reference", "look") or not commands:
         return kind or "no run"
+    if not item.left:
+        return "used up"
     words = shlex.split(commands[0])[1:]
     if kind == "look":
-        there = step.get("checks") in item.entry["causes"]
-        return ("look", 0, [] if there else words) if step.get("checks") else "no run"
+        if not step.get("checks"):
+            return "no run"
+        there = step["checks"] in item.entry["causes"] and step["checks"] not in item.mended
+        return _Taken(kind, minutes(kind, 0), [] if there else words)
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
-        return ("reference", points, words) if points else "no reference"
-    name = item.run(step["points"])
-    return ("run", len(step["points"]), [name if w == _NEW else w for w in words]) if name else "no run"
+        return _Taken(kind, minutes(kind, points), words) if points else "no reference"
+    name, points = (item.run(step["points"]), len(step["points"])) if step["points"] else item.repeat()
+    return _Taken(kind, minutes(kind, points), [name if w == _NEW else w for w in words]) if name else "no run"
 
 
 def programme(rig: Rig) -> list[list[dict[str, float]]]:
@@ -116,7 +229,7 @@ def programme(rig: Rig) -> list[list[dict[str, float]]]:
     return [still, wind]
 
 
-def _fixed(item: _Item, number: int) -> tuple[str, int, list[str]] | str:
+def _fixed(item: _Item, number: int) -> _Taken | str:
     """Run ``number`` of the fixed programme."""
     kind, points = "reference", 0
     if number == 0:
@@ -128,40 +241,40 @@ def _fixed(item: _Item, number: int) -> tuple[str, int, list[str]] | str:
         return "no run"
     known = ["--reference", _REFERENCE] if (item.box / _REFERENCE).exists() else []
     runs = [f"run_{k}.csv" for k in range(1, len(item.runs) + 1)]
-    return kind, points, ["diagnose", "recording.csv", *runs, *known, "--case", "case.toml"]
+    return _Taken(kind, minutes(kind, points), ["diagnose", "recording.csv", *runs, *known, "--case", _CASE])
 
 
 def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, Any], runs: int, fixed: bool) -> Course:
     course = Course(str(entry["folder"]), [first])
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
-        item = _Item(out, entry, bench, Path(box))
+        item = _Item(out, entry, bench, Path(box), runs)
         for file in (out / "items" / course.folder).iterdir():
             write_atomic(item.box / file.name, file.read_text("utf-8"))
-        end = "used up"
-        for number in range(runs):
-            made = _fixed(item, number) if fixed else _recommended(item, course.answers[-1])
-            if isinstance(made, str):
+        item.words = prove.question(item.box)
+        for number in count():
+            if fixed and number == runs:
+                return replace(course, end="used up")
+            taken = _fixed(item, number) if fixed else _recommended(item, course.answers[-1])
+            if isinstance(taken, str):
                 if fixed and number < 2:  # no reference can be had: the next run of the programme
                     continue
-                end = made
-                break
-            kind, points, words = made
-            course.steps.append(kind)
-            course.minutes.append(minutes(kind, points))
-            if not words:  # the check has found it
+                return replace(course, end=taken)
+            item.left -= taken.kind != _MODEL
+            course.steps.append(taken.kind)
+            course.minutes.append(taken.minutes)
+            course.aside.append(taken.aside)
+            if not taken.words:  # the check has found it
                 step = course.answers[-1]["next_measurement"]
                 looked_for = step["checks"] or step["otherwise"]["checks"]
-                course.answers.append({**course.answers[-1], "verdict": "named", "effects": [looked_for]})
-                end = "confirmed"
-                break
-            answer, _ = prove.asked(item.box, words)
+                found = {"verdict": "named", "effects": [looked_for], "confirmed": True}
+                course.answers.append({**course.answers[-1], **found})
+                continue
+            item.words = item.of_its_own(taken.words)
+            answer, _ = prove.asked(item.box, item.words)
             if answer is None:
-                end = "failed"
-                break
+                return replace(course, end="failed")
             course.answers.append(answer)
-        else:
-            end = "named" if course.answers[-1]["verdict"] in _DONE else end
-    return Course(course.folder, course.answers, course.steps, course.minutes, end)
+    raise AssertionError("a course has an end")
 
 
 def loop(
@@ -174,7 +287,7 @@ def loop(
     first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
     found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)}
     todo = []
-    for entry in key["items"]:
+    for entry in sorted(key["items"], key=_rank):
         answer = seal.answer(out / "answers" / f"{entry['folder']}.json")
         if entry["set"] in _SETS and answer:
             todo.append((entry, answer))
@@ -189,7 +302,7 @@ def loop(
         write_atomic(file, json.dumps(asdict(course)))
         return course
 
-    courses = []
+    courses: list[Course] = []
     with ThreadPoolExecutor(jobs) as pool:
         for k, course in enumerate(pool.map(one, todo), 1):
             courses.append(course)
@@ -201,21 +314,63 @@ def loop(
     return document
 
 
+def _rank(entry: Mapping[str, Any]) -> int:
+    """Place of an item in the order of work: visible pairs, the others in mixed order, last what no plan can see."""
+    if not entry["causes"] or entry["set"] == "unlisted":
+        return 1
+    return (0 if entry["set"] == "pair" else 1) if score.judge(entry, {}).separation >= score.VISIBLE else 2
+
+
+def _named(entry: Mapping[str, Any], course: Course, at: int) -> list[str]:
+    """What a course has named up to an answer; of names for one cause, which the plan cannot tell apart, one."""
+    last = course.answers[at]
+    said = [*(n for some in course.aside[:at] for n in some), *(last["effects"] if last["verdict"] in _DONE else ())]
+    names = list(dict.fromkeys(said))
+    allowed = [{c, *alike} for c, alike in zip(entry["causes"], entry["alike"], strict=True)]
+    if not all(any(n in a for a in allowed) for n in names):
+        return names
+    of_each = [[n for n in names if n in a] or [""] for a in allowed]
+    return max((list(filter(None, dict.fromkeys(some))) for some in product(*of_each)), key=len)
+
+
+def judge(entry: Mapping[str, Any], course: Course, runs: int) -> tuple[score.Judged, bool]:
+    """Judge what a course has said after so many runs, and whether what it named is what is at work.
+
+    Everything that was named counts, and so does the class of the last answer: where nothing is left to find, that is a
+    wrong claim, but what was named before stays found.
+    """
+    at = course.after(runs)
+    last, names = course.answers[at], _named(entry, course, at)
+    if not names:
+        return score.judge(entry, last), False
+    named = score.judge(entry, {**last, "verdict": "named", "effects": names, "sets": [[n] for n in names]})
+    # a class with what was put aside in it asks for no second cause
+    if last["verdict"] != "class" or set(names) & set(last["effects"]):
+        return named, named.right
+    there = {c for c, alike in zip(entry["causes"], entry["alike"], strict=True) if not {c, *alike} & set(names)}
+    known = {i for c, alike in zip(entry["causes"], entry["alike"], strict=True) for i in (c, *alike)}
+    right = bool(there & set(last["effects"])) and known >= set(names)
+    said = {**last, "effects": [*names, *last["effects"]], "sets": [*([n] for n in names), last["effects"]]}
+    return replace(named, right=right, answer=said), named.right
+
+
 def _scored(entries: Sequence[Mapping[str, Any]], courses: Sequence[Course], runs: int, fixed: bool) -> dict[str, Any]:
     """What was found after each number of runs, and what it cost."""
     after = []
     for k in range(runs + 1):
-        judged = [score.judge(e, c.answers[min(k, len(c.answers) - 1)]) for e, c in zip(entries, courses, strict=True)]
-        visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible]
-        pairs = [j for j in judged if j.entry["set"] == "pair" and j.visible]
+        pairs_of = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
+        judged = [j for j, _ in pairs_of]
+        visible = [(j, exact) for j, exact in pairs_of if j.entry["set"] in ("single", "sensor") and j.visible]
+        pairs = [(j, exact) for j, exact in pairs_of if j.entry["set"] == "pair" and j.visible]
         nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch")]
         caused = [j for j in judged if j.entry["causes"] and j.entry["set"] != "unlisted" and j.claims]
-        spent = [sum(c.minutes[:k]) for e, c in zip(entries, courses, strict=True) if e["causes"]]
+        spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e["causes"]]
         after.append({
             "runs": k,
-            "found": _count(j.right and j.answer["verdict"] != "class" for j in visible),
-            "found_or_class": _count(j.right for j in visible),
-            "pairs": _count(score.in_sets(j) for j in pairs),
+            "found": _count(exact for _, exact in visible),
+            "found_or_class": _count(exact or j.right for j, exact in visible),
+            "pairs_named": _count(exact for _, exact in pairs),
+            "pairs": _count(exact or score.in_sets(j) for j, exact in pairs),
             "right_when_claimed": _count(j.right for j in caused),
             "nulls_accused": _count(j.claims for j in nothing),
             "unlisted_named": _count(j.claims for j in judged if j.entry["set"] == "unlisted"),
@@ -239,12 +394,12 @@ def text(document: Mapping[str, Any]) -> str:
     def share(pair: Sequence[int]) -> str:
         return f"{pair[0]}/{pair[1]} ({100 * pair[0] / pair[1]:.0f} %)" if pair[1] else "-"
 
-    keys = ("found", "found_or_class", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
+    keys = ("found", "found_or_class", "pairs_named", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
     rows = [[str(a["runs"]), *(share(a[k]) for k in keys), f"{a['minutes']:.0f}"] for a in document["after"]]
-    header = ["runs", "named", "named or in class", "pairs in sets", "right when it claims", "nulls accused",
-              "unlisted named", "stand [min]"]  # fmt: skip
+    header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims",
+              "nulls accused", "unlisted named", "stand [min]"]  # fmt: skip
     title = {"fixed": "the fixed programme: a reference, a sweep at rest, a sweep in wind",
-             "recommended": "the run that each answer recommends"}[document["programme"]]  # fmt: skip
+             "recommended": "the step that follows from each answer"}[document["programme"]]  # fmt: skip
     ends = ", ".join(f"{k} {n}" for k, n in document["ends"].items())
     return "\n".join([
         f"{document['items']} items, {title}", text_table(header, rows, left=(), indent="  "), f"  ended by: {ends}",

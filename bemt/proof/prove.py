@@ -24,7 +24,9 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
-__all__ = ["SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "teller"]
+__all__ = [
+    "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question", "teller",
+]  # fmt: skip
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -91,7 +93,7 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
         given = [name for name in _GIVEN if (folder / name).exists()]
         for name in given:
             shutil.copy(folder / name, box)
-        return asked(Path(box), _question(folder))
+        return asked(Path(box), question(folder))
 
 
 def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
@@ -112,7 +114,7 @@ def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, st
         return None, ran.stderr.strip() or "no JSON document on the output"
 
 
-def _question(folder: Path) -> list[str]:
+def question(folder: Path) -> list[str]:
     """Subcommand and files that are asked."""
     case = ["--case", "case.toml"] if (folder / "case.toml").exists() else []
     if (folder / COMPARE).exists():
