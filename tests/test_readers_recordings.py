@@ -1037,7 +1037,7 @@ def test_a_clock_is_the_time_of_a_log_that_has_no_other(write: Write) -> None:
     assert got["time_s"][-1] == 2.0 and got["timestamp_s"][-1] == 4.0
     text = "when,Thrust (N),RPM\n" + "".join(f"0{k}/05/2024 12:00,1.5,3000\n" for k in range(1, 6))
     got = import_file(write(text))  # day or month first?
-    assert "when" in got.texts and said(got, "text, kept as such, in 1 columns: 'when'")
+    assert "when" in got.texts and said(got, "text, kept as such, in 1 column: 'when'")
 
 
 def test_a_comma_between_thousands_is_not_taken_for_a_decimal_one(write: Write) -> None:
