@@ -20,6 +20,7 @@ from bemt.flight.inflow import Inflow, inflow
 from bemt.flight.judge import FALSE_ALARM, BesideBalance, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.mass import mass_faults
 from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
 from bemt.flight.simulator import simulator_constants
@@ -158,12 +159,17 @@ def answer_on(
     Raises
     ------
     InputError
-        When logs have another number of rotors, or the layout does not fit.
+        When logs have another number of rotors, the layout does not fit, or a mass cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
     if others:
         expected = f"{log.rotors} rotors and the same channels as {log.file}"
         raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
+    faults = mass_faults(log, mass_kg, "--mass")
+    for h in healthy:
+        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass")
+    if faults:
+        raise InputError(faults)
     if layout:
         log = replace(log, layout=layout)
     placed = layout_of(log.layout, log.rotors) if log.rotors else None

@@ -143,7 +143,10 @@ def _performance(page: Mapping[str, Any]) -> Section:
         traces = [Trace("BEMT", w["rpm"], y, u, COLOURS["bemt"]), *more, *seen]
         title = f"{title} at {own['airspeed_m_s']:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
-    words = "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. Points: recorded values; a value without a bar states no uncertainty."
+    words = (
+        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. "
+        "Points: recorded values; a value without a bar states no uncertainty."
+    )
     return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 
 
