@@ -66,10 +66,11 @@ def mass_faults(log: FlightLog, mass_kg: float | None, name: str) -> list[Fault]
 
 
 def _current(log: FlightLog) -> float:
-    """Mean current of the battery in the air, or of all speed controllers; NaN where neither is logged. [A]"""
-    if log.battery_current is not None:
-        return _mean(log, log.battery_current)
-    return math.nan if log.current is None else _mean(log, log.current.sum(axis=1))
+    """Mean current of the battery in the air, else of all speed controllers; NaN where none is logged. [A]"""
+    battery = math.nan if log.battery_current is None else _mean(log, log.battery_current)
+    if battery > 0.0 or log.current is None:  # an autopilot without the sensor writes -1
+        return battery
+    return _mean(log, log.current.sum(axis=1))
 
 
 def _mean(log: FlightLog, values: Array) -> float:

@@ -100,7 +100,7 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
                 told = ["-", "", ""] if c is None else [
                     f"{number_text(c['D'], 3)} {c['source']}", f"{c['E']:+.3g} ({100 * c['share']:.0f} %)",
                     _agreement(c)]  # fmt: skip
-                body.append([_short(result["name"]) if first else "", *cells, *told])
+                body.append([_name(result["name"]) if first else "", *cells, *told])
                 cells, first = [""] * len(cells), False
     shown = body[:ROWS]
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
@@ -115,7 +115,7 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[Mapping[str, Any
     return lines
 
 
-def _short(name: str) -> str:
+def _name(name: str) -> str:
     """A name of 20 letters at most; a cut shows."""
     return name if len(name) <= 20 else f"{name[:19]}…"
 
@@ -172,7 +172,7 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
             told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
             while len(", ".join(told)) > WIDTH - 24:
                 told.pop()
-            lines.append(f"  {_short(result['name']):<22}{', '.join(told)}")
+            lines.append(f"  {_name(result['name']):<22}{', '.join(told)}")
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
