@@ -172,7 +172,7 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
             told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
             while len(", ".join(told)) > WIDTH - 24:
                 told.pop()
-            lines.append(f"  {_name(result['name']):<22}{', '.join(told)}")
+            lines.append(f"  {_name(result['name']):<17} {', '.join(told)}")
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
