@@ -16,7 +16,6 @@ __version__ = "0.3.0"
 if TYPE_CHECKING:
     from bemt.base.errors import InputError as InputError
     from bemt.dataset import Dataset as Dataset
-    from bemt.design import choose as choose
     from bemt.library import Answer as Answer
     from bemt.library import Propeller as Propeller
     from bemt.library import calibrate_rotor as calibrate_rotor
@@ -33,8 +32,9 @@ if TYPE_CHECKING:
     from bemt.library import read as read
     from bemt.library import report as report
     from bemt.library import validate as validate
+    from bemt.library.choices import choose as choose
 
-_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset", "choose": "bemt.design"}
+_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.dataset", "choose": "bemt.library.choices"}
 _ROOMS = ("compare", "design", "diagnose", "drive", "report", "validate")  # packages that can be called like functions
 _NAMES = (
     "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "design",

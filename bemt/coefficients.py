@@ -159,6 +159,19 @@ def eta(J: ArrayLike, CT: ArrayLike, CP: ArrayLike) -> Any:
     return _out(np.where((J == 0) & known, 0.0, out))
 
 
+def eta_limit(J: ArrayLike, CT: ArrayLike) -> Any:
+    """Greatest efficiency of an open rotor at a thrust, V/(V + v) of momentum theory; 1 without thrust.
+
+    2/(1 + sqrt(1 + 8 CT/(pi J^2))), from T = 2 rho A (V + v) v (Glauert, "Airplane Propellers", in Durand,
+    "Aerodynamic Theory" IV, 1935). A duct with a wide exit may pass it, but not 1: use CT = 0 there.
+
+    >>> eta_limit([0.0, 0.5, 0.5, 0.5], [0.1, 0.1, 0.0, -0.1]).round(3)
+    array([0.   , 0.67 , 1.   , 1.   ])
+    """
+    J, CT = np.broadcast_arrays(np.abs(_f(J)), np.fmax(_f(CT), 0.0))
+    return _out(np.where(CT > 0.0, 2.0 * J / (J + np.sqrt(J**2 + 8.0 * CT / math.pi) + (CT == 0.0)), 1.0))
+
+
 def FM(CT: ArrayLike, CP: ArrayLike) -> Any:
     """Figure of merit T^1.5/(P sqrt(2 rho A)) = sqrt(2/pi) CT^1.5/CP; NaN where CT < 0 or CP <= 0.
 

@@ -81,8 +81,8 @@ def main() -> None:
         upper = np.array([d["upper_thrust_ratio"][0] for d in found])
         axis.fill_between(z, ratio - 2 * u, ratio + 2 * u, color="C0", alpha=0.15, lw=0, label="95 %")
         axis.fill_between(z, ratio - u, ratio + u, color="C0", alpha=0.3, lw=0, label="68 %")
-        axis.plot(z, ratio, "C0", label="second rotor, bemt")
-        axis.plot(z, upper, "C1", label="first rotor, bemt")
+        axis.plot(z, ratio, "C0", label="second rotor, BEMT")
+        axis.plot(z, upper, "C1", label="first rotor, BEMT")
         if data is not None:
             points = measured(Path(data) / "contrasts" / "coax_spacing_15in_11in", inches)
             at, values = np.array(list(points)), np.array(list(points.values()))

@@ -47,18 +47,27 @@ def main() -> None:
     left.set_yticks([])
     left.grid(False)
     left.tick_params(axis="x", pad=22)
-    fig.colorbar(drawn, ax=left, label="N/m2", shrink=0.8)
+    fig.colorbar(drawn, ax=left, label="N/m²", shrink=0.8)
     angle = np.linspace(0.0, 180.0, 37)
     for speed, color in ((5.0, "C0"), (10.0, "C1")):
         curve = p.solve(RPM, speed, angle_deg=angle)
         T, u = curve.thrust_N, curve.u["thrust_N"]
-        right.plot(angle, T, color=color, label=f"bemt, {speed:g} m/s")
+        right.plot(angle, T, color=color, label=f"BEMT, {speed:g} m/s")
         right.fill_between(angle, T - u, T + u, color=color, alpha=0.2, lw=0)
         for at in (0, 30):
             rows = measured(folder, at)
             rows = rows[rows[:, 1] == speed]
             at_rpm = np.interp(RPM, rows[:, 0], rows[:, 2])
-            right.plot(at, at_rpm, "o", color=color, mec="k", label=f"measured, {speed:g} m/s" if at == 0 else None)
+            right.plot(
+                at,
+                at_rpm,
+                "o",
+                color=color,
+                mec="k",
+                clip_on=False,
+                zorder=3,
+                label=f"measured, {speed:g} m/s" if at == 0 else None,
+            )
     right.set(xlabel="angle between wind and shaft [deg]", ylabel="thrust [N]", xlim=(0, 180))
     right.set_title(f"APC 8x4.5MR as drawn, {RPM:g} rev/min\nBand: one standard deviation")
     right.legend(fontsize=8)

@@ -137,7 +137,7 @@ def test_a_restart_gives_up_the_branch_and_one_stray_row_does_not() -> None:
     clock = np.arange(100.0)
     clock[60] = 6.0
     index, notes = keep_last(clock)
-    assert len(index) == 99 and "1 rows with step out of order left out" in notes
+    assert len(index) == 99 and "1 row with step out of order left out" in notes
 
 
 def test_time_steps() -> None:

@@ -134,3 +134,11 @@ def test_arrays_equal_scalars():
 def test_arguments_broadcast():
     assert co.J(np.zeros((4, 1)), np.ones(3), 0.3).shape == (4, 3)
     assert co.eta(np.zeros((4, 1)), np.ones(3), 0.3).shape == (4, 3)
+
+
+@given(st.floats(0.01, 3.0), st.floats(1e-4, 1.0), positive)
+def test_the_limit_of_efficiency_is_the_ideal_disk(J, CT, D):
+    """Thrust from T = 2 rho A (V + v) v with the efficiency V/(V + v)."""
+    V = J * D
+    v = V * (1.0 / co.eta_limit(J, CT) - 1.0)
+    assert 2.0 * math.pi / 4.0 * D**2 * (V + v) * v == pytest.approx(co.thrust(CT, 1.0, 1.0, D), rel=1e-6)

@@ -40,7 +40,7 @@ def test_the_document_is_the_library_s_answer_with_k1k2_beside_it(capsys: pytest
 def test_what_is_doubtful_is_printed_once_with_its_count(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["estimate", "14x8", "--rpm", "20000", "3000"]) == 0
     out = capsys.readouterr().out
-    assert out.count("supersonic") == 1 and "(1 of 2 rows)" in out and len(out.splitlines()) < 24
+    assert out.count("supersonic") == 1 and "1 of 2 points: supersonic" in out and len(out.splitlines()) < 24
 
 
 def test_what_was_measured_narrows_the_band_and_is_no_unknown(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ import pytest
 from flight_files import broken_copies
 
 from bemt.base.errors import InputError
+from bemt.case import load_case
 from bemt.commands.cli import main
 from bemt.diagnose.rule import decide
 from bemt.flight.answer import FlightAnswer, answer_on
@@ -25,6 +26,7 @@ from bemt.flight.inflow import inflow
 from bemt.flight.judge import judge, weighed
 from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.mass import mass_faults
 from bemt.flight.picture import flight_picture
 from bemt.flight.read import read_log
 from bemt.flight.rules import BUILD, RULES
@@ -436,3 +438,28 @@ def test_picture_of_a_log_without_motors() -> None:
     """It says so instead of failing."""
     t = np.arange(0.0, 5.0, 0.01)
     assert flight_picture(answer_on(FlightLog("f", "made", t))).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("mass", "refused"), [(0.02, False), (0.2, False), (20.0, True), (1500.0, True), (0.0, True)])
+def test_a_mass_that_the_battery_cannot_lift_is_refused(mass: float, refused: bool, flights: Path) -> None:
+    """A small quadrotor on one cell: 20 kg would take kilowatts; 200 g is odd, but not impossible."""
+    assert bool(mass_faults(read_log(flights / "before_1.usdlog"), mass, "--mass")) is refused
+
+
+@pytest.mark.parametrize("amps", [10.0, 40.0])
+def test_the_mass_that_is_just_refused_takes_the_power_that_the_log_allows(amps: float) -> None:
+    """Momentum theory on disks whose tips run at Mach 0.5, with twice the logged current."""
+    t, ones = np.arange(0.0, 10.0, 0.01), np.ones(1000)
+    log = FlightLog("x", "x", t, rpm=3000.0 * np.ones((1000, 4)), voltage=22.0 * ones, battery_current=amps * ones)
+    area = 4 * np.pi / 4 * (170.0 / (np.pi * 50.0)) ** 2
+    lifted = (2.0 * 1.225 * area * (2.0 * 22.0 * amps) ** 2) ** (1 / 3) / 9.80665
+    assert mass_faults(log, 1.01 * lifted, "--mass") and not mass_faults(log, 0.99 * lifted, "--mass")
+
+
+def test_a_case_from_flights_is_solved_at_the_speed_flown(flights: Path, tmp_path: Path) -> None:
+    out = tmp_path / "known"
+    words = [str(flights / "before_1.usdlog"), "--mass", "0.035", "--case", "1.8x1", "--out-case", str(out)]
+    main(["fly", *words, "--quiet"])
+    log = read_log(flights / "before_1.usdlog")
+    assert log.rpm is not None
+    assert load_case(out / "case.toml").rpm == pytest.approx(log.rpm[log.flying].mean(), rel=0.01)

@@ -213,7 +213,7 @@ def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
             continue
         notes = " ".join(record.notes)
         head = ("no heading line" not in notes and "headings are the comment" not in notes) + ("holds units" in notes)
-        head += sum(int(n) for n in re.findall(r"(\d+) lines (?:above the headings|left out)", notes))
+        head += sum(int(n) for n in re.findall(r"(\d+) lines? (?:above the headings|left out)", notes))
         below = lines_below_the_heading(raw)
         assert len(record.lines) == len(record) == len(below) - head and set(record.lines) <= below, case
         found = findings(record)

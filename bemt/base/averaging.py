@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 
 DEFAULT_REVOLUTIONS = 4
 """Revolutions that are averaged when nothing is asked for, at most half of what the run has."""
@@ -115,7 +116,7 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
         raise InputError(faults)
     none = Average(None, 0, 0, math.nan, math.nan)
     if t.size < 2:
-        return replace(none, problem=f"{t.size} rows: no revolution")
+        return replace(none, problem=f"{number_of(t.size, 'row')}: no revolution")
     dt = time_steps(t)
     slack = 1e-6 * float(np.median(dt[1:]))
     length = float(t[-1] - t[0] + dt[0])
@@ -187,7 +188,11 @@ def keep_last(clock: ArrayLike, name: str = "step") -> tuple[NDArray[np.intp], t
     """
     c = np.asarray(clock, dtype=float)
     finite = np.flatnonzero(np.isfinite(c))
-    notes = [f"{c.size - finite.size} rows without a number for {name} left out"] if finite.size < c.size else []
+    notes = (
+        [f"{number_of(c.size - finite.size, 'row')} without a number for {name} left out"]
+        if finite.size < c.size
+        else []
+    )
     if finite.size > 1 and not np.all(np.diff(c[finite]) > 0.0):
         finite, more = _ascending(c, finite, name)
         notes += more
@@ -223,7 +228,7 @@ def _ascending(c: Array, order: NDArray[np.intp], name: str) -> tuple[NDArray[np
     if repeated:
         notes.append(f"{repeated} repeated {name} rows: the last one of each holds")
     if damaged:
-        notes.append(f"{damaged} rows with {name} out of order left out")
+        notes.append(f"{number_of(damaged, 'row')} with {name} out of order left out")
     if backs:
         more = f" and {len(backs) - 3} times more" if len(backs) > 3 else ""
         notes.append(f"restart: {name} goes back {'; '.join(backs[:3])}{more}")

@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsInt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,16 @@ def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
         return f"{value:.{digits - 1}e}"
     rounded = round(value, digits - 1 - magnitude)
     return f"{rounded:.{max(digits - 1 - magnitude, 0)}f}"
+
+
+def number_of(count: SupportsInt, noun: str) -> str:
+    """Count things in words, singular for one.
+
+    >>> number_of(1, "row"), number_of(0, "row"), number_of(12, "row")
+    ('1 row', '0 rows', '12 rows')
+    """
+    n = int(count)
+    return f"{n} {noun}" + ("" if n == 1 else "s")
 
 
 def plain(value: Any, digits: int = 10) -> Any:

@@ -17,6 +17,7 @@ from bemt.case.prepare import k1k2_case
 from bemt.case.propagate import propagate
 from bemt.case.schema import AIRSPEED, ANGLE, RPM
 from bemt.readers._uiuc_names import find_family
+from bemt.rotors.validity import counted
 from geometry.designation import Designation
 
 SCHEMA = "bemt.estimate/2"
@@ -164,12 +165,7 @@ def text(doc: dict[str, Any]) -> str:
     table = [
         [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
     ]
-    counts: dict[str, int] = {}
-    for row in doc["rows"]:
-        for flag in row["flags"]:
-            counts[flag] = counts.get(flag, 0) + 1
-    several = len(doc["rows"]) > 1
-    notes = [f"! {flag}" + (f" ({n} of {len(doc['rows'])} rows)" if several else "") for flag, n in counts.items()]
+    notes = [f"! {flag}" for flag in counted([row["flags"] for row in doc["rows"]])]
     more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
     if more:
         notes.append(f"for narrower bands give {' and '.join(more)} (at 0.75 R)")

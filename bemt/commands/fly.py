@@ -16,6 +16,7 @@ NAME = "fly"
 HELP = "identify the rotors of a flight log, and compare it with healthy flights"
 GROUP = "Recordings"
 EXAMPLE = "fly flight.ulg --mass 1.2 --case 10x4.5"
+_FAR = 5.0  # ratio of thrusts at one speed that is no scatter of propellers: half as large again in diameter
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,13 +24,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     kinds = "flight logs: PX4 ULog, ArduPilot DataFlash, Crazyflie usdlog, Betaflight or other CSV"
     parser.add_argument("logs", nargs="*", metavar="LOG", help=kinds)
     parser.add_argument("--case", metavar="ROTOR", help="case or label of the propeller, compared with the flight")
-    parser.add_argument("--mass", type=_mass, metavar="KG", help="mass in flight with battery [kg]")
+    parser.add_argument("--mass", type=float, metavar="KG", help="mass in flight with battery [kg]")
     layout = 'angles with turning, "-45+ 135+ 45- -135-", or quad-x, x8, ...; "list" prints the names'
     parser.add_argument("--layout", default="", metavar="LAYOUT", help=f"{layout} (default: of the log)")
     healthy = "healthy flights of the same vehicle, 3 or more for a verdict"
     parser.add_argument("--healthy", default=[], metavar="LOG", help=healthy, **_options.MANY)
     known = "mass of the healthy flights [kg]: gives the mass of this one"
-    parser.add_argument("--healthy-mass", type=_mass, metavar="KG", help=known)
+    parser.add_argument("--healthy-mass", type=float, metavar="KG", help=known)
     alarm = "accepted share of healthy flights that are accused (default 0.01); more finds smaller damage"
     parser.add_argument("--false-alarm", type=_share, default=0.01, metavar="P", help=alarm)
     learnt = "write the case of --case with the rotor as these flights show it to this folder; needs --mass"
@@ -37,13 +38,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", dest="picture", metavar="PNG", help="write a picture of the first log to this file")
     _options.add_json(parser, "bemt.flight/1")
     _options.add_quiet(parser, "no answer")
-
-
-def _mass(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < 1000.0:
-        raise argparse.ArgumentTypeError(f"got {text}; expected a mass above 0 and below 1000 kg")
-    return value
 
 
 def _share(text: str) -> float:
@@ -105,6 +99,7 @@ def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, 
     import shlex
 
     from bemt.base.errors import Fault, InputError
+    from bemt.case.load import with_changes
     from bemt.diagnose.rotor_calibration import document, text, write
     from bemt.flight.rotor_case import learn_from_flights
     from bemt.library.rotors import rotor_of
@@ -112,6 +107,9 @@ def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, 
     if not args.case:
         raise InputError(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
     case = rotor_of(args.case).case
+    speeds = [one for a in answers for one in a.found.rotors.get("mean rpm", ())]
+    if speeds and not Path(args.case).exists():  # the speed of a label is a guess
+        case = with_changes(case, {"operating.rpm": round(sum(speeds) / len(speeds))})
     found = learn_from_flights(case, args.logs, [a.found for a in answers])
     written = write(case, found, args.logs, args.out_case, NAME, "--out-case")
     folder = shlex.quote(Path(args.out_case).as_posix())
@@ -134,6 +132,7 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
 
     import numpy as np
 
+    from bemt.base.errors import Fault, InputError
     from bemt.flight.answer import Predicted
     from bemt.library.rotors import rotor_of
 
@@ -143,6 +142,11 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
     rpm, rotor, flow = sum(speeds) / len(speeds), rotor_of(case), answer.inflow
     points = rotor.solve(rpm=rpm, airspeed_m_s=0.0)
     hover, u = float(points.thrust_N[0]), float(points.u["thrust_N"][0])
+    flown = answer.found.constants.get("thrust constant")
+    if flown is not None and flown.unit == "N/rpm^2" and not 1.0 / _FAR < flown.value * rpm**2 / hover < _FAR:
+        got = f"{flown.value * rpm**2:.3g} N of each rotor at {rpm:.0f} rev/min"
+        expected = f"about the {hover:.3g} N of {case}"
+        raise InputError(Fault(answer.log.file, "--mass, --case", got, expected, "Mass in kg? The flown propeller?"))
     along, across = np.linspace(*(flow.axial_m_s if flow else (0.0, 0.0)), 9), np.linspace(0.0, 1.0, 9)
     across = across * (flow.inplane_m_s if flow else 0.0)
     axial = rotor.solve(rpm=rpm, airspeed_m_s=np.abs(along), angle_deg=np.where(along < 0.0, 180.0, 0.0)).thrust_N

@@ -32,9 +32,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     beside.add_argument("--picture", metavar="FILE.png", help="with --case: draw the recordings inside the band")
     what = "with --out it is kept in a run.toml, or in a recording.toml for a table of measurements"
     run = parser.add_argument_group("what the files do not say", what)
-    run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N, report-def-0='N m'",
+    run.add_argument("--unit", metavar="NAME=UNIT", help="unit of a quantity or column: thrust=N; repeat it for each",
                      **_options.REPEATABLE)  # fmt: skip
-    run.add_argument("--column", metavar="NAME=COLUMN", help="column of a quantity: thrust=fz", **_options.REPEATABLE)
+    column = "column of a quantity: thrust=fz; repeat it for each"
+    run.add_argument("--column", metavar="NAME=COLUMN", help=column, **_options.REPEATABLE)
     run.add_argument("--sign", metavar="NAME=-1", help="sign of a load: torque=-1; -1 alone: all (default: positive)",
                      **_options.REPEATABLE)  # fmt: skip
     sector = "the model is one of N equal sectors: multiply loads by N"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_text, text_table
+from bemt.base.tables import number_of, number_text, text_table
 from bemt.case import Case
 from bemt.case.propagate import propagate
 from bemt.dataset import Dataset
@@ -131,7 +131,7 @@ def _case(name: str) -> Case:
 
     files = find_cases([name])
     if len(files) != 1:
-        raise InputError(Fault("--case", "", f"{len(files)} cases", "the case of the rotor"))
+        raise InputError(Fault("--case", "", number_of(len(files), "case"), "the case of the rotor"))
     return load_case(files[0])
 
 
@@ -189,7 +189,7 @@ def _sentence(points: list[dict[str, Any]]) -> str:
     off = [(k, load) for k, load in every if load["verdict"] == "differs"]
     near = [(k, load) for k, load in every if load["verdict"] == "within 2 u"]
     lost = sum(load["verdict"] == "no result" for _, load in every)
-    tail = f" {lost} values have no result." if lost else ""
+    tail = f" No result for {number_of(lost, 'value')}." if lost else ""
     if off:
         k, load = max(off, key=lambda x: abs(x[1]["difference"]) / x[1]["u_both"])
         times = abs(load["difference"]) / load["u_both"]

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from bemt import coefficients as co
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import tables
 from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
@@ -195,7 +196,7 @@ class Dataset:
 
     def __repr__(self) -> str:
         """One-line summary; to_pandas() shows the numbers."""
-        return f"Dataset({self.kind!r}, {self.name!r}, {len(self)} points: {', '.join(self.values)})"
+        return f"Dataset({self.kind!r}, {self.name!r}, {number_of(len(self), 'point')}: {', '.join(self.values)})"
 
     def _repr_html_(self) -> str:
         """Show the points in a notebook, with standard uncertainties if known."""

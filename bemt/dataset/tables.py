@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt import coefficients as co
 from bemt.base import units
 from bemt.base.canvas import CYCLE
 from bemt.base.errors import Fault, InputError, needs
@@ -106,7 +107,12 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
             if np.any(u > 0.0) and points:
                 ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
             elif np.any(u > 0.0):
-                ax.fill_between(at, value - u, value + u, alpha=0.2, color=line.get_color(), lw=0)
+                top = value + u
+                if channel == "eta" and {"J", "CT"} <= d.values.keys():
+                    ducted = "duct_share" in d and np.any(d["duct_share"] != 0.0)
+                    least = 0.0 if ducted else d["CT"][rows] - np.nan_to_num(d.u["CT"][rows])
+                    top = np.fmax(value, np.minimum(top, co.eta_limit(d["J"][rows], least)))
+                ax.fill_between(at, value - u, top, alpha=0.2, color=line.get_color(), lw=0)
     ax.set_xlabel(x)
     ax.set_ylabel(", ".join(wanted))
     if not beside:

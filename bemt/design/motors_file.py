@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.tables import number_of
 
 COLUMNS = ("name", "kv", "resistance_mohm", "no_load_A")
 LIMITS = {
@@ -64,7 +65,7 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     out = []
     for (line, _), row in zip(rows[1:], cells, strict=True):
         if len(row) > len(head):
-            got, expected = f"{len(row)} cells", f"{len(head)}, as in the first line"
+            got, expected = number_of(len(row), "cell"), f"{len(head)}, as in the first line"
             faults.append(Fault(name, f"line {line}", got, expected, "A decimal comma? Write 0.8"))
             continue
         row += [""] * (len(head) - len(row))

@@ -151,7 +151,7 @@ def choose(
     names = _several(labels) or _standard(target, max_diameter_in, counts)
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
-        raise InputError(Fault("", "labels", "none that can be solved", "a propeller that can reach the speed"))
+        raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
     spreads = _scatters(loads, target)
     rows = [row for one in loads for row in _rows(one, _nearest(one, spreads), machines, target)]
     table = _ranked(pd.DataFrame(rows), sure)
@@ -175,26 +175,26 @@ def _target(
 ) -> Target:  # fmt: skip
     faults = []
     if thrust_N is None and mass_kg is None:
-        faults.append(Fault("", "thrust", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust 27 --cells 6"))
+        faults.append(Fault("", "--thrust", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust 27 --cells 6"))
     if cells is None:
-        faults.append(Fault("", "cells", "nothing", "cells in series", "As in --thrust 27 --cells 6"))
+        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust 27 --cells 6"))
     if minutes is not None and capacity_Ah is None:
-        faults.append(Fault("", "capacity", "nothing", "the battery's capacity [A h], for the time"))
-    named = {"thrust": thrust_N, "mass": mass_kg, "cells": cells, "rotors": rotors, "airspeed": airspeed_m_s,
-             "max-tip-mach": max_tip_mach, "capacity": capacity_Ah, "hover-time": minutes}  # fmt: skip
+        faults.append(Fault("", "--capacity", "nothing", "the battery's capacity [A h], for the time"))
+    named = {"--thrust": thrust_N, "--mass": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed": airspeed_m_s,
+             "--max-tip-mach": max_tip_mach, "--capacity": capacity_Ah, "--hover-time": minutes}  # fmt: skip
     faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
     if faults:
         raise InputError(faults)
-    faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("cells", cells), ("rotors", rotors))
+    faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
                if v is not None and v % 1 != 0]  # fmt: skip
     mAh = "In mAh? Divide by 1000" if capacity_Ah is not None and capacity_Ah > 200.0 else ""
     grams = "In grams? Divide by 1000" if mass_kg is not None and mass_kg > 1000.0 else ""
     fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
     for name, value, low, high, hint in (
-        ("thrust", thrust_N, 0.01, 5000.0, ""), ("mass", mass_kg, 0.005, 1000.0, grams), ("cells", cells, 1, 60, ""),
-        ("rotors", rotors, 1, 64, ""), ("airspeed", airspeed_m_s, 0.0, 150.0, fast),
-        ("max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
-        ("capacity", capacity_Ah, 0.01, 1000.0, mAh), ("hover-time", minutes, 0.01, 1e4, ""),
+        ("--thrust", thrust_N, 0.01, 5000.0, ""), ("--mass", mass_kg, 0.005, 1000.0, grams),
+        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed", airspeed_m_s, 0.0, 150.0, fast),
+        ("--max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
+        ("--capacity", capacity_Ah, 0.01, 1000.0, mAh), ("--hover-time", minutes, 0.01, 1e4, ""),
     ):  # fmt: skip
         if value is not None and not low <= value <= high:
             faults.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
@@ -204,21 +204,21 @@ def _target(
     most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
     if hover is not None and most < hover:
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
-        raise InputError(Fault("", "thrust", f"{most:g}", f"{hover:.4g} N or more", hint))
+        raise InputError(Fault("", "--thrust", f"{most:g}", f"{hover:.4g} N or more", hint))
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes)
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
     faults = []
     if not 1 <= len(kv) <= 2 or not all(_is_number(v) and 20.0 <= v <= 50_000.0 for v in kv):
-        faults.append(Fault("", "kv", ":".join(f"{v}" for v in kv), "LOW:HIGH from 20 to 50000 rev/min/V"))
+        faults.append(Fault("", "--kv", ":".join(f"{v}" for v in kv), "LOW:HIGH from 20 to 50000 rev/min/V"))
     if max_diameter_in is not None and not 1.0 <= max_diameter_in <= 120.0:
         hint = "Is that in mm? Divide by 25.4" if max_diameter_in > 120.0 else ""
-        faults.append(Fault("", "max-diameter-in", f"{max_diameter_in:g}", "a number from 1 to 120", hint))
+        faults.append(Fault("", "--max-diameter-in", f"{max_diameter_in:g}", "a number from 1 to 120", hint))
     if not 0.0 < sure < 1.0:
         hint = "In percent? Divide by 100" if 1.0 < sure < 100.0 else ""
-        faults.append(Fault("", "sure", f"{sure:g}", "a probability between 0 and 1", hint))
-    faults += [Fault("", "blades", f"{b}", "2 to 8") for b in blades if b not in range(2, 9)]
+        faults.append(Fault("", "--sure", f"{sure:g}", "a probability between 0 and 1", hint))
+    faults += [Fault("", "--blades", f"{b}", "2 to 8") for b in blades if b not in range(2, 9)]
     if faults:
         raise InputError(faults)
 
@@ -239,7 +239,7 @@ def _standard(target: Target, max_in: float | None, blades: Sequence[int]) -> tu
         )
         got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:g} in")
         expected = f"{least:.2g} to {most:.3g} N, the load of standard sizes from {sizes[0]} to {sizes[-1]} in"
-        raise InputError(Fault("", "thrust", got, expected, "Other sizes: name them with --labels"))
+        raise InputError(Fault("", "--thrust", got, expected, "Other sizes: name them with --labels"))
     return tuple(out)
 
 
@@ -263,7 +263,7 @@ def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
         if np.isfinite([found.u_thrust, found.u_torque]).all():
             out.append(found)
     if not out:
-        raise InputError(Fault("", "labels", "no band converges", "sizes that the solver can judge at this thrust"))
+        raise InputError(Fault("", "--labels", "no band converges", "sizes that the solver can judge at this thrust"))
     return out
 
 

@@ -187,7 +187,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
 
 def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> dict[str, DriveBand]:
     """Speed, thrust, current and power at full throttle and the stated charge: the one source of maximum thrust."""
-    found = _carried(case, airspeed_m_s, (), _full, bands, rotor_table.UPPER)[1]
+    found = _carried(case, airspeed_m_s, (), _full, bands)[1]
     return {key.partition(".")[2]: band for key, band in found.items()}
 
 
@@ -217,12 +217,11 @@ def _carried(
     off: Sequence[str],
     ask: Ask,
     bands: bool = True,
-    speeds: Array = rotor_table.SPEEDS,
 ) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()
-    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s, speeds)
+    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s)
     found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
     rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
 

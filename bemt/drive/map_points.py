@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset, concat
 from bemt.readers._recording import FULL_THROTTLE
 from bemt.recordings import plateaus
@@ -80,7 +81,7 @@ def points(got: Dataset, name: str = "", sign: int = 1, run: int = 0) -> Dataset
     full = float(np.nanmax(np.abs(thrust)))
     silent = (data["rpm"] == 0.0) & (np.abs(thrust) > 0.05 * full)
     if np.any(silent):
-        notes.append(f"rpm of 0 under thrust in {int(silent.sum())} rows: no rpm there")
+        notes.append(f"rpm of 0 under thrust in {number_of(silent.sum(), 'row')}: no rpm there")
         data["rpm"] = np.where(silent, np.nan, data["rpm"])
     out = _reduced(got, command, data, notes, run)
     if len(out) < 4 or np.ptp(out.pulse_us) <= 0.0:

@@ -73,13 +73,9 @@ SPEEDS = np.linspace(0.04, 1.0, 33)
 """Speeds of the table of a rotor over the greatest."""
 
 
-UPPER = SPEEDS[8::3]
-"""Speeds that are enough for full throttle."""
-
-
-def points(diameter_m: float, rpm_max: float, airspeed_m_s: float, speeds: Array = SPEEDS) -> tuple[Array, Array]:
+def points(diameter_m: float, rpm_max: float, airspeed_m_s: float) -> tuple[Array, Array]:
     """Speeds [rev/min] and airspeeds [m/s] of which `from_loads` makes a table: each speed twice, the second faster."""
-    rpm = speeds * rpm_max
+    rpm = SPEEDS * rpm_max
     step = 0.02 * math.pi * diameter_m * rpm[-1] / 60.0
     return np.tile(rpm, 2), airspeed_m_s + np.repeat([0.0, step], rpm.size)
 

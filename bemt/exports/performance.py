@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.bem.model import HUB_LOADS
+from bemt.rotors.validity import kind
 
 if TYPE_CHECKING:
     from bemt.air import Air
@@ -281,7 +282,7 @@ class StatedBand:
     rpm: float
     airspeed_m_s: tuple[float, float]
     origin: str
-    flags: tuple[str, ...]  # Of both points, each once
+    flags: tuple[str, ...]  # Of both points, each kind once
 
     def document(self) -> dict[str, Any]:
         """For the manifest, uncertainties in per cent."""
@@ -310,7 +311,7 @@ def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> Stated
         u = [found.u[name] / np.abs(found[name]) for name in ("thrust_N", "torque_Nm")]
     thrust, torque = ((float(v[0]), float(v[1])) for v in u)
     origin = f"{len(made.moved)} declared assumptions of the case and the spread of rotors as built"
-    flags = tuple(dict.fromkeys(flag for point in found.flags for flag in point))
+    flags = tuple({kind(flag): flag for point in found.flags for flag in point}.values())
     V0, V1 = airspeed_m_s
     return StatedBand(thrust, torque, (T0, T1), (Q0, Q1), float(rpm), (float(V0), float(V1)), origin, flags)
 

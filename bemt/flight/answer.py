@@ -20,6 +20,7 @@ from bemt.flight.inflow import Inflow, inflow
 from bemt.flight.judge import FALSE_ALARM, FlightVerdict, judge
 from bemt.flight.layout import layout_of
 from bemt.flight.log import FlightLog
+from bemt.flight.mass import mass_faults
 from bemt.flight.motor_speed import speed_changes
 from bemt.flight.repeat import flight_scatter
 from bemt.flight.rules import BesideBalance
@@ -138,12 +139,18 @@ def answer_on(
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
     `false_alarm` is the accepted probability that a healthy flight is accused [1]. InputError when logs have another
-    number of rotors, or the layout (as :func:`bemt.flight.layout.layout_of` takes it) does not fit.
+    number of rotors, or the layout (as :func:`bemt.flight.layout.layout_of` takes it) does not fit, or a mass
+    cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
     if others:
         expected = f"{log.rotors} rotors and the same channels as {log.file}"
         raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
+    faults = mass_faults(log, mass_kg, "--mass")
+    for h in healthy:
+        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass")
+    if faults:
+        raise InputError(faults)
     if layout:
         log = replace(log, layout=layout)
     placed = layout_of(log.layout, log.rotors) if log.rotors else None

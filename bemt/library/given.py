@@ -13,6 +13,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -24,7 +25,7 @@ RPM_MAX, AIRSPEED_MAX = 300000.0, 300.0  # as in a case file [rev/min], [m/s]
 ARGUMENTS = {
     "--airspeed": "airspeed_m_s", "--density": "density_kg_m3", "--format": "formats", "--out": "folder",
     "--case": "propeller", "--plan": "points", "--thrust": "thrust_N", "--static-thrust": "static_thrust_N",
-    "--mass": "mass_kg", "--capacity": "capacity_Ah",
+    "--mass": "mass_kg", "--capacity": "capacity_Ah", "--hover-time": "minutes",
 }  # fmt: skip
 """Arguments whose name is not the option's."""
 
@@ -156,7 +157,7 @@ def turned(case: Case, n: Array, V: Array, angle_deg: Any) -> tuple[Array, Array
     try:
         n, V, angle = np.broadcast_arrays(n, V, angle.ravel())
     except ValueError:
-        got = f"{angle.size} of angle_deg for {n.size} points"
+        got = f"{angle.size} of angle_deg for {number_of(n.size, 'point')}"
         raise InputError(Fault("", "angle_deg", got, "as many of each, or one")) from None
     return n, V, angle
 

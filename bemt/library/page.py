@@ -149,7 +149,7 @@ def main() -> None:
     import streamlit as st
 
     st.set_page_config(page_title="bemt", layout="wide")
-    st.title("bemt: propellers with uncertainty")
+    st.title("Propellers with uncertainty")
     st.caption(ABOUT)
     try:
         propeller, point = asked(st)

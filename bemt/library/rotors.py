@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
+from bemt.base.tables import number_of
 from bemt.bem.coaxial import LOADS, RATIOS
 from bemt.case import Case, case_of, find_cases, fresh, load_case
 from bemt.dataset import Dataset
@@ -318,7 +319,7 @@ class Propeller:
 
         n, V = conditions(self.case, rpm, airspeed_m_s, J)
         if n.size != 1:
-            raise InputError(Fault("", "rpm, airspeed_m_s, J", f"{n.size} points", "one operating point"))
+            raise InputError(Fault("", "rpm, airspeed_m_s, J", number_of(n.size, "point"), "one operating point"))
         density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
         air = self.case.air(None if density is None else {"air.density_kg_m3": density})
         prep = self._model.prep
@@ -363,7 +364,7 @@ class Propeller:
 
         one, V = conditions(self.case, rpm, airspeed_m_s, J)
         if one.size != 1:
-            raise InputError(Fault("", "rpm", f"{one.size} points", "one operating point"))
+            raise InputError(Fault("", "rpm", number_of(one.size, "point"), "one operating point"))
         return gradient(self._model, self._model.effects, float(one[0]), float(V[0]), self.case.air())
 
     @cached_property
@@ -546,7 +547,7 @@ def load(path: str | os.PathLike[str]) -> Propeller:
     """
     files = find_cases([path_text("path", path)])
     if len(files) != 1:
-        raise InputError(Fault(os.fspath(path), "", f"{len(files)} cases", "one case", "Name its folder"))
+        raise InputError(Fault(os.fspath(path), "", number_of(len(files), "case"), "one case", "Name its folder"))
     case = load_case(files[0])
     return Propeller(case, case.path.read_text(encoding="utf-8-sig"))
 

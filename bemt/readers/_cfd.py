@@ -20,6 +20,7 @@ from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._columns import Channel, dataset
@@ -203,7 +204,7 @@ def numeric_table(
         if len(values) != width:
             widths[len(values)] += 1
             names = ", ".join(column.name for column in columns[:8])
-            fault = source.fault(row.line, f"{len(values)} columns", f"{width} as in the header ({names})")
+            fault = source.fault(row.line, number_of(len(values), "column"), f"{width} as in the header ({names})")
         else:
             at = values.index(None)
             fault = source.fault(f"{row.line}:{at + 1}", repr(row.cells[at][:40]), "a number")

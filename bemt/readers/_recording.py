@@ -20,6 +20,7 @@ import numpy as np
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import load_text
 from bemt.readers._columns import Channel, dataset
@@ -138,7 +139,9 @@ class Builder:
         values, bad, empty = self.table.numbers(index, decimal)
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
-            self.warnings.append(f"column {label!r}: {errors} cells with an error of the spreadsheet are empty")
+            self.warnings.append(
+                f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
+            )
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
@@ -279,18 +282,20 @@ class Builder:
             same = rows[1:][step == 0.0]
             if same.size:
                 where = some(self.line(int(r)) for r in same)
-                self.warnings.append(f"{same.size} rows repeat the time of the row before (lines {where})")
+                self.warnings.append(f"{number_of(same.size, 'row')} with the time of the row before (lines {where})")
 
     def finish(self, provenance: Mapping[str, str] | None = None, **more: Any) -> Dataset:
         """Make the `Dataset`, or raise all faults."""
         if not self.channels and not self.faults:
-            columns = f"{len(self.texts)} columns of text" if self.texts else "empty columns"
+            columns = f"{number_of(len(self.texts), 'column')} of text" if self.texts else "empty columns"
             self.fault("", f"no column of numbers ({columns})", "one column of numbers or more")
         self.check()
         if self.empty:
-            self.warnings.append(f"no values in {len(self.empty)} columns: {some(self.empty, 8)}")
+            self.warnings.append(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}")
         if self.words:
-            self.warnings.append(f"text, kept as such, in {len(self.words)} columns: {some(self.words, 8)}")
+            self.warnings.append(
+                f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
+            )
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bemt.base import units
 from bemt.base.errors import Fault
+from bemt.base.tables import number_of
 from bemt.readers import SourceText, number
 from bemt.readers._unit_text import unit_of
 from bemt.readers._words import english, quantities
@@ -295,13 +296,13 @@ def _without_ends(
     ):
         ends.append(kept.pop())
     if again:
-        notes.append(f"{len(again)} lines left out: the headings again (line {some(again)})")
+        notes.append(f"{number_of(len(again), 'line')} left out: the headings again (line {some(again)})")
     if sums:
         words = some((f"{word!r} in line {i}" for i, word in sums), 3)
-        notes.append(f"{len(sums)} lines left out: sums of others ({words})")
+        notes.append(f"{number_of(len(sums), 'line')} left out: sums of others ({words})")
     if ends:
         words = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
-        notes.append(f"{len(ends)} lines left out: remarks at the end ({words})")
+        notes.append(f"{number_of(len(ends), 'line')} left out: remarks at the end ({words})")
     return kept
 
 
@@ -317,13 +318,15 @@ def split_table(
     if not used:
         source.refuse("", "no data", "a heading line and rows of numbers")
     notes = [f"{comments} comment lines left out"] if comments else []
-    notes += [f"{len(bare)} lines of empty cells left out (line {some(bare)})"] if bare else []
+    notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
     labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
     if start:
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
-        notes += [] if _EXCEL.fullmatch(used[0][1]) else [f"{start} lines above the headings left out: {above}"]
+        notes += (
+            [] if _EXCEL.fullmatch(used[0][1]) else [f"{number_of(start, 'line')} above the headings left out: {above}"]
+        )
         used = used[start:]
     if any(len(t) > 100_000 for _, t in used):
         source.refuse("", "a line of more than 100000 characters", "a table of short lines")
@@ -397,7 +400,7 @@ def _rows(
             rows.append((*cells, *[""] * (width - len(cells))))
         elif short or any(cells[width:]):
             hint = "Was a line cut?" if short else "A delimiter inside a value, or a decimal comma?"
-            faults.append(source.fault(i, f"{len(cells)} cells", f"{width} as in line {top}", hint))
+            faults.append(source.fault(i, number_of(len(cells), "cell"), f"{width} as in line {top}", hint))
             misfits.append(k)
             rows.append(("",) * width)
         else:
@@ -405,7 +408,7 @@ def _rows(
     if len(faults) > most_misfits * len(body):
         source.faults += faults[:MAX_FAULTS]
         if len(faults) > MAX_FAULTS:
-            source.add("", f"{len(faults) - MAX_FAULTS} more lines of another length", f"{width} cells")
+            source.add("", f"{number_of(len(faults) - MAX_FAULTS, 'more line')} of another length", f"{width} cells")
         source.check()
     if not rows:
         source.refuse("", "no rows", "a heading line and rows of numbers")

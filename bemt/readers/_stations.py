@@ -11,6 +11,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.readers import SourceText, load_text
 from bemt.readers._split import decimal_mark, split_table
 from bemt.readers._unit_text import unit_of
@@ -106,7 +107,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
         columns.append(values * place.scale)
     source.faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
     if not source.faults and len(table) < 2:
-        source.add("", f"{len(table)} stations", "two or more")
+        source.add("", number_of(len(table), "station"), "two or more")
     source.check()
     x, c, beta = columns
     if wanted[2] == "pitch":

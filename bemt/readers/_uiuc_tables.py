@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._uiuc_names import parse_file_name
 
@@ -167,7 +168,7 @@ def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
     for i in np.flatnonzero(np.diff(r_R) <= 0):
         source.add(f"{rows[i + 1]}:1", f"r/R = {r_R[i + 1]:g} after {r_R[i]:g}", "ascending r/R", "Sort rows")
     if len(r_R) < 3 or r_R[-1] < 0.9:
-        got = f"{len(r_R)} stations to r/R = {r_R[-1]:g}"
+        got = f"{number_of(len(r_R), 'station')} to r/R = {r_R[-1]:g}"
         source.add("", got, "three stations or more up to r/R = 0.9", "Is the file cut off?")
     if np.max(np.abs(beta)) < 1.6:
         got = f"blade angles of at most {np.max(np.abs(beta)):g}"

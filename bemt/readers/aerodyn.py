@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bemt.base.tables import number_of
 from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
 from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.polars import Polar
@@ -108,7 +109,7 @@ def _airfoils(source: SourceText) -> list[str]:
     lines = [] if first is None else source.lines[first : first + count]
     names = [m[1] for line in lines if (m := re.match(r'\s*"([^"]+)"', line))]
     if len(names) < max(count, 1):
-        source.add("AFNames", f"{len(names)} files", f"{max(count, 1)} in quotes")
+        source.add("AFNames", number_of(len(names), "file"), f"{max(count, 1)} in quotes")
     return names
 
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
 
@@ -168,7 +169,7 @@ def _pe0_rows(source: SourceText, at: int, names: list[str]) -> dict[str, Array]
     lines, data = list(rows), np.array([*rows.values()])
     if len(rows) < 3:
         if not source.faults:
-            source.add(at, f"{len(rows)} stations", "three or more", "Is the file cut off?")
+            source.add(at, number_of(len(rows), "station"), "three or more", "Is the file cut off?")
         return {}
     table = {name: data[:, i] for i, name in enumerate(names)}
     wanted = ("station", "chord", "pitch quoted", "pitch le-te", "sweep", "thickness", "twist", "max-thick")
@@ -215,7 +216,11 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
     version = re.search(r"^\s*(v\d{4}\S*)", source.text, re.MULTILINE)
     sections = re.findall(r"^\s*AIRFOIL\d+:\s*([\d.]+)\s*,\s*(\S.*?)\s*(?:\(|$)", source.text, re.MULTILINE)
     notes = tuple(re.findall(r"^\s*NOTE:\s*(.*?)\s*$", source.text, re.MULTILINE))
-    remark = f"{len(names)} columns; blade number by the name {blades_named}" if blades_named != tail["BLADES"] else ""
+    remark = (
+        f"{number_of(len(names), 'column')}; blade number by the name {blades_named}"
+        if blades_named != tail["BLADES"]
+        else ""
+    )
     return ApcBlade(
         name=name, version=version[1] if version else "", diameter_m=diameter_in * inch, pitch_m=pitch_in * inch,
         radius_m=R * inch, hub_radius_m=tail["HUBTRA"] * inch, blades=int(tail["BLADES"]), r_m=table["station"] * inch,

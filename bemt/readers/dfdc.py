@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from bemt.base.tables import number_of
 from bemt.readers import head_text
 from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.readers.xrotor import read_section
@@ -53,7 +54,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     n = whole(rows.take(1, "#stations")[0])
     body = rows.table(n, 3, "r chord beta")
     if len(body) < n:
-        rows.add("ROTOR", f"{len(body)} stations", f"{n}")
+        rows.add("ROTOR", number_of(len(body), "station"), f"{n}")
     rows.check()
     r, c, b = body.T
     hub, tip, duct = _walls(rows, words, x_disk)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import os
 
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import load_text
 from bemt.readers._cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
@@ -45,5 +46,5 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     body = [row for row in rows if row.cells != names]
     table = numeric_table(source, columns, body, commas=mark != ",")
     repeated = len(rows) - len(body)
-    notes = [f"header repeated {repeated} times: several surfaces in one file"] if repeated else []
+    notes = [f"header repeated {number_of(repeated, 'time')}: several surfaces in one file"] if repeated else []
     return fields(KIND, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])

@@ -25,6 +25,7 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text, number
 from bemt.readers._cfd import head_lines, si_unit, slug, unique
@@ -77,7 +78,7 @@ def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tupl
         return [(f"center_of_pressure_{c}{suffix}", si or (unit[1] if unit else "")) for c in columns]
     groups = [m for part in re.split(r"\s{3,}", groups_line.strip()) if (m := _GROUP.fullmatch(part))]
     if not columns or not groups or len(columns) % len(groups):
-        return f"{len(columns)} columns under {len(groups)} groups"
+        return f"{number_of(len(columns), 'column')} under {len(groups)} groups"
     each = len(columns) // len(groups)
     if any(columns[k * each : (k + 1) * each] != columns[:each] for k in range(len(groups))):
         return f"groups of unlike columns ({' '.join(columns)})"
@@ -127,7 +128,9 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
                 right = ({1},) if " along " in names[0][0] else ({1}, {2}, {3})
                 shape = shape or (sizes if sizes in right else set())
                 if len(vectors) != len(names) or None in vectors or sizes not in right or sizes != shape or cut:
-                    got = f"{len(vectors)} columns, or text among them" + (" (no line end: cut?)" if cut else "")
+                    got = f"{number_of(len(vectors), 'column')}, or text among them" + (
+                        " (no line end: cut?)" if cut else ""
+                    )
                     faults.append(source.fault(k + 1, got, f"a zone and {len(names)} numbers or vectors"))
                 else:
                     entries += _entries(cells[0], names, [v for v in vectors if v is not None])

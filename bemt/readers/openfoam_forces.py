@@ -25,6 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base.averaging import Mean
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, load_text
 from bemt.readers._cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table
@@ -112,7 +113,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
         hint = "Their sum is in the forces (or force and moment) file in the same folder"
         source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
-    notes = [f"header repeated {repeated} times: the run was restarted"] if repeated else []
+    notes = [f"header repeated {number_of(repeated, 'time')}: the run was restarted"] if repeated else []
     if header.split()[0] == "patch":
         return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)
     if probes:
@@ -200,7 +201,8 @@ def _balance(columns: list[Column], table: ExportTable, axis: str) -> list[str]:
         if np.any(off):
             rows = int(np.count_nonzero(off))
             line = table.lines[int(np.flatnonzero(off)[0])]
-            notes.append(f"{base}_total_{axis}_{unit} is not the sum of its parts in {rows} rows (first: line {line})")
+            where = f"{number_of(rows, 'row')} (first: line {line})"
+            notes.append(f"{base}_total_{axis}_{unit} is not the sum of its parts in {where}")
     return notes
 
 

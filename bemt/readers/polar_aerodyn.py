@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import re
 
+from bemt.base.tables import number_of
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers.polar_csv import PolarRow, assemble, row_of
 from bemt.sections.polars import Polar
@@ -94,7 +95,9 @@ def _read_v15(source: SourceText) -> list[PolarRow]:
             block = lines[at : at + count]
             stop = next((k for k, (_, c) in enumerate(block) if len(c) > 1 and c[1][:1].isalpha()), len(block))
             if stop < count:
-                source.add(i, f"{stop} rows after NumAlf = {count}", f"{count} rows", "Correct NumAlf")
+                source.add(
+                    i, f"{number_of(stop, 'row')} after NumAlf = {count}", number_of(count, "row"), "Correct NumAlf"
+                )
             for j, row in block[:stop]:
                 rows += row_of(source, j, row, reynolds)
             at += stop
@@ -126,7 +129,7 @@ def _read_v13(source: SourceText) -> list[PolarRow]:
                     hint = "Tables distinguished by an id are not supported"
                     source.add(i, "a table without Re", "Reynolds number in millions", hint)
             if len(cells) > 5:
-                source.add(i, f"{len(cells)} columns", "alpha, cl, cd, cm", "Give several tables one by one")
+                source.add(i, number_of(len(cells), "column"), "alpha, cl, cd, cm", "Give several tables one by one")
             rows += row_of(source, i, cells, reynolds)
         elif inside and len(cells) > 1 and not cells[1][:1].isalpha():
             rows += row_of(source, i, cells, reynolds)

@@ -7,6 +7,7 @@ import os
 
 import numpy as np
 
+from bemt.base.tables import number_of
 from bemt.readers import head_text
 from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.parametric import QpropSection
@@ -48,7 +49,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     """Read one propeller file."""
     rows = Cursor(path, "#!")
     if len(rows.rows) < 10:
-        rows.refuse("", f"{len(rows.rows)} lines", "a title, seven lines of numbers, two stations")
+        rows.refuse("", number_of(len(rows.rows), "line"), "a title, seven lines of numbers, two stations")
     rows.at, line = 1, rows.rows[1][0]
     got = [rows.take(n, what, max(n, 2)) for n, what in HEAD]
     body = [rows.take(3, "r c beta", 13) for _ in rows.rows[8:]]

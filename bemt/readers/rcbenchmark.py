@@ -28,6 +28,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import head_text, number
 from bemt.readers._headings import heading
@@ -114,7 +115,9 @@ def _messages(build: Builder, k: int, text: str) -> None:
     if any(cells):
         build.texts["app_message" if text else f"column_{k + 1}"] = cells
         rows = [i for i, cell in enumerate(cells) if cell]
-        build.warnings.append(f"messages of the stand in {len(rows)} rows, kept as text: {cells[rows[0]][:60]!r} ...")
+        build.warnings.append(
+            f"messages of the stand in {number_of(len(rows), 'row')}, kept as text: {cells[rows[0]][:60]!r} ..."
+        )
 
 
 def _mode(build: Builder) -> str:

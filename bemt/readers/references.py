@@ -28,6 +28,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemt.base import units
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import SourceText, head_text, load_text, number
 from bemt.readers._unit_text import WEIGHTS, unit_of
@@ -236,7 +237,7 @@ def read(path: str | os.PathLike[str]) -> list[Reference]:
             header = _header(source, line, cells)
         elif len(cells) != len(header):
             hint = "Quote cells that hold a comma" if len(cells) > len(header) else "Write empty cells too"
-            source.add(line, f"{len(cells)} cells", f"{len(header)} cells", hint)
+            source.add(line, number_of(len(cells), "cell"), number_of(len(header), "cell"), hint)
         else:
             row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
             if reference := _reference(_Row(source, line, header, row)):

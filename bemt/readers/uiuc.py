@@ -41,6 +41,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers import HEAD_BYTES
 from bemt.readers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
@@ -188,7 +189,9 @@ def _collect(files: list[tuple[Path, UiucFile]], faults: list[Fault]) -> Iterato
     for key, name in sorted(names.items()):
         folder = os.fspath(next(file for file, told in files if told.propeller.name == key).parent)
         if name.faults:
-            faults.extend(Fault(f"{folder}/{key}_* ({counts[key]} files)", "name", *fault) for fault in name.faults)
+            faults.extend(
+                Fault(f"{folder}/{key}_* ({number_of(counts[key], 'file')})", "name", *fault) for fault in name.faults
+            )
             continue
         if key == name.family or name.diameter_in is None:  # the design of a family is no propeller of its own
             continue

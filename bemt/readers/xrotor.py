@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 
+from bemt.base.tables import number_of
 from bemt.readers import head_text
 from bemt.readers._blade import BladeFile, Cursor, whole
 from bemt.sections.parametric import XrotorSection
@@ -67,7 +68,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     n, blades = rows.take(2, "II Nblds")
     left = len(rows.rows) - rows.at
     if min(left, whole(n)) < n:
-        rows.add(rows.rows[-1][0], f"{min(left, whole(n))} stations", f"{n:g}")
+        rows.add(rows.rows[-1][0], number_of(min(left, whole(n)), "station"), f"{n:g}")
     table = rows.table(whole(n), 4, "r/R C/R Beta0deg Ubody")
     rows.check()
     notes = ["compressibility: effects of the case instead of XROTOR's Mcrit"]

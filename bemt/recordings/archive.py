@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import file_hash
+from bemt.base.tables import file_hash, number_of
 
 MAX_ARCHIVE = 500_000_000
 """Bytes that an archive may have."""
@@ -114,7 +114,7 @@ def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo,
     seen: set[str] = set()
     infos = archive.infolist()
     if len(infos) > MAX_FILES:
-        raise InputError(Fault(name, "", f"{len(infos)} files", f"at most {MAX_FILES}", "Is this the archive?"))
+        raise InputError(Fault(name, "", number_of(len(infos), "file"), f"at most {MAX_FILES}", "Is this the archive?"))
     for info in infos:
         path = PurePosixPath(info.filename)
         parts = path.parts

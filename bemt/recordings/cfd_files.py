@@ -13,6 +13,7 @@ from bemt import readers
 from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 
 PROGRAMS: Mapping[str, str] = {
@@ -168,7 +169,7 @@ def settled(
         turns = np.array(found.per_revolution)
         scatter = float(np.std(turns, ddof=1) / math.sqrt(turns.size)) if turns.size > 1 else 0.0
         word = f"{found.revolutions} revolution" + ("s" if found.revolutions > 1 else "")
-        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({found.rows} rows)"
+        over = f"last {word}, {found.start:.6g} to {found.end:.6g} s ({number_of(found.rows, 'row')})"
         wide = (np.ptp(turns) / abs(found.mean) if turns.size and found.mean else 0.0) > SCATTERED
         over += "; revolutions differ by more than 2 %" if wide else ""
         return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), scatter, over)

@@ -16,7 +16,7 @@ from bemt import readers
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_text, text_table
+from bemt.base.tables import number_of, number_text, text_table
 from bemt.dataset import Dataset
 from bemt.readers._cfd import unit_of
 from bemt.readers.cfd_run import RunToml
@@ -252,7 +252,7 @@ def _dataset(
         index = np.flatnonzero(keep)
         made = Dataset("cfd", made.name, {k: v[index] for k, v in full.items()}, {k: made.u[k][index] for k in u}, (),
                        provenance, tuple(labels[i] for i in index) if labels else (),
-                       notes=(*made.notes, f"{int((~keep).sum())} points without a load left out"))  # fmt: skip
+                       notes=(*made.notes, f"{number_of((~keep).sum(), 'point')} without a load left out"))  # fmt: skip
     return with_grid_floor(made, conditions.get("u_grid", math.nan))
 
 

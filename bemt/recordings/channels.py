@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base import units
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 from bemt.readers._recording import FULL_THROTTLE
 
@@ -167,7 +168,7 @@ def named(d: Dataset) -> Dataset:
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
     if none:
-        notes.append(f"{none} rows without a run: taken as run 0")
+        notes.append(f"{number_of(none, 'row')} without a run: taken as run 0")
     own = {key: d.unit(name) for key, name in names.items() if name in d}
     about = {**d.provenance, "names": names, "dropped": tuple(out)}
     return replace(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.dataset import Dataset
 
 
@@ -63,7 +64,7 @@ def averaged(record: Dataset, period: float, revolutions: int | None = None) -> 
 
 def _span(average: Average) -> str:
     turns = f"{average.revolutions} revolution" + ("s" if average.revolutions > 1 else "")
-    return f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {average.rows} rows)"
+    return f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {number_of(average.rows, 'row')})"
 
 
 def asked(rpm: float | None = None, period: float | None = None, revolutions: int | None = None) -> Choice:

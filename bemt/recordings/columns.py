@@ -9,6 +9,7 @@ import numpy as np
 from bemt.air import LIQUID
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.recordings.findings import Facts, Finding, check_for
 
 SENSORS = (
@@ -163,7 +164,7 @@ def time_backwards(facts: Facts) -> Iterator[Finding]:
         lines = ", ".join(str(facts.lines[int(r)]) for r in odd[:6]) + (" ..." if odd.size > 6 else "")
         fall = float(np.min(np.diff(t[rows])[back]))
         first = odd.size == 1 and odd[0] <= 2 and abs(fall) < 1.0
-        text = f"time falls in {odd.size} rows (line {lines}), by {-fall:.4g} s at most"
+        text = f"time falls in {number_of(odd.size, 'row')} (line {lines}), by {-fall:.4g} s at most"
         fix = (
             "leave those rows out" if first else "sort the rows by time, or split the file where its clock starts again"
         )

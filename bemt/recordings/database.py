@@ -19,7 +19,7 @@ from typing import Any
 
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import file_hash, json_text
+from bemt.base.tables import file_hash, json_text, number_of
 from bemt.recordings.archive import download, unpacked
 
 SCHEMA = "bemt.data/1"
@@ -59,7 +59,7 @@ def _check_own(folder: Path, known: dict[str, Any]) -> None:
         got += ", ..." if len(strange) > 5 else ""
     else:  # a record of earlier versions: it only counts
         strange = list(there) if len(there) != known.get("files") else []
-        got = f"{len(there)} files where its record counts {known.get('files')}"
+        got = f"{number_of(len(there), 'file')} where its record counts {known.get('files')}"
     if strange:
         raise InputError(Fault(os.fspath(folder), "", got, "only what this command put there", hint))
 

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 
 OUTLIER = 6.0
 """Robust standard deviations from which a sample is an outlier."""
@@ -208,7 +209,7 @@ def _checked(
         lengths["command"] = len(np.asarray(command))
     wrong = [f"{name} has {length}" for name, length in lengths.items() if length != n]
     if wrong:
-        faults.append(Fault("", "plateaus", ", ".join(wrong), f"{n} values each"))
+        faults.append(Fault("", "plateaus", ", ".join(wrong), f"{number_of(n, 'value')} each"))
     if signal not in data:
         faults.append(Fault("", "signal", repr(signal), f"one of {', '.join(sorted(data))}"))
     elif not np.any(np.isfinite(data[signal])):
@@ -216,7 +217,7 @@ def _checked(
     if not np.all(np.isfinite(t)):
         faults.append(Fault("", "time_s", "a value that is not finite", "finite times"))
     elif len(back := _backwards(t)) > max(2, n // 100):
-        got = f"time that falls in {len(back)} rows, first row {back[0]}"
+        got = f"time that falls in {number_of(len(back), 'row')}, first row {back[0]}"
         faults.append(Fault("", "time_s", got, "times in order", "Sort the file, or split it where its clock restarts"))
     return t, faults
 

@@ -23,6 +23,7 @@ from bemt import coefficients as co
 from bemt.air import GAMMA, R_DRY, Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
 from bemt.dataset import Dataset, concat
 from bemt.recordings.channels import (
@@ -99,7 +100,9 @@ def reduce(
     _outliers(rec, found)
     if not found.points:
         reasons = ", ".join(sorted({gone.reason for gone in found.lost if not gone.channel}))
-        raise InputError(Fault(name, "", f"no steady point in {len(rec)} rows ({reasons or 'no rows'})", "one or more"))
+        raise InputError(
+            Fault(name, "", f"no steady point in {number_of(len(rec), 'row')} ({reasons or 'no rows'})", "one or more")
+        )
     values, u = _columns(found.points)
     notes = [reason, *rec.notes, *found.notes, *_shared(values, stated(rec))]
     for key, constant in (("tip_gap_m", "gap_m"), ("wall_distance_m", "wall_distance_m")):
@@ -285,14 +288,16 @@ def _fill_scatter(
             missing = ~np.isfinite(u[name])
             u[name] = np.where(missing, again.scatter * np.abs(values[name]), u[name])
             use = (
-                f"; taken as the uncertainty of {int(missing.sum())} points that state none" if np.any(missing) else ""
+                f"; taken as the uncertainty of {number_of(missing.sum(), 'point')} that state none"
+                if np.any(missing)
+                else ""
             )
             notes.append(f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom){use}")
         between = session(values[name], values["rpm"], run, _flow(values))
         if math.isfinite(between.scatter):
             correlated[name]["session"] = between.scatter
             words = f"{name}: runs differ by {between.scatter:.2%} at equal speed"
-            notes.append(f"{words} ({between.runs} runs, {between.pairs} common points)")
+            notes.append(f"{words} ({number_of(between.runs, 'run')}, {number_of(between.pairs, 'common point')})")
 
 
 def _series(
@@ -477,5 +482,5 @@ def _moist(values: Mapping[str, Array], temperature: Array) -> AirOfPoints:
         "density from pressure and temperature" + (" and humidity" if np.any(np.isfinite(humidity)) else ", dry air")
     ]
     if bad:
-        notes.append(f"no density in {len(bad)} points: {bad[0]}")
+        notes.append(f"no density in {number_of(len(bad), 'point')}: {bad[0]}")
     return AirOfPoints(rho, a_sound, tuple(notes))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bemt import coefficients as co
 from bemt.base.arrays import Array
+from bemt.base.tables import number_of
 from bemt.recordings.channels import shaft_power
 from bemt.recordings.findings import MANY, Facts, Finding, check_for
 from bemt.recordings.windmilling import zero_thrust_speed
@@ -65,7 +66,8 @@ def flipped(facts: Facts) -> Iterator[Finding]:
         odd = _mirrored(facts, name, v, loaded, -1.0 if share > 0.5 else 1.0)
         if np.any(odd):
             rows = np.flatnonzero(odd)
-            text = f"the sign changes in {len(rows)} rows ({_where(facts, rows)}) whose magnitude fits the others"
+            where = f"{number_of(len(rows), 'row')} ({_where(facts, rows)})"
+            text = f"the sign changes in {where} whose magnitude fits the others"
             yield Finding("sign_flipped", facts.named(name), text, "multiply those rows by -1", _rows(odd), "error")
 
 
@@ -114,7 +116,7 @@ def negative_thrust(facts: Facts) -> Iterator[Finding]:
         where = f"{_where(facts, rows)}; lowest {np.nanmin(v[odd]):.4g} N, largest thrust {top:.4g} N"
         fix = "a propeller in still air pushes one way: zero of the load cell, sign, or a misreading; leave them out"
         turns = "while the rotor turns" if rpm is not None else "beside positive ones"
-        text = f"negative thrust {turns} in {len(rows)} rows ({where})"
+        text = f"negative thrust {turns} in {number_of(len(rows), 'row')} ({where})"
         yield Finding("negative_thrust", facts.named("thrust_N"), text, fix, _rows(odd), "warning")
 
 
@@ -163,7 +165,9 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
     odd = facts.loaded & facts.still & (fm > limit * 1.02)
     if _enough(odd, facts.loaded):
         rows = np.flatnonzero(odd)
-        text = f"figure of merit {np.max(fm[odd]):.4g} at most in {len(rows)} rows ({_where(facts, rows)}); "
+        text = (
+            f"figure of merit {np.max(fm[odd]):.4g} at most in {number_of(len(rows), 'row')} ({_where(facts, rows)}); "
+        )
         text += f"{words} stays below {limit:.3g}"
         fix = "unit or gain of thrust or torque, diameter, or a zero that was not subtracted"
         named, severity = facts.named("thrust_N" if T is not None else "CT"), _contradicts(odd, facts.loaded)
@@ -179,6 +183,6 @@ def tip_mach(facts: Facts) -> Iterator[Finding]:
     mach = math.pi * D * np.abs(np.nan_to_num(rpm)) / 60.0 / 343.0
     odd = mach > 1.1
     if np.mean(odd) > 0.05:
-        text = f"tip Mach number {np.max(mach):.3g} in {int(odd.sum())} rows with the diameter of {D:g} m"
+        text = f"tip Mach number {np.max(mach):.3g} in {number_of(odd.sum(), 'row')} with the diameter of {D:g} m"
         fix = "electrical revolutions taken for mechanical (divide by the pole pairs), or the unit of the diameter"
         yield Finding("tip_mach", facts.named("rpm"), text, fix, _rows(odd), "error")

@@ -75,8 +75,8 @@ def book_html(book: Mapping[str, Any]) -> str:
         "Nothing here is fitted to the value it is compared with."
     )
     foot = (
-        f"bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). Colours after Okabe and Ito. "
-        "This file loads nothing from the network."
+        f"Made by bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). "
+        "Colours after Okabe and Ito. This file loads nothing from the network."
     )
     title = about.get("title") or (headline(only[0]["result"]) if len(only) == 1 else "Validation report")
     return render(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bemt import coefficients as co
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.report.cfd import audit_parts
@@ -120,13 +121,16 @@ def _performance(page: Mapping[str, Any]) -> Section:
         y = j[name]
         if name == "eta":  # a ratio of two small numbers where thrust ends
             y = np.where(j["CT"] > 0.1 * np.nanmax(np.append(j["CT"], 0.0)), y, np.nan)
-        traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"])]
+        most = None
+        if name == "eta":  # of the least thrust in the band, as the limit falls with thrust
+            most = co.eta_limit(j["J"], 0.0 if result.get("fan") else j["CT"] - j["u_CT"])
+        traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"], ceiling=most)]
         if name == "CT":
             traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
             traces += _points(page, "J", name, lambda r: near(r, "rpm"))
         title = f"{label[0].upper()}{label[1:]} over advance ratio at {own['rpm']:g} rev/min"
-        note = "Where the band exceeds 1, the efficiency is not known." if name == "eta" else ""
+        note = "The band ends at the limit of momentum theory." if name == "eta" else ""
         plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces, note=note))
     with np.errstate(divide="ignore", invalid="ignore"):
         per_kW: Any = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
@@ -141,8 +145,8 @@ def _performance(page: Mapping[str, Any]) -> Section:
         title = f"{title} at {own['airspeed_m_s']:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
-        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors (efficiency: "
-        "assumptions only). Points: recorded values; a value without a bar states no uncertainty."
+        "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. "
+        "Points: recorded values; a value without a bar states no uncertainty."
     )
     return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 

@@ -33,7 +33,8 @@ NOTE = (
 NEEDS = {
     "needs u_D": "“Needs u_D ≥ 8 %”: the recording states no uncertainty, and the two agree only if its own is at "
     "least that large.",
-    "inside the model's band": "“Inside the model's band”: they agree for any uncertainty of the recording.",
+    "inside the model's band": "“Inside the model's band”: the two differ by less than BEMT's own uncertainty, so "
+    "they agree however uncertain the recording is.",
 }
 """Explanations of badges, by how their words begin."""
 OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
@@ -141,7 +142,12 @@ def _n(value: Any, digits: int = 4) -> str:
 
 def summary(book: Mapping[str, Any]) -> str:
     """Write the summary."""
-    out = ["# Validation report", "", f"bemt {plain_markdown(book['version'])}. Figures and tables: `report.html`.", ""]
+    out = [
+        "# Validation report",
+        "",
+        f"Made by bemt {plain_markdown(book['version'])}. Figures and tables: `report.html`.",
+        "",
+    ]
     out += [
         "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | verdict |",
         "|---|---|---|---|---|---|---|---|",

@@ -9,7 +9,7 @@ from typing import Any
 
 import bemt
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, write_atomic
+from bemt.base.tables import json_text, number_of, write_atomic
 from bemt.case import Case, find_cases, load_case
 from bemt.report import curves, trends
 from bemt.report.cfd import attach, cfd_runs, fidelities
@@ -150,7 +150,9 @@ def diagnose_into(
 
     cases = find_cases(paths)
     if len(cases) != 1:
-        raise InputError(Fault("--recording", "", f"{len(cases)} cases", "one case, the rotor that was recorded"))
+        raise InputError(
+            Fault("--recording", "", number_of(len(cases), "case"), "one case, the rotor that was recorded")
+        )
     found, records = load_all(list(recordings), [str(cases[0])])
     target = (out / found[0].name / "diagnosis").as_posix()
     folder.check(target, found)

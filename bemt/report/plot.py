@@ -49,6 +49,14 @@ class Trace:
     points: bool = False  # Points instead of a line
     labels: Sequence[str] = ()  # Words per point, shown on hovering
     horizontal: bool = False  # The uncertainty belongs to x
+    ceiling: Sequence[Any] | None = None  # What y cannot pass: a band ends there
+
+    def top(self, x: float, y: float, u: float) -> float:
+        """Upper end of the band at a point of the trace."""
+        if self.ceiling is None:
+            return y + u
+        most = next((c for at, c in zip(self.x, self.ceiling, strict=True) if at == x), math.inf)
+        return max(y, min(y + u, float(most)))
 
 
 def points(
@@ -143,9 +151,10 @@ class _Frame:
                 xs.append(x)
                 ys.append(y)
                 if not math.isnan(u):
-                    (xs if t.trace.horizontal else ys).extend(
-                        [(x if t.trace.horizontal else y) + s * u for s in (-1, 1)]
-                    )
+                    if t.trace.horizontal:
+                        xs += [x - u, x + u]
+                    else:
+                        ys += [y - u, t.trace.top(x, y, u)]
         xs = [min(max(x, low), high) for x in xs]
         self.log = plot.log_x and all(x > 0 for x in xs)
         xs = [math.log10(x) for x in xs] if self.log else xs
@@ -228,7 +237,9 @@ def _draw(t: _Numbers, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str,
         at = [t.points[i] for i in run]
         band = [p for p in at if not math.isnan(p[2])]
         if len(band) > 1:
-            edge = [(f.x(x), f.y(y + u)) for x, y, u in band] + [(f.x(x), f.y(y - u)) for x, y, u in reversed(band)]
+            edge = [(f.x(x), f.y(trace.top(x, y, u))) for x, y, u in band] + [
+                (f.x(x), f.y(y - u)) for x, y, u in reversed(band)
+            ]
             out.append(("band", _path(edge) + "z"))
         if len(at) > 1:
             out.append(("line", _path([(f.x(x), f.y(y)) for x, y, _ in at])))

@@ -22,6 +22,7 @@ from bemt import readers as importers
 from bemt.air import Air, isa_pressure
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.dataset import Dataset
 from bemt.readers import apc, uiuc
@@ -231,7 +232,11 @@ def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list
         maker = str(name).split("_")[0].split(" ")[0]
         made = MeasuredPropeller(str(name), maker, path.name, float(d), float(p), int(b), inside)
         rows.append((made, rpm[at], J[at], CT[at]))
-    return rows, [f"{path}: {bad} rows without a positive diameter, pitch and blade count"] if bad else [], notes
+    return (
+        rows,
+        [f"{path}: {number_of(bad, 'row')} without a positive diameter, pitch and blade count"] if bad else [],
+        notes,
+    )
 
 
 def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:

@@ -102,7 +102,7 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[_Thrust]) -> lis
                 told = ["-", "", ""] if t is None else [
                     f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g} ({100 * t.share:.0f} %)",
                     _agreement(t.c)]  # fmt: skip
-                body.append([result["name"][:16] if first else "", *cells, *told])
+                body.append([_name(result["name"]) if first else "", *cells, *told])
                 cells, first = [""] * len(cells), False
     shown = body[:ROWS]
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
@@ -115,6 +115,11 @@ def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[_Thrust]) -> lis
         if any(t.c.doubts for t in found):
             lines.append("!: do not take it for agreement; the flag below says why")
     return lines
+
+
+def _name(name: str) -> str:
+    """A name of 20 letters at most; a cut shows."""
+    return name if len(name) <= 20 else f"{name[:19]}…"
 
 
 def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -164,9 +169,9 @@ def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
         )[:3]
         if first:
             told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
-            while len(", ".join(told)) > WIDTH - 20:
+            while len(", ".join(told)) > WIDTH - 24:
                 told.pop()
-            lines.append(f"  {result['name'][:16]:<18}{', '.join(told)}")
+            lines.append(f"  {_name(result['name']):<17} {', '.join(told)}")
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 

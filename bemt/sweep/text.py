@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bemt.base.tables import csv_text, number_text, text_table
+from bemt.base.tables import csv_text, number_of, number_text, text_table
 from bemt.sweep.case import ROW_SOURCES
 from bemt.sweep.comparison import Comparison
 
@@ -223,7 +223,7 @@ def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
     body = []
     for result in map(with_nan, results):
         if not result["rows"]:
-            body.append([result["name"], "not solved", *[""] * 8, f"{len(result['faults'])} faults"])
+            body.append([result["name"], "not solved", *[""] * 8, number_of(len(result["faults"]), "fault")])
         for row in [*result["rows"], *result["variants"], *result["other_rows"]]:
             count = len(row["flags"])
             body.append([

@@ -249,7 +249,7 @@ def draw(panels: list[list[Known]], to: Path) -> None:
             shown = ("CT", 1.0, known.CT), ("duct_share", 100.0, known.share)
             for ax, (key, scale, reference) in zip(column, shown, strict=True):
                 y, u = scale * found[key], scale * found.u[key]
-                ax.plot(J, y, color=f"C{k}", label=f"bemt: {known.name}")
+                ax.plot(J, y, color=f"C{k}", label=f"BEMT: {known.name}")
                 ax.fill_between(J, y - u, y + u, color=f"C{k}", alpha=0.2, lw=0)
                 ax.plot(known.J[seen], scale * reference[seen], "o", color=f"C{k}", mec="k", ms=5)
         column[0].legend(fontsize=8)
