@@ -590,7 +590,10 @@ def _median(text: str, column: str) -> float:
     return float(np.median(np.genfromtxt(text.splitlines(), delimiter=",", names=True)[column]))
 
 
-REFERENCE_STEP = {"kind": "reference", "commands": ["bemt diagnose recording.csv --reference reference.csv --case case.toml"]}
+REFERENCE_STEP = {
+    "kind": "reference",
+    "commands": ["bemt diagnose recording.csv --reference reference.csv --case case.toml"],
+}
 
 
 def test_a_none_that_recommends_a_reference_is_followed(

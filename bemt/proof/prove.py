@@ -25,7 +25,8 @@ from bemt.base.tables import json_text, write_atomic
 from bemt.proof import draw, items, proof_text, real, resolve, score, seal
 
 __all__ = [
-    "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question", "teller",
+    "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
+    "teller",
 ]  # fmt: skip
 
 T = TypeVar("T")
