@@ -166,7 +166,7 @@ def eta_limit(J: ArrayLike, CT: ArrayLike) -> Any:
     "Aerodynamic Theory" IV, 1935). A duct with a wide exit may pass it, but not 1: use CT = 0 there.
 
     >>> eta_limit([0.0, 0.5, 0.5, 0.5], [0.1, 0.1, 0.0, -0.1]).round(3)
-    array([0.   , 0.67 , 1.   , 1.   ])
+    array([0.   , 0.826, 1.   , 1.   ])
     """
     J, CT = np.broadcast_arrays(np.abs(_f(J)), np.fmax(_f(CT), 0.0))
     return _out(np.where(CT > 0.0, 2.0 * J / (J + np.sqrt(J**2 + 8.0 * CT / math.pi) + (CT == 0.0)), 1.0))

@@ -106,8 +106,20 @@ class InputError(ValueError):
 
 
 def system_fault(error: OSError) -> Fault:
-    """The fault that the system's error is, at the file that it names; an error without ``strerror`` is quoted.
+    """Say what the system would not do.
 
+    Parameters
+    ----------
+    error : OSError
+        With the system's word, `strerror`; an error of a library may have none, and is quoted.
+
+    Returns
+    -------
+    Fault
+        The fault, at the file that the error names.
+
+    Examples
+    --------
     >>> print(system_fault(OSError(28, "No space left on device", "out/grid.csv")))
     out/grid.csv: got No space left on device; expected a file or folder that can be used.
     """
@@ -115,8 +127,27 @@ def system_fault(error: OSError) -> Fault:
 
 
 def needs(module: str, extra: str) -> Any:
-    """Import a library that an extra brings, or say in an InputError which extra is missing.
+    """Import a library that an extra brings, or say which extra is missing.
 
+    Parameters
+    ----------
+    module : str
+        Dotted name of the module.
+    extra : str
+        Extra of this project that installs it.
+
+    Returns
+    -------
+    module
+        The imported module.
+
+    Raises
+    ------
+    InputError
+        When it is not installed.
+
+    Examples
+    --------
     >>> needs("math", "cad").floor(2.5)
     2
     >>> needs("no_such_library", "cad")
