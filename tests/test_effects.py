@@ -25,7 +25,7 @@ from bemt.bem import solver
 from bemt.case import load_case
 from bemt.case.prepare import prepare_case
 from bemt.commands import cli
-from bemt.effects.base import Array, Baking, Effect, Flow, Parameter, Reading
+from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, RotorBuild
 from bemt.report import effects_list
 from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
 from bemt.sections.polars import Polar
@@ -308,7 +308,7 @@ class Inflow(Effect):
     dy: float = 0.0
     id = "inflow_by_hand"
 
-    def inflow(self, bake: Baking) -> None:
+    def inflow(self, bake: RotorBuild) -> None:
         """Change the onset speeds."""
         bake.Vx_factor, bake.Vx_add = bake.Vx_factor * self.fx, bake.Vx_add + self.dx
         bake.Vy_factor, bake.Vy_add = bake.Vy_factor * self.fy, bake.Vy_add + self.dy
@@ -343,7 +343,7 @@ class Mistyped(Effect):
 
     id = "mistyped"
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Mistype."""
         bake.num.tipp = 1.0  # type: ignore[attr-defined]
 
@@ -356,7 +356,7 @@ def test_a_mistyped_kernel_number_is_refused() -> None:
 NEW = '''
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import RotorBuild, Effect, Parameter
 
 
 @dataclass(frozen=True)
@@ -369,7 +369,7 @@ class {cls}(Effect):
     title = "made up"
     parameters = (Parameter("factor", "1", 1.0, 1.5, "made up"),)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         bake.cd *= self.factor
 '''
 

@@ -21,7 +21,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bemt.bem.packing import zero_and_slope
-from bemt.effects.base import Baking
+from bemt.effects.base import RotorBuild
 from bemt.effects.cascade import Cascade
 from bemt.sections.polars import ALPHA_GRID, Polar
 from bemt.sections.row import row_lift, weinig_factor
@@ -59,14 +59,14 @@ def compressor_section(design_lift: float) -> Airfoil:
     return Airfoil("NACA 65 compressor", np.concatenate([x[::-1], x[1:]]), y)
 
 
-def bake(solidity: float, stagger: float, polar: Polar, sections: tuple[tuple[float, Airfoil], ...]) -> Baking:
+def bake(solidity: float, stagger: float, polar: Polar, sections: tuple[tuple[float, Airfoil], ...]) -> RotorBuild:
     """One station of a row."""
     Re = polar.Re if polar.Re.size == 1 else np.array([245_000.0])
     q = polar.on_grid(ALPHA_GRID, Re, polar.M[:1])
     cl, cd = (v.transpose(2, 1, 0)[None].copy() for v in (q.cl, q.cd))
     zero, slope = zero_and_slope(ALPHA_GRID, cl[:, 0])
     one, none = np.ones(1), np.zeros(1)
-    return Baking(
+    return RotorBuild(
         r=one,
         dr=one,
         chord=one,

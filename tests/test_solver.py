@@ -17,7 +17,7 @@ from bemt import bem
 from bemt.air import Air
 from bemt.bem import kernel, residual, solver, vecmath
 from bemt.bem.duct import DuctFlow
-from bemt.effects import Baking, Effect, standard, without
+from bemt.effects import Effect, RotorBuild, standard, without
 from bemt.effects.lifting_surface import LiftingSurface
 from bemt.effects.swirl import Swirl
 from bemt.effects.tip_loss import TipLoss
@@ -187,7 +187,7 @@ class Rougher(Effect):
     id = "rougher"
     order = 60
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         bake.cd *= 1.1
 
 

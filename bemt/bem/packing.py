@@ -12,7 +12,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.bem import kernel as K
 from bemt.bem import residual as res
-from bemt.effects.base import Baking
+from bemt.effects.base import RotorBuild
 from bemt.sections.polars import (
     ALPHA_COARSE_STEP,
     ALPHA_FINE_HI,
@@ -104,7 +104,7 @@ def blend_weights(rR: Array, x: Array) -> Array:
     return np.stack([np.interp(rR, x, row) for row in np.eye(x.size)], axis=1)
 
 
-def pack_stations(bake: Baking, num: Array) -> Array:
+def pack_stations(bake: RotorBuild, num: Array) -> Array:
     """Station columns of the kernel, (N, 14)."""
     st = np.empty((bake.r.size, K.N_STATION))
     st[:, K.S_R], st[:, K.S_DR], st[:, K.S_CHORD] = bake.r, bake.dr, bake.chord
@@ -128,7 +128,7 @@ def pack_stations(bake: Baking, num: Array) -> Array:
     return st
 
 
-def pack_tables(bake: Baking) -> Array:
+def pack_tables(bake: RotorBuild) -> Array:
     """Rows of (angle, (cl, cd)) per station: every Mach and Reynolds number, or these and, apart, those."""
     n, n_t, n_r, n_a = bake.cl.shape
     apart = n_t < bake.M2.size
@@ -141,7 +141,7 @@ def pack_tables(bake: Baking) -> Array:
     return out
 
 
-def pack_grid(bake: Baking) -> Array:
+def pack_grid(bake: RotorBuild) -> Array:
     """Grid numbers of the kernel in the order of its comment on ``par``."""
     n_r, n_a = bake.cl.shape[2:]
     n_m = bake.M2.size

@@ -23,7 +23,7 @@ from bemt.bem import packing as arrays
 from bemt.bem import residual as res
 from bemt.bem.packing import M2_STEP
 from bemt.effects import Effect, standard
-from bemt.effects.base import Baking
+from bemt.effects.base import RotorBuild
 from bemt.sections.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def prepare(
     w = arrays.blend_weights(rR, x)
     alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
     shapes = [(a[0], a[1].thickness) for a in blade.anchors] or [(0.0, THICKNESS)]
-    bake = Baking(
+    bake = RotorBuild(
         r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
         R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
         cl=_blended(w, cl), cd=_blended(w, cd), alpha0=w @ alpha0, cla=w @ cla,
@@ -236,7 +236,7 @@ def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> Duc
     return replace(duct or DuctFlow(1.0), **numbers)
 
 
-def _numbers(bake: Baking, duct: DuctFlow | None) -> Array:
+def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
     """Numbers of effects and duct in the order of :mod:`bemt.bem.residual`."""
     n = bake.num
     num = np.zeros(res.N_NUM)

@@ -125,7 +125,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
             low, high = (math.exp(f(c.x[~c.second, 0])) for f in (np.min, np.max))
             where = f"at the speeds of A, {low:.0f} to {high:.0f} rev/min"
         return {"text": f"run B again {where}, and at its airspeeds", "command": asked.command(b="B_AGAIN.csv")}
-    if said.verdict in ("insufficient", "unknown") and (letter := _restless(change)):
+    if said.verdict in ("insufficient", "unknown") and (letter := _unrepeatable(change)):
         run = change.a if letter == "a" else change.b
         column = run.conditions[0] if run.conditions else "COLUMN"
         others = f" (the file has {', '.join(run.conditions[:4])})" if run.conditions else ""
@@ -153,7 +153,7 @@ def _check(name: str) -> str:
     return row.settles if row is not None else catalogue()[name].check if name in catalogue() else ""
 
 
-def _restless(change: RunChange) -> str:
+def _unrepeatable(change: RunChange) -> str:
     """Letter of the recording whose readings at one speed differ by more than those of any stand; "" where none do."""
     for name in LOADS:
         c = change.loads_by_name.get(name)

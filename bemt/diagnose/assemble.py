@@ -23,7 +23,7 @@ from bemt.diagnose.nuisance import nuisances
 from bemt.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.effects.base import Effect
-from bemt.recordings.between import Level, odd_ones
+from bemt.recordings.between import Level, outlier_runs
 from bemt.rotors.validity import counted
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def _between(problem: Problem, joined: Sequence[Sequence[Record]], records: Sequ
                 if mine.size >= _FEWEST:
                     low, mid, high = np.quantile(mine, [0.1, 0.5, 0.9])
                     levels.append(Level(label[id(r)], channel, float(mid), float(high - low) / 2.0))
-    return tuple(f"{level.name}: {finding}" for level, finding in odd_ones(levels))
+    return tuple(f"{level.name}: {finding}" for level, finding in outlier_runs(levels))
 
 
 def assemble(parts: tuple[Part, ...], blade: CalibratedBlade = PLAIN) -> Problem:

@@ -20,7 +20,7 @@ from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
 
 if TYPE_CHECKING:
     from bemt.case import Case
-    from bemt.effects.base import Baking, Effect
+    from bemt.effects.base import Effect, RotorBuild
 
 # Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
 # calibrations; a wide blade without a reference would swallow slips of speed and unit.
@@ -41,7 +41,7 @@ _FLAT, _STEEP = 0.02, 1.45
 class AsLabelled(AsBuilt):
     """Rotor whose pitch is what the label may have wrong: the angle holds at 0.75 R, the twist is that of the pitch."""
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Change the pitch, beta = atan(pitch / (2 pi r)) at every station."""
         at75 = float(np.interp(0.75 * bake.R, bake.r, bake.beta))
         steeper = math.tan(np.clip(at75 + math.radians(self.angle_deg), _FLAT, _STEEP)) / math.tan(max(at75, _FLAT))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.form import Form, Forms, columns, form_modes
+from bemt.diagnose.form import Form, LawError, columns, form_modes
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -73,7 +73,7 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     matrix = np.zeros((len(ids), len(ids)))
     if ids:
         own = [columns(c, g, modes[c.id]) for c, g in zip(found.candidates, at, strict=True)]
-        forms = Forms.of(state.white, own)
+        forms = LawError.of(state.white, own)
         starts = [found.spans[i].start for i in ids]
         for k, s in enumerate(chosen):
             square = _squares(s[:, None] - state.S, forms[k])

@@ -19,7 +19,7 @@ from bemt import effects
 from bemt.base.arrays import Array
 from bemt.diagnose import form, noise, prior
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.form import Forms
+from bemt.diagnose.form import LawError
 from bemt.diagnose.pair_evidence import best_pair, every_pair, price, solve_together
 from bemt.diagnose.state import State
 from bemt.gaussian.evidence import log_sum, shares
@@ -248,9 +248,9 @@ class _EvidenceTable:
         total = gain + self.log_w
         return np.array([s.start + int(np.argmax(total[s])) for s in self.spans.values()], dtype=np.intp)
 
-    def _forms(self, white: Conditional, at: NDArray[np.intp], rest: Array, which: NDArray[np.intp]) -> Forms:
+    def _forms(self, white: Conditional, at: NDArray[np.intp], rest: Array, which: NDArray[np.intp]) -> LawError:
         """Error of the form at the best settings of some candidates."""
-        return Forms.of(white, [self._columns(k, int(at[k])) for k in which.tolist()], rest[:, at[which]])
+        return LawError.of(white, [self._columns(k, int(at[k])) for k in which.tolist()], rest[:, at[which]])
 
     def _columns(self, k: int, at: int) -> tuple[int, Array]:
         if (k, at) not in self._own:
@@ -262,7 +262,7 @@ class _EvidenceTable:
         """Number of modes and columns of the error of an effect's law at a column of the table."""
         return self._columns(list(self.spans).index(name), at)
 
-    def _add(self, gain: Array, base: Array, forms: Forms, rest: Array, which: NDArray[np.intp]) -> None:
+    def _add(self, gain: Array, base: Array, forms: LawError, rest: Array, which: NDArray[np.intp]) -> None:
         """Put in the log likelihood over that of "none" of every setting, its form taken into account."""
         spans = list(self.spans.values())
         added = forms.gains([rest[:, spans[k]] for k in which])

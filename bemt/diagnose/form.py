@@ -38,7 +38,7 @@ class Form(LinearTerms):
 
 
 @dataclass(frozen=True, eq=False)
-class Forms:
+class LawError:
     """Errors of the forms of several effects at a time, side by side: columns that an effect does not have are zero."""
 
     # (C, M, Q) Whitened modes of unit size, then what lies between a setting and its neighbours on the grid [1]
@@ -52,7 +52,7 @@ class Forms:
     half_log_det: Array  # (C,) As that of :class:`Form`, 0 where an effect has no column [1]
 
     @classmethod
-    def of(cls, white: Conditional, columns: Sequence[tuple[int, Array]], d: Array | None = None) -> Forms:
+    def of(cls, white: Conditional, columns: Sequence[tuple[int, Array]], d: Array | None = None) -> LawError:
         """Whitened columns of each effect, as :func:`columns` gives them; ``d`` chooses the sizes."""
         q = np.array([n for n, _ in columns], dtype=np.intp)
         width = np.array([x.shape[1] for _, x in columns], dtype=np.intp)
@@ -83,7 +83,7 @@ class Forms:
         total = 0.5 * np.sum(x * np.linalg.solve(self.gram, x), axis=1) - self.half_log_det[:, None]
         return [t[: r.shape[1]] for t, r in zip(total, rest, strict=True)]
 
-    def replaced(self, where: NDArray[np.intp], other: Forms) -> Forms:
+    def replaced(self, where: NDArray[np.intp], other: LawError) -> LawError:
         """The same with some effects taken from another one that has only these."""
         Q, Qo = self.B.shape[2], other.B.shape[2]
         if Qo < Q:
@@ -95,14 +95,14 @@ class Forms:
             out[where] = b
             return out
 
-        return Forms(*(put(getattr(mine, n), getattr(other, n)) for n in
+        return LawError(*(put(getattr(mine, n), getattr(other, n)) for n in
                        ("B", "size", "scale", "gram", "width", "half_log_det")))  # type: ignore[arg-type]  # fmt: skip
 
-    def _padded(self, Q: int) -> Forms:
+    def _padded(self, Q: int) -> LawError:
         C, M, q = self.B.shape
         B, scale, gram = np.zeros((C, M, Q)), np.ones((C, Q)), np.tile(np.eye(Q), (C, 1, 1))
         B[:, :, :q], scale[:, :q], gram[:, :q, :q] = self.B, self.scale, self.gram
-        return Forms(B, self.size, scale, gram, self.width, self.half_log_det)
+        return LawError(B, self.size, scale, gram, self.width, self.half_log_det)
 
     def __getitem__(self, k: int) -> Form:
         """Form of one effect."""

@@ -44,7 +44,7 @@ from bemt.diagnose.verdict import (
     BESIDE_IT,
     Decision,
     VerdictQuery,
-    holds_off,
+    interval_includes_off,
     levels_only,
     mass,
     rough,
@@ -336,7 +336,7 @@ def _far_rougher_than_stated(a: VerdictQuery) -> Decision | None:
 @_rule("may as well be absent", "90 % interval")
 def _may_as_well_be_absent(a: VerdictQuery) -> Decision | None:
     """DIAGNOSIS 7: 4 of 5 wrong names, 0 of 42 right ones."""
-    if not a.leading.pair and len(a.group) <= 1 and holds_off(*next(iter(a.parameters.items()))):
+    if not a.leading.pair and len(a.group) <= 1 and interval_includes_off(*next(iter(a.parameters.items()))):
         return a.says("insufficient", f"{a.leading} fits best, but the interval of its size includes zero")
     return None
 

@@ -154,7 +154,7 @@ class VerdictQuery:
         if not self.first.pair or twins(self.first):
             return self.first, share
         leading, share = _earned(self.found, self.first, share, self.rest)
-        idle = [i for i in leading if leading.pair and holds_off(i, self._parameters(leading)[i])]
+        idle = [i for i in leading if leading.pair and interval_includes_off(i, self._parameters(leading)[i])]
         if len(idle) == 1:
             leading, share = leading.without(idle[0]), {i: (0.0 if i in idle else p) for i, p in share.items()}
         return leading, share
@@ -399,7 +399,7 @@ def levels_only(what: Explanation) -> bool:
     return len(chosen) > 1 and all(shares)
 
 
-def holds_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
+def interval_includes_off(name: str, told: Mapping[str, Mapping[str, Any]]) -> bool:
     """Whether an effect may as well be absent: the interval of its size holds the value at which it is.
 
     Of several sizes that stand for each other (zero and temperature of a drift) each may hold it and all together not.
@@ -436,7 +436,7 @@ def _earned(
     for other, one in (ids, ids[::-1]):
         price = PROVEN if other in on else EARNED
         adds = found.log_bayes(pair) - found.log_bayes(Explanation.of(one))
-        # beside the thousands of a slip every rest is small: what is named next to it must explain its own
+        # next to a unit error any residual is small: what is named beside it must explain its own
         vague = effects.catalogue()[one].fault == "unit" and rest > max(LEFT_OVER, SMALL * adds)
         if (adds < price or vague) and share[one] >= share[other]:
             return Explanation.of(one), {i: (0.0 if i == other else p) for i, p in share.items()}

@@ -19,7 +19,7 @@ from bemt.base.units import INCH
 from bemt.diagnose.blade import AsLabelled
 from bemt.diagnose.record import CHANNELS
 from bemt.diagnose.thresholds import ANOTHER
-from bemt.effects.base import Baking, Effect
+from bemt.effects.base import Effect, RotorBuild
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
@@ -66,7 +66,7 @@ class _Blades(Effect):
 
     id = "blades"
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Change the solidity."""
         bake.sigma = bake.sigma * self.count / bake.B
         bake.B = self.count
@@ -80,7 +80,7 @@ class _Chord(Effect):
 
     id = "chord"
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Change chord and solidity."""
         bake.chord = bake.chord * self.factor
         bake.sigma = bake.sigma * self.factor

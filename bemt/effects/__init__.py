@@ -18,10 +18,10 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Effect, Parameter, RotorBuild
 
 __all__ = [
-    "Baking",
+    "RotorBuild",
     "Effect",
     "Parameter",
     "catalogue",

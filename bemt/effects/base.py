@@ -121,7 +121,7 @@ class KernelNumbers:
 
 
 @dataclass(slots=True)
-class Baking:
+class RotorBuild:
     """Mutable record of one rotor while its effects are applied.
 
     Attributes
@@ -467,16 +467,16 @@ class Effect:
                 f"{cls.__name__}: parameter {', '.join(hidden)} has the name of a hook; choose another name"
             )
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Change blade angles; does nothing by default."""
 
-    def inflow(self, bake: Baking) -> None:
+    def inflow(self, bake: RotorBuild) -> None:
         """Change the onset speeds of the stations; does nothing by default."""
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Change section tables; does nothing by default."""
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Set kernel numbers; does nothing by default."""
 
     def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Array, Baking, Effect, Flow, Parameter, choice
+from bemt.effects.base import Array, Effect, Flow, Parameter, RotorBuild, choice
 from bemt.sections.row import row_shift, weinig_factor
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Cascade(Effect):
         """Both forms, and the row with the single section's zero-lift angle."""
         return {"form": "potential"}, {"form": "carter"}, {"form": "potential", "zero_lift": 0.0}
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Read the tables at the angle that the row leaves of the incidence; add the losses of rows."""
         stagger = np.minimum(0.5 * np.pi - np.abs(bake.beta), _STEEPEST)  # turned the other way: a mirror image
         K, shift = _row(bake, stagger)
@@ -100,7 +100,7 @@ class Cascade(Effect):
                 bake.cd[k] += tight * self.secondary * bake.cl[k] ** 2
 
 
-def _row(bake: Baking, stagger: Array) -> tuple[Array, Array]:
+def _row(bake: RotorBuild, stagger: Array) -> tuple[Array, Array]:
     """Slope of the row over that of the section alone (N,), and shift of the zero-lift angle (N, 1) [rad]."""
     sections = bake.sections or _stand_in(bake)
     x = np.array([r_R for r_R, _ in sections])
@@ -116,7 +116,7 @@ def _row(bake: Baking, stagger: Array) -> tuple[Array, Array]:
     return np.clip(out[0], *_SLOPES), out[1][:, None]
 
 
-def _stand_in(bake: Baking) -> tuple[tuple[float, Airfoil], ...]:
+def _stand_in(bake: RotorBuild) -> tuple[tuple[float, Airfoil], ...]:
     """Section for blades that have none: camber by thin-aerofoil theory from the zero-lift angle of the tables."""
     from geometry.airfoil import naca4
 
@@ -124,7 +124,7 @@ def _stand_in(bake: Baking) -> tuple[tuple[float, Airfoil], ...]:
     return ((0.75, naca4(min(max(round(camber, 3), -0.09), 0.09), 0.5, round(float(np.median(bake.thickness)), 3))),)
 
 
-def _carter(bake: Baking, stagger: Array, K: Array, shift: Array) -> tuple[Array, Array]:
+def _carter(bake: RotorBuild, stagger: Array, K: Array, shift: Array) -> tuple[Array, Array]:
     """Weinig's slope, and the shift at which a circular arc met along its camber line leaves by Carter's deviation."""
     tight = np.clip((bake.sigma - LOOSE) / (TIGHT - LOOSE), 0.0, 1.0)
     K = K + tight * (np.clip(weinig_factor(bake.sigma, stagger), *_SLOPES) - K)
@@ -142,7 +142,7 @@ def _carter(bake: Baking, stagger: Array, K: Array, shift: Array) -> tuple[Array
     return K, shift + tight[:, None] * (zero - bake.alpha0 - shift)
 
 
-def _read_at(bake: Baking, K: Array, shift: Array) -> None:
+def _read_at(bake: RotorBuild, K: Array, shift: Array) -> None:
     """Read both tables at alpha_0 + K (alpha - alpha_0 - shift), at the angle itself far from zero lift."""
     alpha = bake.alpha
     near = slice(*np.searchsorted(alpha, [-0.5 * np.pi - 0.3, 0.5 * np.pi + 0.3]))
@@ -166,7 +166,7 @@ def _read_at(bake: Baking, K: Array, shift: Array) -> None:
     bake.cla = bake.cla * K[:, None]
 
 
-def _diffusion_drag(bake: Baking, stagger: Array, k: NDArray[np.intp], near: slice) -> Array:
+def _diffusion_drag(bake: RotorBuild, stagger: Array, k: NDArray[np.intp], near: slice) -> Array:
     """Drag by Lieblein's momentum thickness at the diffusion of each lift, zero where the row does not pump."""
     side = np.where(bake.beta[k] < 0.0, -1.0, 1.0)[:, None, None, None]
     sigma = np.maximum(bake.sigma[k], LOOSE)[:, None, None, None]

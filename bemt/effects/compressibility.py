@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("prandtl_glauert", "karman_tsien")
 # Lift grows a little beyond drag divergence, then the shock stalls the section within this span of Mach number.
@@ -53,7 +53,7 @@ class Compressibility(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Scale lift by Mach number."""
         if bake.M2.size == 1:
             return

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("lock", "cubic")
 
@@ -42,7 +42,7 @@ class DragDivergence(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Add wave drag."""
         if bake.M2.size == 1:
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,6 @@ class Flapping(Effect):
     on_by_default = False
     diagnosed = False
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Hinge the blades."""
         bake.num.cone = math.radians(self.coning_deg)

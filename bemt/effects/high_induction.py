@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect
+from bemt.effects.base import Effect, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,6 @@ class HighInduction(Effect):
     sign = "only in windmilling and descent, never in normal propeller operation"
     diagnosed = False
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Switch the bridge on."""
         bake.num.bridge = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class HubLoss(Effect):
     sign = "less thrust and torque by constant shares, growing with loading; the root is so slow that it barely shows"
     parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl", 3),)
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Switch the hub factor on."""
         if not bake.ducted:
             bake.num.hub = self.strength

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Baking, Effect, Parameter
+from bemt.effects.base import Array, Effect, Parameter, RotorBuild
 
 # Rate of the closed form: least squares on the lattice of tests/test_lifting_surface.py, c/R 0.15 to 0.2 [1].
 RATE = 1.36
@@ -52,7 +52,7 @@ class LiftingSurface(Effect):
     order = 46
     on_by_default = False
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Read the tables at the smaller angle."""
         if bake.ducted:
             return

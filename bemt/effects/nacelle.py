@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Flow, Loads, Parameter
+from bemt.effects.base import Effect, Flow, Loads, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Nacelle(Effect):
         """A body at rest in still air does nothing."""
         return "" if np.any(flow.V > 0.0) else "no point has airspeed"
 
-    def inflow(self, bake: Baking) -> None:
+    def inflow(self, bake: RotorBuild) -> None:
         """Slow the axial flow, most at the root."""
         bake.Vx_factor = bake.Vx_factor * (1.0 - self.deficit * (1.0 + (bake.r / self._radius(bake)) ** 2) ** -1.5)
 
@@ -57,7 +57,7 @@ class Nacelle(Effect):
         W = flow.V + self.wash * flow.induced
         loads.T = loads.T - self.cd * 0.5 * flow.rho * W * np.abs(W) * area
 
-    def _radius(self, rotor: Flow | Baking) -> float:
+    def _radius(self, rotor: Flow | RotorBuild) -> float:
         return max(rotor.Rhub if rotor.Rhub > 0.0 else 0.1 * rotor.R, self.body_over_R * rotor.R)
 
     def variants(self) -> tuple[dict[str, float], ...]:

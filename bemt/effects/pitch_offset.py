@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,6 @@ class PitchOffset(Effect):
     parameters = (Parameter("offset_deg", "deg", -8.0, 8.0, "declared: workshop, or another label", 9, 0.0, 1.0),)
     on_by_default = False
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Turn the blade."""
         bake.beta = bake.beta + np.radians(self.offset_deg)

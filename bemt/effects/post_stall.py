@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
 from bemt.sections.polars import first_stall
 
 FORMS = ("viterna", "plate")
@@ -47,7 +47,7 @@ class PostStall(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Change the tables beyond the stall, on both sides."""
         least = bake.cd.min(axis=-1, keepdims=True)
         for sign in (1.0, -1.0):
@@ -60,7 +60,7 @@ class PostStall(Effect):
                 self._plate(bake, a, stall, sign)
         np.maximum(bake.cd, least, out=bake.cd)
 
-    def _viterna(self, bake: Baking, a: Array, stall: Array, sign: float, cd_90: Array) -> None:
+    def _viterna(self, bake: RotorBuild, a: Array, stall: Array, sign: float, cd_90: Array) -> None:
         more = self.cd_max - cd_90
         front = np.clip(np.where(a > 0.5 * np.pi, np.pi - a, a), stall, 0.5 * np.pi)
         side = np.where(a > 0.5 * np.pi, -_REVERSED, 1.0)
@@ -69,7 +69,7 @@ class PostStall(Effect):
         bake.cl += on * sign * side * more * (0.5 * np.sin(2.0 * front) - lead * np.cos(front) ** 2 / np.sin(front))
         bake.cd += on * more * (np.sin(front) ** 2 - lead * np.cos(front))
 
-    def _plate(self, bake: Baking, a: Array, stall: Array, sign: float) -> None:
+    def _plate(self, bake: RotorBuild, a: Array, stall: Array, sign: float) -> None:
         t = np.clip((np.minimum(a, np.pi - a) - stall) / _PLATE_SPAN, 0.0, 1.0)
         w = t * t * (3.0 - 2.0 * t)
         bake.cl += w * (sign * self.cd_max * np.sin(a) * np.cos(a) - bake.cl)
@@ -80,7 +80,7 @@ class PostStall(Effect):
         return tuple({"form": f, "cd_max": c} for f in FORMS for c in (1.1, 1.25, 1.4, 1.55, 1.7, 1.85, 2.0))
 
 
-def _stall(bake: Baking, sign: float) -> Array:
+def _stall(bake: RotorBuild, sign: float) -> Array:
     """Angle of the stall of each station and Reynolds number, incompressible, (N, Nr) [rad]."""
     a = sign * bake.alpha
     window = np.flatnonzero((a > 0.0) & (a <= _STALL_LAST))[:: int(sign)]

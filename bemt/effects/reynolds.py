@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Parameter, choice
+from bemt.effects.base import Effect, Parameter, RotorBuild, choice
 from bemt.sections.polars import RE_FIXED
 
 
@@ -44,7 +44,7 @@ class Reynolds(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, ("table", "power"))
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Stretch the tables, or replace them by the power laws."""
         if bake.Re.size == 1 or (self.form == "table" and self.amount == 1.0):
             return

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Parameter
+from bemt.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Section(Effect):
     order = 10
     on_by_default = False
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Shift lift and scale drag of the attached section."""
         attached = np.clip((np.radians(30.0) - np.abs(bake.alpha_col)) / np.radians(15.0), 0.0, 1.0)
         bake.cl += bake.cla[:, None, :, None] * 2.0 * self.camber * attached

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Baking, Effect, Parameter, choice
+from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("chaviaropoulos", "snel", "du_selig")
 # Du and Selig's weight turns back at wider roots than wind turbines have, and below zero at chord = r.
@@ -51,7 +51,7 @@ class StallDelay(Effect):
         """Refuse unknown forms."""
         choice("form", self.form, FORMS)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Lift the stalled part of the tables."""
         weight = np.clip(self.weight(bake.chord / bake.r, bake.r / bake.R, bake.beta), 0.0, 1.0)[:, None, None, None]
         # elsewhere the gain is zero; most of the table need not be touched

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect
+from bemt.effects.base import Effect, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,6 @@ class Swirl(Effect):
         "thrust and torque off by constant shares at heavy loading; their ratio distinguishes it from density or speed"
     )
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Switch the tangential balance on."""
         bake.num.swirl = 1.0

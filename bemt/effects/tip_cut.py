@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Baking, Effect, Flow, Parameter
+from bemt.effects.base import Effect, Flow, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class TipCut(Effect):
         """In a duct the gap is what changes."""
         return "in a duct shorter blades are a wider tip gap" if flow.ducted else ""
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """End the blades at the new radius."""
         R = (1.0 - self.cut) * bake.R
         share = (R - bake.Rhub) / (bake.R - bake.Rhub)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
+from bemt.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 
 GAP_LOSS = 1.0, 2.0
 """Points of pressure rise lost per point of gap over span, as measured on compressor rotors [1]."""
@@ -41,7 +41,7 @@ class TipGap(Effect):
         Parameter("scale", "1", 0.02, 0.10, "declared", 0),
     )
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Open the tip."""
         if not bake.ducted:
             return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Parameter, choice
+from bemt.effects.base import Effect, Parameter, RotorBuild, choice
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class TipLoss(Effect):
         """Refuse unknown sheets."""
         choice("sheets", self.sheets, ("wake", "disk"))
 
-    def momentum(self, bake: Baking) -> None:
+    def momentum(self, bake: RotorBuild) -> None:
         """Switch the tip factor on."""
         bake.num.tip = self.strength
         bake.num.far_wake = float(self.sheets == "wake")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Baking, Effect, Flow, Parameter
+from bemt.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Untwist(Effect):
     )
     on_by_default = False
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Twist the blade."""
         bake.beta = bake.beta - np.radians(self.tip_deg) * bake.level * (bake.r / bake.R) ** 2
         bake.level = 1.0  # it was meant for this effect, not for one that comes later

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Baking, Effect, Flow, Parameter
+from bemt.effects.base import Effect, Flow, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class WiderGap(Effect):
     parameters = (Parameter("extra_mm", "mm", -1.0, 4.0, "declared; printed and moulded ducts", 6, 0.0, 0.5),)
     on_by_default = False
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Lengthen the gap."""
         if bake.ducted:
             bake.gap = max(bake.gap + 1e-3 * self.extra_mm, 0.0)

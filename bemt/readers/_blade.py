@@ -102,7 +102,7 @@ class Cursor(SourceText):
         return blade
 
 
-def whole(value: float) -> int:
+def as_count(value: float) -> int:
     """A count; 0 for what is none (its fault is told already)."""
     return int(value) if value == value and 0.0 <= value <= 1e4 else 0
 

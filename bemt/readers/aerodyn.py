@@ -20,7 +20,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
-from bemt.readers._blade import BladeFile, Cursor, whole
+from bemt.readers._blade import BladeFile, Cursor, as_count
 from bemt.sections.polars import Polar
 
 KIND = "aerodyn"
@@ -55,7 +55,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     polars = [_turned(polar_aerodyn.read(folder / name)) for name in _airfoils(primary)]
     rows = _nodes(blade)
     nodes = [rows.take(7, "a node", 7) for _ in rows.rows]
-    ids = [whole(row[6]) for row in nodes]
+    ids = [as_count(row[6]) for row in nodes]
     for bad in sorted({i for i in ids if not 1 <= i <= len(polars)}):
         rows.add("BlAFID", f"{bad}", f"1 to {len(polars)}, as {primary.name} lists")
     rows.check()
@@ -66,7 +66,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         notes.append("prebend, sweep and cant of the blade are left out")
     V, rpm, rho = (None if (v := _value(driver, key)) is None else number(v[1]) for key in _POINT)
     found = BladeFile(
-        Path(path).stem, "AeroDyn", whole(count), float(r[-1]), hub, r, chord, np.radians(twist),
+        Path(path).stem, "AeroDyn", as_count(count), float(r[-1]), hub, r, chord, np.radians(twist),
         _anchors(r / r[-1], ids, polars), rpm, V, rho, tuple(notes),
     )  # fmt: skip
     return rows.finish(found)
@@ -104,7 +104,7 @@ def _part(source: SourceText, keys: Sequence[str], folder: Path) -> SourceText:
 
 def _airfoils(source: SourceText) -> list[str]:
     """Files of ``AFNames``: a quoted name on each of ``NumAFfiles`` lines."""
-    count = whole(_number(source, "NumAFfiles"))
+    count = as_count(_number(source, "NumAFfiles"))
     first = next((i for i, line in enumerate(source.lines) if re.search(r'"\s+AFNames\b', line)), None)
     lines = [] if first is None else source.lines[first : first + count]
     names = [m[1] for line in lines if (m := re.match(r'\s*"([^"]+)"', line))]
@@ -115,7 +115,7 @@ def _airfoils(source: SourceText) -> list[str]:
 
 def _nodes(source: SourceText) -> Cursor:
     """Rows of span, three shapes of the axis, twist, chord and airfoil."""
-    count = whole(_number(source, "NumBlNds"))
+    count = as_count(_number(source, "NumBlNds"))
     begin = (_value(source, "NumBlNds") or (0, ""))[0] + 2
     rows = Cursor(source, "")
     rows.faults = source.faults

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.readers import head_text
-from bemt.readers._blade import BladeFile, Cursor, whole
+from bemt.readers._blade import BladeFile, Cursor, as_count
 from bemt.readers.xrotor import read_section
 
 KIND = "dfdc"
@@ -44,14 +44,14 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     sections = []
     if "AERO" in words:
         rows.at = words.index("AERO") + 1
-        sections = [read_section(rows) for _ in range(whole(rows.take(1, "#sections")[0]))]
+        sections = [read_section(rows) for _ in range(as_count(rows.take(1, "#sections")[0]))]
     else:
         rows.add("AERO", "nothing", "sections of the blade")
     rows.at = words.index("ROTOR") + 1
     if words.count("ROTOR") > 1:
         notes.append("the file has several rotors: the first is read")
     x_disk, blades, _ = rows.take(3, "Xdisk Nblds NRsta")
-    n = whole(rows.take(1, "#stations")[0])
+    n = as_count(rows.take(1, "#stations")[0])
     body = rows.table(n, 3, "r chord beta")
     if len(body) < n:
         rows.add("ROTOR", number_of(len(body), "station"), f"{n}")
@@ -65,7 +65,7 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         tip = float(r[-1])
         notes.append("no duct at the rotor: the tip is that of the last station")
     blade = BladeFile(
-        name, "DFDC", whole(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
+        name, "DFDC", as_count(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
     )
     return rows.finish(blade)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.readers import head_text
-from bemt.readers._blade import BladeFile, Cursor, whole
+from bemt.readers._blade import BladeFile, Cursor, as_count
 from bemt.sections.parametric import QpropSection
 
 KIND = "qprop"
@@ -72,11 +72,11 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     last = f"{r[-1]:g} m"
     if math.isfinite(R) and R > 1.5 * r[-1]:
         rows.add(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
-    if blades != whole(blades):
+    if blades != as_count(blades):
         rows.add(line, f"{blades:g} blades", "a whole number")
     if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
         rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
     name, beta = rows.rows[0][1].strip(), np.radians(b)
     return rows.finish(
-        BladeFile(name, "QPROP", whole(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
+        BladeFile(name, "QPROP", as_count(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
     )

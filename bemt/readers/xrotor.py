@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.readers import head_text
-from bemt.readers._blade import BladeFile, Cursor, whole
+from bemt.readers._blade import BladeFile, Cursor, as_count
 from bemt.sections.parametric import XrotorSection
 
 KIND = "xrotor"
@@ -60,16 +60,16 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
     rows.check()
     if not 1 <= count <= 50:
         rows.refuse(rows.rows[5][0], f"{count:g} sections", "1 to 50")
-    sections = [read_section(rows) for _ in range(whole(count))]
+    sections = [read_section(rows) for _ in range(as_count(count))]
     if rows.at + 1 >= len(rows.rows):
         rows.refuse("", "the end of the file", "flags, stations")
     flags = rows.rows[rows.at][1].split()
     rows.at += 1
     n, blades = rows.take(2, "II Nblds")
     left = len(rows.rows) - rows.at
-    if min(left, whole(n)) < n:
-        rows.add(rows.rows[-1][0], number_of(min(left, whole(n)), "station"), f"{n:g}")
-    table = rows.table(whole(n), 4, "r/R C/R Beta0deg Ubody")
+    if min(left, as_count(n)) < n:
+        rows.add(rows.rows[-1][0], number_of(min(left, as_count(n)), "station"), f"{n:g}")
+    table = rows.table(as_count(n), 4, "r/R C/R Beta0deg Ubody")
     rows.check()
     notes = ["compressibility: effects of the case instead of XROTOR's Mcrit"]
     if len(flags) > 1 and flags[1].upper().startswith("T"):
@@ -85,4 +85,6 @@ def read(path: str | os.PathLike[str]) -> BladeFile:
         rows.add("sections", f"r/R {x.tolist()}", "ascending")
     r, c, beta = table[:, 0] * R, table[:, 1] * R, np.radians(table[:, 2])
     point = (rpm, V if rpm else None, air)
-    return rows.finish(BladeFile(name, "XROTOR", whole(blades), R, hub * R, r, c, beta, sections, *point, tuple(notes)))
+    return rows.finish(
+        BladeFile(name, "XROTOR", as_count(blades), R, hub * R, r, c, beta, sections, *point, tuple(notes))
+    )

@@ -34,11 +34,11 @@ class Level:
     spread: float  # Half of what the middle four fifths of those span [1]
 
 
-def odd_ones(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
+def outlier_runs(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
     """Name recordings whose level differs from that of most others by the factor of a usual slip.
 
     >>> files = [("a", 0.02), ("b", -0.05), ("c", 4.6), ("d", 0.8)]  # c reads 102 times, d 2.3 times what others do
-    >>> [(level.name, f.correction.split(".")[0]) for level, f in odd_ones([Level(n, "thrust_N", x, 0.1)
+    >>> [(level.name, f.correction.split(".")[0]) for level, f in outlier_runs([Level(n, "thrust_N", x, 0.1)
     ...     for n, x in files])]
     [('c', 'gf taken for N: multiply by 0'), ('d', 'lbf taken for kgf: multiply by 0')]
     """

@@ -57,7 +57,7 @@ _BARE_POWER = re.compile(r"\s*power\s*[\[(]\s*w(atts?)?\s*[\])]\s*", re.IGNORECA
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class DroppedCells:
     """Rows, or one value of each, that were left out: first and last line, `channel` ("" for the rows) and `reason`."""
 
     line: int
@@ -71,7 +71,7 @@ class Lost:
         return range(self.line, self.last + 1)
 
 
-def lost(d: Dataset, rows: ArrayLike, channel: str, reason: str) -> list[Lost]:
+def lost(d: Dataset, rows: ArrayLike, channel: str, reason: str) -> list[DroppedCells]:
     """Rows that are left out, one entry for lines that follow each other."""
     at = np.asarray(rows, dtype=np.intp)
     if not at.size:
@@ -79,7 +79,7 @@ def lost(d: Dataset, rows: ArrayLike, channel: str, reason: str) -> list[Lost]:
     lines = np.asarray(d.lines, dtype=np.intp)[at] if not isinstance(d.lines, range) else d.lines.start + at
     cuts = np.flatnonzero(np.diff(lines) != 1) + 1
     first, last = lines[np.concatenate([[0], cuts])], lines[np.concatenate([cuts - 1, [-1]])]
-    return [Lost(a, b, channel, reason) for a, b in zip(first.tolist(), last.tolist(), strict=True)]
+    return [DroppedCells(a, b, channel, reason) for a, b in zip(first.tolist(), last.tolist(), strict=True)]
 
 
 def _alive(v: Array) -> bool:
@@ -96,7 +96,7 @@ def _base_of_u(name: str) -> str | None:
     return re.sub(r"_err_", "_", name) if "_err_" in name else None
 
 
-def dropped(d: Dataset) -> tuple[Lost, ...]:
+def dropped(d: Dataset) -> tuple[DroppedCells, ...]:
     """Values and rows that were left out so far."""
     return tuple(d.provenance.get("dropped", ()))
 
@@ -134,7 +134,7 @@ def named(d: Dataset) -> Dataset:
     values: dict[str, Array] = {}
     names: dict[str, str] = {}
     notes: list[str] = []
-    out: list[Lost] = []
+    out: list[DroppedCells] = []
     for name, v in d.values.items():
         if not d.unit(name) and name not in ("run", "rpm", *_SPEEDS):
             continue

@@ -32,7 +32,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.dataset import Dataset
 from bemt.readers._samples import MISREAD, against_load
 from bemt.recordings import plateaus
-from bemt.recordings.channels import LOADS, Lost, file_name, lost, moves, runs_of, stated
+from bemt.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
 
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")
@@ -159,7 +159,7 @@ class Found:
 
     points: list[Point] = field(default_factory=list)
     rests: dict[float, list[Rest]] = field(default_factory=dict)
-    lost: list[Lost] = field(default_factory=list)
+    lost: list[DroppedCells] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 

@@ -28,7 +28,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.dataset import Dataset, concat
 from bemt.recordings.channels import (
     LOADS,
-    Lost,
+    DroppedCells,
     dropped,
     file_name,
     in_one_step,
@@ -55,7 +55,7 @@ class Reduction:
     reason: str
     # By channel: ``gain`` [1], ``zero`` [unit of the channel], ``session`` [1], as far as known
     correlated: Mapping[str, Mapping[str, float]]
-    dropped: tuple[Lost, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
+    dropped: tuple[DroppedCells, ...]  # Line, channel ("" for the whole row) and reason of everything that was left out
     rows: tuple[NDArray[np.intp], ...]  # (M,) rows of the recording in each point
     directions: tuple[str, ...]  # ``first``, ``up`` or ``down`` per point
     hysteresis: Mapping[str, Hysteresis]  # By channel, where both branches were recorded

@@ -14,7 +14,7 @@ from bemt.base.arrays import Array
 from bemt.effects.base import Effect
 
 if TYPE_CHECKING:
-    from bemt.effects.base import Baking
+    from bemt.effects.base import RotorBuild
 
 KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
 """How the blade of a case is known; ``reference``: from a run of this very rotor."""
@@ -38,11 +38,11 @@ class AsBuilt(Effect):
     order = 15
     diagnosed = False
 
-    def blade(self, bake: Baking) -> None:
+    def blade(self, bake: RotorBuild) -> None:
         """Turn the blade."""
         bake.beta += np.radians(self.angle_deg)
 
-    def section(self, bake: Baking) -> None:
+    def section(self, bake: RotorBuild) -> None:
         """Shift and scale the section tables."""
         if self.camber_deg:
             whole = np.clip((_SEPARATED - np.abs(bake.alpha)) / (_SEPARATED - _ATTACHED), 0.0, 1.0)
