@@ -53,7 +53,7 @@ class BladeLoads:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class AlongBlade:
     """Rotor over recording in each band, and what is left of the squared misfit with each single effect."""
 
     bands: Array  # (N + 1,) Edges over the tip radius [1]
@@ -135,7 +135,7 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
     return {run: made(run) for run in table}
 
 
-def along(case: Case, path: Path) -> dict[str, Comparison]:
+def along(case: Case, path: Path) -> dict[str, AlongBlade]:
     """Compare every run of a file of radial loads with a case, at the run's own speeds or the case's."""
     model = prepare_case(case)
     out = {}
@@ -146,7 +146,7 @@ def along(case: Case, path: Path) -> dict[str, Comparison]:
     return out
 
 
-def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> Comparison:
+def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Air) -> AlongBlade:
     """Compare loads in bands along the blade, then with each effect changed alone."""
     recorded = _banded(loads.r / model.rotor.R, np.stack([loads.thrust, loads.torque]))
     fine = (max(FINE, loads.u[0]), max(FINE, loads.u[1]))
@@ -169,7 +169,7 @@ def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Ai
     if whole > base.size and best < EXPLAINED:
         good = [text for text, share in left.items() if share <= max(ALIKE * best, 0.02)]
         named = tuple(dict.fromkeys(text.partition("(")[0] for text in good))
-    return Comparison(BANDS, base[0], base[1], left, named, fine)
+    return AlongBlade(BANDS, base[0], base[1], left, named, fine)
 
 
 def _misfit(ratio: Array, fine: tuple[float, float]) -> float:
