@@ -197,7 +197,7 @@ def sentence(doc: Mapping[str, Any]) -> str:
         return f"{lead}: {names}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
         if " present; " in doc["rule"]:  # one is sure, what is beside it is not
-            return f"{doc['rule'][0].upper()}{doc['rule'][1:]}{sure}: {names}."
+            return f"{doc['rule']}{sure}: {names}."
         return f"One of these; the data cannot tell them apart{sure}: {names}."
     if doc["verdict"] == "unknown":
         return f"Unknown: {doc['rule']}."
