@@ -41,7 +41,10 @@ def test_committed_sweep_is_what_the_cases_give(
 # won two.
 @pytest.mark.parametrize(
     ("volume", "static", "forward"),
-    [(1, (0.045, 0.115, 0.060), (0.070, 0.20, 0.067)), (2, (0.065, 0.20, 0.085), (0.065, 0.25, 0.080))],
+    [
+        pytest.param(1, (0.045, 0.115, 0.060), (0.070, 0.20, 0.067), marks=pytest.mark.slow),
+        (2, (0.065, 0.20, 0.085), (0.065, 0.25, 0.080)),
+    ],
 )
 def test_committed_validation_is_what_the_data_give_and_within_its_bounds(
     project: Path, shared_data: Path, volume: int, static: tuple[float, ...], forward: tuple[float, ...]
