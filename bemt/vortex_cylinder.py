@@ -22,15 +22,6 @@ from numpy.typing import ArrayLike
 from bemt.base.arrays import Array
 
 
-def on_axis(z_over_R: float) -> float:
-    """Gain of the induced velocity on the axis behind a disk, s in v (1 + s); ahead of it v (1 - s) [1].
-
-    >>> on_axis(0.0), round(on_axis(1.0), 3), round(on_axis(1e9), 3)
-    (0.0, 0.707, 1.0)
-    """
-    return float(z_over_R / math.sqrt(1.0 + z_over_R**2))
-
-
 def ahead(r: ArrayLike, R: ArrayLike, z: float) -> Array:
     """Axial velocity at radius r, a distance z ahead of a disk of radius R [m], over that in the disk [1].
 

@@ -19,7 +19,8 @@ from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_vo
 from bemt.diagnose import evidence, gate, rules, signatures, verdict
 from bemt.diagnose.assemble import assemble
 from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
-from bemt.diagnose.record import Record, air_of, thinned
+from bemt.diagnose.record import Record, thinned
+from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
     from bemt.compare.recordings import RunChange
@@ -223,7 +224,7 @@ def _record(
     if "second_rotor_rad_s" in extra:  # what it changes is no scatter
         u = {k: np.full(len(run), np.nan) for k in u}
     record = Record(
-        points.name, rpm, V, air_of(fields), measured, u, extra, {}, zero, recorded,
+        points.name, rpm, V, air_of_points(fields), measured, u, extra, {}, zero, recorded,
         reference=reference, repeatability=repeatability,
         electrical=channels.get("torque_Nm") == "electrical_power_W",
     )  # fmt: skip

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.record import CHANNELS, air_of
-from bemt.rotors.model import beta75_deg, coefficients
+from bemt.diagnose.record import CHANNELS
+from bemt.rotors.model import air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import sense
 
@@ -47,7 +47,9 @@ def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:
     p, known, model = population(), parts[0].as_built, parts[0].model
     assert known is not None
     state = {k: np.concatenate([getattr(q.record.air, k) for q in parts]) for k in _AIR}
-    here = sense(coefficients(model, air_of(state)), model.diameter_m, beta75_deg(model), rpm, J, Re, known.drawn)
+    here = sense(
+        coefficients(model, air_of_points(state)), model.diameter_m, beta75_deg(model), rpm, J, Re, known.drawn
+    )
     f, top, T = (np.nan_to_num(v) for v in (here.f, here.top, here.T))
     here = replace(here, f=f, top=np.where(top == 0.0, _NOTHING, top), T=T)
     # that the population is not centred at the case is one more thing that is not known of this rotor

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.diagnose.repeats import conditions, spread_sizes
 from bemt.effects.base import follows
+from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -87,7 +87,8 @@ class Record:
             return {key: v[index] for key, v in values.items()}
 
         return replace(
-            self, rpm=self.rpm[index], V=self.V[index], air=air_of({k: getattr(self.air, k)[index] for k in _AIR}),
+            self, rpm=self.rpm[index], V=self.V[index],
+            air=air_of_points({k: getattr(self.air, k)[index] for k in _AIR}),
             measured=cut(self.measured), u=cut(self.u), extra=cut(self.extra),
         )  # fmt: skip
 
@@ -100,11 +101,6 @@ class Record:
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 NO_SPEED = "rpm: not recorded"
 """Start of the note of a recording that takes the speed of the case."""
-
-
-def air_of(fields: Mapping[str, Array]) -> Air:
-    """State of the air of many points."""
-    return cast("Air", SimpleNamespace(**fields))
 
 
 def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
@@ -261,7 +257,7 @@ def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str
             fields[name][i] = float(getattr(cache[key], name))
     if not recorded:
         notes.append(f"density: not recorded; {float(default.rho):.4g} kg/m3 of the case")
-    return air_of(fields), recorded
+    return air_of_points(fields), recorded
 
 
 def _plausible(values: Mapping[str, Array], file: str) -> None:
@@ -316,7 +312,7 @@ def thinned(record: Record, most: int = MAX_POINTS) -> Record:
     # neighbours share slow errors: their mean is taken to be no better than one of them
     note = f"{P} points averaged to {rpm.size} of similar conditions"
     return replace(
-        record, rpm=rpm, V=mean(record.V), air=air_of({k: mean(getattr(record.air, k)) for k in _AIR}),
+        record, rpm=rpm, V=mean(record.V), air=air_of_points({k: mean(getattr(record.air, k)) for k in _AIR}),
         measured={k: mean(v / unit[k]) * rho * rpm**2 if k in unit else mean(v) for k, v in record.measured.items()},
         u={k: mean(v) for k, v in record.u.items()}, extra={k: mean(v) for k, v in record.extra.items()},
         notes=(*record.notes, note),
@@ -379,7 +375,7 @@ def merged(records: Sequence[Record]) -> Record:
     notes = tuple(dict.fromkeys(note for r in records for note in r.notes))
     return thinned(Record(
         ", ".join(r.name for r in records), join([r.rpm for r in records]), join([r.V for r in records]),
-        air_of({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
+        air_of_points({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
         {n: channel("measured", n) for n in names}, {n: channel("u", n) for n in names}, concatenated(records),
         {n: max(r.gain.get(n, 0.0) for r in records) for n in names if any(n in r.gain for r in records)},
         {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},

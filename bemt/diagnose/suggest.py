@@ -19,9 +19,10 @@ from bemt.diagnose.assemble import assemble
 from bemt.diagnose.confusion import ALIKE
 from bemt.diagnose.nuisance import PRIORS
 from bemt.diagnose.problem import Part, Problem
-from bemt.diagnose.record import Record, air_of
+from bemt.diagnose.record import Record
 from bemt.diagnose.signatures import effect_of
 from bemt.gaussian.whitening import whitener
+from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
     from bemt.diagnose.evidence import Evidence
@@ -173,7 +174,7 @@ def _extended(part: Part, option: _Option) -> Problem:
     if "run" in extra:
         extra["run"][-option.rpm.size :] = extra["run"].max() + 1.0
     rpm, V = join([old.rpm, option.rpm]), join([old.V, option.V])
-    both = air_of({k: join([getattr(old.air, k), air[k]]) for k in air})
+    both = air_of_points({k: join([getattr(old.air, k), air[k]]) for k in air})
     plain = [e for e in part.baseline if not bem.acts_on_points(e)]
     flow = bem.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
     ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u if c in old.measured}

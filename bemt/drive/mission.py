@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.units import G0
 from bemt.drive import transient
 from bemt.drive.drive_model import Drive
-
-G0 = 9.80665
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import json
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.units import G0
 from bemt.exports.base import Files, Job, LoadsExport
 from bemt.exports.parts import header, plain_name
 from bemt.exports.px4 import thrust_factor
 
-G0 = 9.80665
 ROTORS = 4
 HOVER = 0.5
 

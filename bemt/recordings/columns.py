@@ -100,11 +100,6 @@ def constant(facts: Facts) -> Iterator[Finding]:
             yield Finding("constant_column", own, text, fix, (), severity)
 
 
-def _border(y: Array) -> int:
-    """Row at which a channel jumps most, with a few rows on either side."""
-    return _FEW + int(np.argmax(np.abs(np.diff(y))[_FEW - 1 : 1 - _FEW]))
-
-
 @check_for("units_within")
 def units_within(facts: Facts) -> Iterator[Finding]:
     """A load over the square of the speed that jumps by a power of ten, or more, from one row on: two units.
@@ -126,7 +121,7 @@ def units_within(facts: Facts) -> Iterator[Finding]:
         if rows.size < 2 * _FEW or not facts.still[rows].all():
             continue
         y = level[rows]
-        k = _border(y)
+        k = _FEW + int(np.argmax(np.abs(np.diff(y))[_FEW - 1 : 1 - _FEW]))  # the greatest jump
         parts = y[:k], y[k:]
         jump = float(np.median(parts[1]) - np.median(parts[0]))
         if abs(jump) <= np.log(_JUMP) or any(np.ptp(part) >= np.log(_STEADY) for part in parts):
