@@ -31,6 +31,7 @@ from bemt.diagnose.answer import Diagnosis
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.record import CHANNELS
+from bemt.diagnose.shared import shared
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -110,9 +111,12 @@ def _diagnose(
     problem = build(records, cases, baseline)
     if question := wrong_rotor_check.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
+    every = frozenset().union(*(p.missing for p in problem.parts))
+    problem = replace(problem, shared=every)
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
+    problem, candidates = shared(problem, candidates)
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")

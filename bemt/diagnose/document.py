@@ -81,6 +81,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "fit": {c: {k: or_null(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
         "sets": [list(s) for s in said.sets],
+        "in_reference": sorted(i for i in said.effects if i in d.problem.shared),
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
@@ -325,20 +326,29 @@ def headline(d: Diagnosis) -> str:
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
-        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}."
+        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{_in_both(d)}."
     if said.verdict == "class":
         if said.rule == BESIDE_IT:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}."
+            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{_in_both(d)}."
         if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}."
+            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{_in_both(d)}."
         if len(titles) > _A_GROUP:
             return f"{len(titles)} causes look alike in these readings: {families(said.effects)}."
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them."
+        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{_in_both(d)}."
     if said.verdict == "unknown":
         what = _from_reference(d) or f"Recording and model differ ({off})"
         return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
     what = _from_reference(d) or f"Recording and model differ ({off})"
     return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
+
+
+def _in_both(d: Diagnosis) -> str:
+    """What the case leaves out and the reference shows as well, of the effects that are claimed."""
+    ids = [i for i in d.decision.effects if i in d.problem.shared]
+    if not ids:
+        return ""
+    which = "it" if len(d.decision.effects) == 1 else " and ".join(_title(i) for i in ids)
+    return f"; the case leaves {which} out, and the reference shows it as well"
 
 
 def _guess(d: Diagnosis) -> str:

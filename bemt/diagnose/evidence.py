@@ -141,6 +141,17 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     return Evidence(problem, tuple(candidates), tuple(states), probability, spans, log_w, rivals)
 
 
+def log_odds(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
+    """Natural logarithm of the odds of each effect alone over none, all settings of the covariance added up."""
+    spans, S, log_w = _stacked(problem, candidates)
+    modes = form.form_modes(problem, candidates)
+    table = _EvidenceTable(problem, S, log_w, spans, candidates, modes, _few(problem, candidates))
+    states = [table.state(h, C) for h, C in noise.covariances(problem)]
+    weight = np.log([s.hyper.weight for s in states])
+    none = log_sum([s.log_z[NONE] for s in states], weight)
+    return {i: float(log_sum([s.log_z[Explanation.of(i)] for s in states], weight) - none) for i in spans}
+
+
 def _told(candidates: Sequence[Candidate]) -> list[str]:
     """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
     along = [(v, e.id) for e in effects.catalogue().values() for v in e.along]
@@ -159,7 +170,7 @@ def _stacked(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict[st
 def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
     """Whitened signatures under one covariance, without weighing: all that a plan needs."""
     spans, S, log_w = _stacked(problem, candidates)
-    white = conditional(noise.covariance(problem, hyper), problem.u, problem.free)
+    white = conditional(noise.covariance(problem, hyper), problem.u, problem.changed)
     Sw = white.changes(S)
     state = State(hyper, white, white(problem.residual), Sw, 0.5 * np.sum(Sw * Sw, axis=0))
     return Evidence(problem, tuple(candidates), (state,), {}, spans, log_w)
@@ -212,7 +223,7 @@ class _EvidenceTable:
 
     def state(self, h: Hyper, C: Array, least: float = -np.inf) -> State:
         """Whitened readings and the evidence of none and, unless all must be below a score, of every single effect."""
-        white = conditional(C, self.problem.u, self.problem.free)
+        white = conditional(C, self.problem.u, self.problem.changed)
         r = white(self.residual)
         reach = -white.log_det - float(white.misfit(self.residual))
         none = reach - 0.5 * float(r @ r)

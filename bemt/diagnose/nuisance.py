@@ -38,24 +38,10 @@ after volume 1 of the UIUC database; the jet area of a duct after DFDC, from who
 sixth of the area; the speed at a pulse width after a lithium cell charged to 4.15 instead of 4.20 V (declared); the
 rest is declared."""
 
-# Readings further than this factor from the baseline are in other units.
-_SLIPPED = 3.0
 # Speed over pulse width at rest of everything else: terms of the polynomial.
 PULSE_POWERS = 6
 # Effects whose whole size is below this share of the largest coefficient need no error of their form.
 _FORM_FLOOR = 0.005
-
-
-def _stretch(problem: Problem) -> Array:
-    """Size of the readings over the baseline for channels in other units, else 1: errors are shares of what is read."""
-    out = np.ones_like(problem.y)
-    for k in np.unique(problem.rotor):
-        for c in np.unique(problem.channel):
-            mine = (problem.rotor == k) & (problem.channel == c) & problem.free
-            if mine.any():
-                ratio = float(np.median(np.abs(problem.y[mine]) / np.maximum(np.abs(problem.f0[mine]), 1e-12)))
-                out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
-    return out
 
 
 def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_], Array]:
@@ -65,7 +51,7 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     solver: list[bool] = []
     y, f0, channel = problem.y, problem.f0, problem.channel
 
-    stretch = _stretch(problem)
+    stretch = problem.stretch
 
     def add(name: str, column: Array, of_reading: bool = False, own: bool = False) -> None:
         column = column if of_reading else column * stretch

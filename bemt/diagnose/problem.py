@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt import effects
 from bemt.base.arrays import Array
 from bemt.bem import model as bem
 from bemt.diagnose import real_rotors
@@ -20,6 +21,8 @@ from bemt.effects.base import Effect, Flow, Reading
 if TYPE_CHECKING:
     from bemt.case.as_built import CaseAsBuilt
 
+# Readings further than this factor from the baseline are in other units.
+_SLIPPED = 3.0
 # Speeds over the recorded ones beyond which the tables of these do not reach.
 _SLOWER, _FASTER = 0.7, 1.1
 
@@ -68,6 +71,11 @@ class Part:
     # Speed over pulse width as the reference shows it; None: as this recording itself does
     drive: SpeedCurve | None = None
     _solved: dict[tuple[Effect, ...], tuple[Array, Array, Flow]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def missing(self) -> frozenset[str]:
+        """Physics of every rotor that the case switches off: no run is without it, a reference neither."""
+        return frozenset(self.left_out) & {e.id for e in effects.standard()}
 
     def predict(self, effects: Sequence[Effect]) -> Array:
         """Readings with a set of effects, around the baseline of another model where there is one, (C P,)."""
@@ -180,6 +188,8 @@ class Problem:
     offset: Array = field(default_factory=lambda: np.zeros(0))
     # The parts under other laws, each off by about its uncertainty in one number
     variants: tuple[tuple[Part, ...], ...] = ()
+    # Physics that a reference shows as well as the recording (:mod:`bemt.diagnose.shared`)
+    shared: frozenset[str] = frozenset()
     # Readings that were solved already, by the effects added
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 
@@ -214,10 +224,32 @@ class Problem:
                     out[mine] *= max(1.0, float(np.quantile(np.abs(self.f0 / self.scale)[mine], 0.9)))
         return out
 
+    @cached_property
+    def stretch(self) -> Array:
+        """Readings over the baseline for channels in other units, else 1, (M,): errors are shares of what is read."""
+        out = np.ones_like(self.y)
+        for k in np.unique(self.rotor):
+            for c in np.unique(self.channel):
+                mine = (self.rotor == k) & (self.channel == c) & self.free
+                if mine.any():
+                    ratio = float(np.median(np.abs(self.y[mine]) / np.maximum(np.abs(self.f0[mine]), 1e-12)))
+                    out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
+        return out
+
     @property
     def free(self) -> NDArray[np.bool_]:
         """Readings in which a cause may be at work, (M,): all but those of reference recordings."""
         return np.array([not p.record.reference for p in self.parts])[self.part]
+
+    @property
+    def changed(self) -> NDArray[np.bool_]:
+        """Readings that some explanation changes, (M,): the free ones, and a reference's by what both runs share."""
+        return self.free | np.array([bool(self.shared & p.missing) for p in self.parts])[self.part]
+
+    def of(self, rows: NDArray[np.bool_]) -> Problem:
+        """Some of the readings, to weigh solved signatures by; nothing is solved for these alone."""
+        cut = {k: getattr(self, k)[rows] for k in ("y", "f0", "u", "scale", "channel", "point", "part", "offset")}
+        return replace(self, **cut, tangents=self.tangents[rows], predicted={}, variants=())
 
     @property
     def rotor(self) -> NDArray[np.intp]:
@@ -254,11 +286,11 @@ class Problem:
         """Readings with effects added to the baseline, in place of those of the same id."""
         key = tuple(extra)
         if key not in self.predicted:
-            ids = {e.id for e in extra}
-            full = [
-                p.predict(p.baseline if p.record.reference else (*(e for e in p.baseline if e.id not in ids), *extra))
-                for p in self.parts
-            ]
+            full = []
+            for p in self.parts:
+                mine = tuple(e for e in extra if not p.record.reference or e.id in self.shared & p.missing)
+                ids = {e.id for e in mine}
+                full.append(p.predict((*(e for e in p.baseline if e.id not in ids), *mine)))
             self.predicted[key] = np.concatenate(full)[self.kept]
         return self.predicted[key]
 

@@ -39,7 +39,7 @@ def covariance(problem: Problem) -> Array:
         rows = np.flatnonzero((place[problem.point] >= 0) & (problem.channel < CHANNELS.index("rpm")))
         column = problem.channel[rows] * points.size + place[problem.point[rows]]
         out[np.ix_(rows, rows)] = C[np.ix_(column, column)]
-    return out
+    return out * problem.stretch[:, None] * problem.stretch[None, :]
 
 
 def _of_points(parts: Sequence[Part], rpm: Array, J: Array, Re: Array) -> Array:

@@ -52,6 +52,11 @@ class Cause:
     without: Change = field(default_factory=Change)  # The truth less the cause
     variables: tuple[str, ...] = ()  # Covariates along which it shows; any of them is a right answer of the location
 
+    @property
+    def removable(self) -> bool:
+        """Whether a stand can run without it: nobody can take friction or compressibility away."""
+        return not self.without.section
+
 
 def applied(world: World, stand: Stand, change: Change) -> tuple[World, Stand]:
     """World and stand with a change."""

@@ -112,7 +112,8 @@ class Item:
 
     files: Mapping[str, str]  # Name to text: recording.csv, case.toml, stations.csv
     entry: Mapping[str, Any]  # What the key says of it
-    reference: str = ""  # Run without the causes, given when the diagnosis asks for one; "" where there can be none
+    # Run without the causes that can be taken away, given when the diagnosis asks for one; "" where it has no solution
+    reference: str = ""
 
 
 def _quality(rng: np.random.Generator, quiet: bool) -> Stand:
@@ -159,7 +160,7 @@ def hidden(
         world = bench.plain()
     more = np.random.default_rng((seed, 1))
     stated = bool(more.random() < _STATED) or kind == "mismatch"
-    referenced = bool(more.random() < _REFERENCED) and kind != "mismatch" and _removable(causes)
+    referenced = bool(more.random() < _REFERENCED) and kind != "mismatch"
     if referenced:  # a blade that is not the case's, as a reference shows it
         turn, camber = more.standard_normal(2)
         section = replace(world.section, camber=_CAMBER_OFF * float(camber))
@@ -202,9 +203,11 @@ def make_item(
         ),
         "stations.csv": stations_text(bench.rig),
     }
-    reference = ""
-    if _removable(causes):
-        reference = _reference(bench, causes, own_world, own_stand, air_known, more, stated)
+    kept = [(c, ch) for c, ch in zip(causes, changes, strict=True) if not c.removable]
+    for _, change in kept:
+        own_world, own_stand = applied(own_world, own_stand, change)
+    taken = [c for c in causes if c.removable]
+    reference = _reference(bench, taken, own_world, own_stand, air_known, more, stated)
     if referenced and reference:
         files["reference.csv"] = reference
 
@@ -305,16 +308,11 @@ def _measured_again(
     return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
 
 
-def _removable(causes: Sequence[Cause]) -> bool:
-    """Whether a stand can run without the causes: nobody can take friction or compressibility away."""
-    return not any(c.without.section for c in causes)
-
-
 def _reference(
     bench: Bench, causes: Sequence[Cause], world: World, stand: Stand, air_known: bool, rng: np.random.Generator,
     stated: bool,
 ) -> str:  # fmt: skip
-    """The same rotor at the same points on another day, without the causes; "" where it has no solution."""
+    """The same rotor at the same points on another day, without some causes; "" where it has no solution."""
     for cause in causes:
         world, stand = applied(world, stand, cause.without)
         if cause.id == "ground_effect":

@@ -32,6 +32,7 @@ from bemt import effects
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.diagnose.suggest import minutes
 from bemt.proof import draw, prove, score, seal
+from bemt.proof.causes import CAUSES
 from bemt.proof.items import Bench, further_run, recorded_again
 from bemt.proof.rigs import Rig
 
@@ -153,7 +154,10 @@ class _Item:
         return [file if before == "--case" else w for before, w in pairwise(["", *self.words])]
 
     def of_its_own(self, words: Sequence[str]) -> list[str]:
-        """Command whose reference keeps the first case: it was made without what was put into the other one."""
+        """Command whose reference keeps the first case if it was made without what was put into the other one."""
+        known = (CAUSES.get(n) for n in self.aside if not _at_the_stand(n))
+        if all(c is not None and not c.removable for c in known):
+            return list(words)
         if "--reference" in words and "--reference-case" not in words and _CASE not in words:
             return [*words, "--reference-case", _CASE]
         return list(words)

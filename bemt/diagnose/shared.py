@@ -1,0 +1,41 @@
+"""Physics that the case leaves out and a reference shows as well: what every rotor has is in both runs.
+
+The runs do not differ in it, yet it is why the case fits neither. The reference alone is asked whether it shows it: the
+recording may have another cause, which must not answer for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemt.diagnose import evidence
+
+if TYPE_CHECKING:
+    from bemt.diagnose.problem import Problem
+    from bemt.diagnose.signatures import Candidate
+
+_IN_BOTH = float(np.log(9.0))
+"""Log odds that physics of every rotor is in both runs before they are seen: nobody takes it away [1]."""
+
+
+def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
+    """Problem that knows what its runs share; candidates were solved in both.
+
+    Of what a reference clearly lacks (a code that can switch it off made it) only the recording's part stays.
+    """
+    missing = frozenset().union(*(p.missing for p in problem.parts if p.record.reference))
+    asked = [c for c in candidates if c.id in missing]
+    if not asked:
+        return replace(problem, shared=frozenset()), tuple(candidates)
+    rows = ~problem.free
+    shows = evidence.log_odds(problem.of(rows), [replace(c, signatures=c.signatures[rows], _between={}) for c in asked])
+    both = frozenset(c.id for c in asked if shows[c.id] + _IN_BOTH > 0.0)
+    kept = tuple(
+        c if c.id not in missing - both else replace(c, signatures=np.where(rows[:, None], 0.0, c.signatures), _between={})
+        for c in candidates
+    )
+    return replace(problem, shared=both, predicted={}), kept
