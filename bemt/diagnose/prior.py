@@ -14,7 +14,7 @@ from bemt.effects.duct import DuctEffect
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
 
-__all__ = ["BOTH", "EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
+__all__ = ["ALWAYS", "BOTH", "EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
 
 PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
@@ -24,6 +24,8 @@ parameters, beside 1 for all others [1]."""
 BOTH = 0.01
 """The same of what blade and air do in every run, where the baseline has it and a reference is given: two runs do not
 differ in it [1]."""
+ALWAYS = 9.0
+"""Odds that physics of every rotor is at work, in every run, where the case leaves it out: nobody takes it away [1]."""
 # Recorded conditions that differ by less are the same, share.
 _SAME = 0.1
 EVIDENT = 0.2

@@ -186,7 +186,7 @@ def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
     """
     small = (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
     moved = a.pair is not None and ratio_check.clear_changes(a.pair)
-    if a.p_value > GATE and (a.P[NONE] > 0.5 or (small and not moved)):
+    if a.p_value > a.gate and (a.P[NONE] > 0.5 or (small and not moved)):
         return _nothing(a, _by_chance(a))
     return None
 
@@ -194,7 +194,7 @@ def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
 @_rule("nearly as large a mismatch occurs without a cause", "GATE")
 def _nulls_nearly_look_like_it(a: VerdictQuery) -> Decision | None:
     """The same, between 1 and 5 in 100, or where all loads are far off the case."""
-    if a.p_value > GATE:
+    if a.p_value > a.gate:
         return _nothing(a, _by_chance(a), "insufficient")
     return None
 

@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.diagnose import evidence
+from bemt.diagnose.prior import ALWAYS
 
 if TYPE_CHECKING:
     from bemt.diagnose.problem import Problem
     from bemt.diagnose.signatures import Candidate
-
-_IN_BOTH = float(np.log(9.0))
-"""Log odds that physics of every rotor is in both runs before they are seen: nobody takes it away [1]."""
 
 
 def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
@@ -33,7 +31,7 @@ def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, 
         return replace(problem, shared=frozenset()), tuple(candidates)
     rows = ~problem.free
     shows = evidence.log_odds(problem.of(rows), [replace(c, signatures=c.signatures[rows], _between={}) for c in asked])
-    both = frozenset(c.id for c in asked if shows[c.id] + _IN_BOTH > 0.0)
+    both = frozenset(c.id for c in asked if shows[c.id] + np.log(ALWAYS) > 0.0)
     kept = tuple(
         c if c.id not in missing - both else replace(c, signatures=np.where(rows[:, None], 0.0, c.signatures), _between={})
         for c in candidates

@@ -28,6 +28,7 @@ from bemt.diagnose.thresholds import (
     EARNED,
     ENOUGH,
     EXPECTED,
+    GATE,
     IN_SET,
     LARGEST,
     LEAST,
@@ -178,10 +179,27 @@ class VerdictQuery:
         """The same without an effect that has not earned its place beside another one."""
         return self._kept[0]
 
-    @property
+    @cached_property
     def share(self) -> dict[str, float]:
-        """Probability that each effect is at work, largest first."""
-        return self._kept[1]
+        """Probability that each effect is at work, largest first; see :attr:`missing`."""
+        return {i: p / (self._doubt if self.missing else 1.0) for i, p in self._kept[1].items()}
+
+    @property
+    def _doubt(self) -> float:
+        """Probability that is left when nothing at all is as unlikely as that a rotor lacks what every rotor has."""
+        return 1.0 - self.P[NONE] * (1.0 - 1.0 / prior.ALWAYS)
+
+    @cached_property
+    def missing(self) -> bool:
+        """Whether the cause is one effect that every rotor has and the case leaves out, surely beside all others."""
+        lacks = set.intersection(*(set(p.missing) for p in self.found.problem.parts))
+        one = bool(self.leading) and not self.leading.pair and set(self.leading) <= lacks
+        return one and sum(self._kept[1][i] for i in self.leading) >= SURE * self._doubt
+
+    @property
+    def gate(self) -> float:
+        """Largest p-value at which a mismatch counts as one: of what is there beforehand, nine to one, a larger one."""
+        return GATE * (5.0 if self.missing else 1.0)
 
     @cached_property
     def odds(self) -> float:
@@ -229,6 +247,8 @@ class VerdictQuery:
     @property
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
+        if self.missing:
+            return float(np.log(NAMED / (1.0 - NAMED) / prior.ALWAYS))
         if self.on or self.expected:
             return PROVEN if self.on else EXPECTED
         recorded = self.found.problem.covariates
