@@ -69,11 +69,16 @@ class Evidence:
         """Candidate by id."""
         return next(c for c in self.candidates if c.id == name)
 
-    def log_bayes(self, what: Explanation) -> float:
-        """Natural logarithm of the odds of the readings under an explanation over "none"."""
-        w = np.log([s.hyper.weight for s in self.states])
-        mine, none = ([s.log_z.get(k, -np.inf) for s in self.states] for k in (what, NONE))
-        return float(log_sum(mine, w) - log_sum(none, w))
+    def log_bayes(self, what: Explanation, over: Explanation = NONE, real: bool = False) -> float:
+        """Natural logarithm of the odds of the readings under one explanation over another, "none" for one.
+
+        If so asked of a rotor that is as far off the solver as real ones are, where some setting is of such a rotor.
+        """
+        states = [s for s in self.states if s.hyper.real > 0.0] if real else ()
+        states = states or self.states
+        w = np.log([s.hyper.weight for s in states])
+        mine, other = ([s.log_z.get(k, -np.inf) for s in states] for k in (what, over))
+        return float(log_sum(mine, w) - log_sum(other, w))
 
 
 def singles(state: State, R: Array, spans: dict[str, slice], log_w: Array) -> dict[str, Array]:

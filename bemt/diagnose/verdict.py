@@ -455,7 +455,7 @@ def _earned(
     on = prior.present(found.problem)
     for other, one in (ids, ids[::-1]):
         price = PROVEN if other in on else EARNED
-        adds = found.log_bayes(pair) - found.log_bayes(Explanation.of(one))
+        adds = found.log_bayes(pair, Explanation.of(one), real=True)
         # next to a unit error any residual is small: what is named beside it must explain its own
         vague = effects.catalogue()[one].fault == "unit" and rest > max(LEFT_OVER, SMALL * adds)
         if (adds < price or vague) and share[one] >= share[other]:
