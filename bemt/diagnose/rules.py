@@ -383,19 +383,24 @@ def _another_blade_or_anything_that_scales_all_loads(a: VerdictQuery) -> Decisio
     return None
 
 
-@_rule("at the end of its range", "END")
+@_rule("at the end of its range", "END, NAMED")
 def _at_the_end_of_its_range(a: VerdictQuery) -> Decision | None:
     """Declared: where one number cannot go further, another makes up for something else.
 
-    Among several that look alike under rough laws the number is as rough as they are.
+    Among several that look alike under rough laws the number is as rough as they are. Of two that are each as sure as a
+    name one may be at an end: something is there.
     """
     if a.found.problem.by_laws and len(a.group) > 1:
         return None
-    if any(at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1) for i, told in a.parameters.items()):
-        return a.says(
-            "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
-        )
-    return None
+    ends = [i for i, told in a.parameters.items() if at_end(i, told) and (a.leading.pair or _sizes(i, told) > 1)]
+    if not ends:
+        return None
+    if a.leading.pair and not a.on and min(a.share[i] for i in a.leading) >= NAMED:
+        why = f"two effects are present; {' and '.join(ends)} at the end of its physical range may stand for another"
+        return replace(a.says("class", why, tuple(a.leading), a.P[a.leading]), sets=tuple((i,) for i in a.leading))
+    return a.says(
+        "insufficient", f"{' and '.join(a.leading)}: fits only with a parameter at the end of its physical range"
+    )
 
 
 @_rule("on already, and no reference")
