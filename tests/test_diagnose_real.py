@@ -137,7 +137,7 @@ def test_the_duct_of_a_76_mm_fan_is_named_whatever_pitch_is_guessed(
 @pytest.mark.parametrize(
     ("altitude", "density"), [(1000, 1.112), (2000, 1.007), (3000, 0.909), (4000, 0.819), (5000, 0.736)]
 )
-def test_the_density_of_another_altitude_is_a_rotor_that_is_not_the_case_s_from_four_kilometres_on(
+def test_the_density_of_four_kilometres_is_first_a_rotor_that_is_not_the_case_s(
     shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, altitude: int, density: float
 ) -> None:
     from bemt.proof.real import draw_real

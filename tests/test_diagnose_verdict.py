@@ -110,7 +110,7 @@ def test_what_is_named_beside_a_slip_explains_its_own(
     """A slip explains so much that any rest is small beside it; the second effect may not hide behind that."""
     pair = Explanation.of(first, "untwist")
     weights = {Explanation.of(first): 1000.0, Explanation.of("untwist"): 5.0, pair: 1000.0 + adds}
-    found: Any = SimpleNamespace(problem=None, log_bayes=weights.__getitem__)
+    found: Any = SimpleNamespace(problem=None, log_bayes=lambda a, b, real: weights[a] - weights[b])
     monkeypatch.setattr(prior, "present", lambda _: set())
     leading, share = verdict._earned(found, pair, {first: 1.0, "untwist": 0.99}, rest)
     assert leading == explained(left) and share["untwist"] == (0.99 if leading == pair else 0.0)
@@ -177,8 +177,8 @@ def asked(**changed: Any) -> Any:
     """What an outcome without a doubt would answer, one effect being sure, but for what is changed."""
     lead = Explanation.of("reynolds")
     plain = {
-        "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "on": False,
-        "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
+        "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "gate": 0.01,
+        "on": False, "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
         "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
@@ -230,6 +230,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "another blade, or anything that scales all loads": {"another_blade": True},
     "at the end of its range": {
         "leading": Explanation.of("untwist", "duct"),
+        "share": {"untwist": 0.9, "duct": 1.0},
         "parameters": {"untwist": {"tip_deg": {"value": 5.0, "low": 4.0, "high": 5.0}}},
     },
     "on already, and no reference": {
@@ -270,6 +271,13 @@ def test_the_table_says_where_each_row_comes_from_and_the_last_always_holds() ->
     assert len({r.name for r in rules.RULES}) == len(rules.RULES) and all(r.source for r in rules.RULES)
     assert [r for r in rules.RULES if not r.revises][-1].ask(asked()) is not None
     assert {r.name for r in rules.RULES} == {*ROWS, *REVISIONS, *BY_MODEL}
+
+
+def test_two_sure_effects_one_at_the_end_of_its_range_are_a_class_of_two_sets() -> None:
+    sure = ROWS["at the end of its range"] | {"share": {"untwist": 0.99, "duct": 1.0}}
+    a = asked(**sure, P={NONE: 0.0, UNKNOWN: 0.0, Explanation.of("untwist", "duct"): 0.99})
+    said = next(r.ask(a) for r in rules.RULES if r.name == "at the end of its range")
+    assert said is not None and (said.verdict, set(said.sets)) == ("class", {("untwist",), ("duct",)})
 
 
 def test_a_pair_has_one_set_for_each_cause() -> None:

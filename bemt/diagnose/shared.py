@@ -33,7 +33,9 @@ def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, 
     shows = evidence.log_odds(problem.of(rows), [replace(c, signatures=c.signatures[rows], _between={}) for c in asked])
     both = frozenset(c.id for c in asked if shows[c.id] + np.log(ALWAYS) > 0.0)
     kept = tuple(
-        c if c.id not in missing - both else replace(c, signatures=np.where(rows[:, None], 0.0, c.signatures), _between={})
+        c
+        if c.id not in missing - both
+        else replace(c, signatures=np.where(rows[:, None], 0.0, c.signatures), _between={})
         for c in candidates
     )
     return replace(problem, shared=both, predicted={}), kept
