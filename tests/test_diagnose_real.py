@@ -133,7 +133,7 @@ def test_the_duct_of_a_76_mm_fan_is_named_whatever_pitch_is_guessed(
 
 
 # U.S. Standard Atmosphere (1976).  Rotors whose stations are known thrust up to a fifth more or less than computed: that
-# hides three kilometres.  From four on it is not said to be this rotor, before any cause is looked for.
+# hides three kilometres.  From four on the loads are not those of the case, which is said before any cause.
 @pytest.mark.parametrize(
     ("altitude", "density"), [(1000, 1.112), (2000, 1.007), (3000, 0.909), (4000, 0.819), (5000, 0.736)]
 )

@@ -178,8 +178,8 @@ def asked(**changed: Any) -> Any:
     lead = Explanation.of("reynolds")
     plain = {
         "first": lead, "leading": lead, "rest": 0.0, "odds": 100.0, "needed": 8.0, "p_value": 0.002, "gate": 0.01,
-        "on": False, "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (), "few": (),
-        "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
+        "on": False, "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (),
+        "few": (), "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
         "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}}, "pair": None, "likeliest_none": False,

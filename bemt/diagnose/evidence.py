@@ -74,7 +74,7 @@ class Evidence:
 
         If so asked of a rotor that is as far off the solver as real ones are, where some setting is of such a rotor.
         """
-        states = [s for s in self.states if s.hyper.real > 0.0] if real else ()
+        states = tuple(s for s in self.states if s.hyper.real > 0.0) if real else ()
         states = states or self.states
         w = np.log([s.hyper.weight for s in states])
         mine, other = ([s.log_z.get(k, -np.inf) for s in states] for k in (what, over))

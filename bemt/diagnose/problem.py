@@ -244,7 +244,8 @@ class Problem:
     @property
     def changed(self) -> NDArray[np.bool_]:
         """Readings that some explanation changes, (M,): the free ones, and a reference's by what both runs share."""
-        return self.free | np.array([bool(self.shared & p.missing) for p in self.parts])[self.part]
+        in_both = np.array([bool(self.shared & p.missing) for p in self.parts])[self.part]
+        return np.asarray(self.free | in_both)
 
     def of(self, rows: NDArray[np.bool_]) -> Problem:
         """Some of the readings, to weigh solved signatures by; nothing is solved for these alone."""
