@@ -132,8 +132,8 @@ def test_the_duct_of_a_76_mm_fan_is_named_whatever_pitch_is_guessed(
     assert (answer.decision.verdict, answer.decision.effects) == ("named", ("duct",)), document.text(answer)
 
 
-# U.S. Standard Atmosphere (1976).  Rotors whose stations are known thrust up to a fifth more or less than computed: that
-# hides three kilometres.  From four on the loads are not those of the case, which is said before any cause.
+# U.S. Standard Atmosphere (1976).  Rotors whose stations are known thrust up to a fifth more or less than computed.
+# That hides three kilometres.  From four on the loads are not those of the case, and that is said before any cause.
 @pytest.mark.parametrize(
     ("altitude", "density"), [(1000, 1.112), (2000, 1.007), (3000, 0.909), (4000, 0.819), (5000, 0.736)]
 )

@@ -181,7 +181,7 @@ def asked(**changed: Any) -> Any:
         "on": False, "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (),
         "few": (), "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
+        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "dropped": False, "factor": False, "real": False,
         "parameters": {"reynolds": {}}, "pair": None, "likeliest_none": False,
     }  # fmt: skip
 

@@ -480,15 +480,11 @@ def _one_is_sure_another_may_be_there(a: VerdictQuery) -> Decision | None:
     if not a.paired and (
         len(a.group) <= 1 if a.sure else bool(a.beside) and not a.on and mass(a.found, a.group) >= SURE
     ):
-        return replace(
-            a.says(
-                "class",
-                f"{' or '.join(a.group)} is present; whether another effect is also present is left open",
-                (*a.group, *a.beside),
-                mass(a.found, a.group),
-            ),
-            sets=(a.group, a.beside),
-        )
+        rest = ("a second effect would explain more, by no more than this rotor may be off" if a.dropped
+                else "whether another effect is also present is left open")  # fmt: skip
+        why = f"{' or '.join(a.group)} is present; {rest}"
+        said = a.says("class", why, (*a.group, *a.beside), mass(a.found, a.group))
+        return replace(said, sets=(a.group, a.beside))
     return None
 
 

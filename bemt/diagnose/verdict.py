@@ -201,6 +201,11 @@ class VerdictQuery:
         """Largest p-value at which a mismatch counts as one: of what is there beforehand, nine to one, a larger one."""
         return GATE * (5.0 if self.missing else 1.0)
 
+    @property
+    def dropped(self) -> bool:
+        """Whether two effects are likelier than one, but one of them has not earned its place."""
+        return self.first.pair and not self.leading.pair
+
     @cached_property
     def odds(self) -> float:
         """Log odds of the leading explanation over nothing."""
