@@ -181,8 +181,8 @@ def asked(**changed: Any) -> Any:
         "on": False, "expected": False, "paired": False, "sure": ("reynolds",), "group": ("reynolds",), "beside": (),
         "few": (), "likely": ("reynolds",), "wide": ("reynolds",), "drive_only": False,
         "P": {NONE: 0.0, UNKNOWN: 0.0, lead: 1.0}, "share": {"reynolds": 1.0}, "unlisted": 0.0, "roughness": 1.0,
-        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "dropped": False, "factor": False, "real": False,
-        "parameters": {"reynolds": {}}, "pair": None, "likeliest_none": False,
+        "vague": 0.0, "alone": True, "level": 0.0, "another_blade": False, "factor": False, "real": False,
+        "parameters": {"reynolds": {}}, "pair": None, "likeliest_none": False, "dropped": False,
     }  # fmt: skip
 
     def says(word: str, why: str = "", ids: Any = (), *_: Any, **__: Any) -> verdict.Decision:

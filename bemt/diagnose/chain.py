@@ -111,8 +111,7 @@ def _diagnose(
     problem = build(records, cases, baseline)
     if question := wrong_rotor_check.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
-    every = frozenset().union(*(p.missing for p in problem.parts))
-    problem = replace(problem, shared=every)
+    problem = replace(problem, shared=problem.missing)  # until the reference is asked
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")

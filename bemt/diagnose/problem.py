@@ -242,6 +242,11 @@ class Problem:
         return np.array([not p.record.reference for p in self.parts])[self.part]
 
     @property
+    def missing(self) -> frozenset[str]:
+        """Physics of every rotor that a reference may show and its case switches off."""
+        return frozenset().union(*(p.missing for p in self.parts if p.record.reference))
+
+    @property
     def changed(self) -> NDArray[np.bool_]:
         """Readings that some explanation changes, (M,): the free ones, and a reference's by what both runs share."""
         in_both = np.array([bool(self.shared & p.missing) for p in self.parts])[self.part]

@@ -25,17 +25,12 @@ def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, 
 
     Of what a reference clearly lacks (a code that can switch it off made it) only the recording's part stays.
     """
-    missing = frozenset().union(*(p.missing for p in problem.parts if p.record.reference))
-    asked = [c for c in candidates if c.id in missing]
+    asked = [c for c in candidates if c.id in problem.missing]
     if not asked:
         return replace(problem, shared=frozenset()), tuple(candidates)
     rows = ~problem.free
-    shows = evidence.log_odds(problem.of(rows), [replace(c, signatures=c.signatures[rows], _between={}) for c in asked])
-    both = frozenset(c.id for c in asked if shows[c.id] + np.log(ALWAYS) > 0.0)
-    kept = tuple(
-        c
-        if c.id not in missing - both
-        else replace(c, signatures=np.where(rows[:, None], 0.0, c.signatures), _between={})
-        for c in candidates
-    )
-    return replace(problem, shared=both, predicted={}), kept
+    shows = evidence.log_odds(problem.of(rows), [c.seen_as(c.signatures[rows]) for c in asked])
+    both = frozenset(i for i, odds in shows.items() if odds + np.log(ALWAYS) > 0.0)
+    alone = problem.missing - both
+    kept = (c.seen_as(np.where(rows[:, None], 0.0, c.signatures)) if c.id in alone else c for c in candidates)
+    return replace(problem, shared=both, predicted={}), tuple(kept)

@@ -7,7 +7,7 @@ fixed set of vectors, for the recording and for hundreds of bootstrapped nulls a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -46,6 +46,10 @@ class Candidate:
     def kind(self) -> str:
         """Kind of the effect: air, stand or drive."""
         return effects.catalogue()[self.id].kind
+
+    def seen_as(self, signatures: Array) -> Candidate:
+        """The same settings, of which other signatures (M, G) are known [units of the readings]."""
+        return replace(self, signatures=signatures, _between={})
 
     def only(self, keep: NDArray[np.bool_]) -> Candidate | None:
         """Candidate with some of its settings; None without any."""
