@@ -198,7 +198,7 @@ class VerdictQuery:
 
     @property
     def gate(self) -> float:
-        """Largest p-value at which a mismatch counts as one: of what is there beforehand, nine to one, a larger one."""
+        """Largest p-value at which a mismatch counts as one; five times that where the cause is there beforehand."""
         return GATE * (5.0 if self.missing else 1.0)
 
     @property
