@@ -173,6 +173,7 @@ def document(change: RunChange) -> dict[str, Any]:
         "effects": list(said.effects),
         "probability": said.mass,
         "rule": said.why,
+        "sets": [list(s) for s in said.sets],
         "ranking": _ranking(said),
         "subsystems": {
             name: {"verdict": j.verdict, "effects": list(j.effects), "rule": j.why, "ranking": _ranking(j)}

@@ -196,7 +196,7 @@ def sentence(doc: Mapping[str, Any]) -> str:
         lead = "The stand" if doc["verdict"] == "sensor" else "What changed"
         return f"{lead}: {names}{sure}: {doc['rule']}."
     if doc["verdict"] == "class":
-        if " present; " in doc["rule"]:  # one is sure, what is beside it is not
+        if len(doc["sets"]) > 1:  # more than one cause
             return f"{doc['rule']}{sure}: {names}."
         return f"One of these; the data cannot tell them apart{sure}: {names}."
     if doc["verdict"] == "unknown":

@@ -59,6 +59,7 @@ class Judgement:
     parameters: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
     why: str = ""  # The rule that decided
     chance: float = math.nan  # Of the verdict
+    sets: tuple[tuple[str, ...], ...] = ()  # Of a class, one set of effects per cause; () or one: one cause
 
     @property
     def mass(self) -> float | None:

@@ -84,7 +84,7 @@ def judged(pair: RunChange) -> Judgement:
     solved = bool(said.effects) and bool(said.leading) and all(i in query.found.spans for i in said.leading)
     parameters = query.refined(said.leading)[1] if solved else {}
     return Judgement(
-        said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability
+        said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability, said.sets
     )  # fmt: skip
 
 
