@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt import effects
 from bemt.air import Air
@@ -48,11 +47,6 @@ _FEWEST = 4
 _NEAR_ZERO, _STILL = 0.15, 0.02
 # Rows this many robust standard deviations off the curve through all of them are strays, and at least this share off.
 _FAR, _FAR_SHARE, _STRAYS = 5.0, 0.05, 0.1
-# Slope and bend over J of a rotor at rest, shares, for that.
-_ANY_ROTOR = (-1.0, 0.0, 0.5)
-# A curve follows its ends: the slowest and the fastest row are strays this far off the curve through the others, share.
-# Reynolds number changes coefficients by half as much at most; counters miss pulses at idle.
-_FAR_END = 0.3
 
 
 def law_effects() -> list[str]:
@@ -249,26 +243,14 @@ def _without_strays(record: Record, D: float) -> Record:
     """Record without readings that all others of it contradict."""
     n = record.rpm / 60.0
     unit, J = np.asarray(record.air.rho) * n**2, record.V / (n * D)
-    measured = {k: np.where(_strays(v / unit, J, record.rpm), np.nan, v) for k, v in record.measured.items()}
+    measured = {}
+    for channel, v in record.measured.items():
+        y = v / unit
+        good = np.isfinite(y)
+        off = np.where(good, y - CoefficientCurve.of(y, J, record.rpm, (-1.0, 0.0, 0.5))(J, record.rpm), 0.0)
+        middle = float(np.median(off[good]))
+        spread = 1.48 * float(np.median(np.abs(off[good] - middle)))
+        far = np.abs(off - middle) > max(_FAR * spread, _FAR_SHARE * float(np.max(np.abs(y[good]))))
+        measured[channel] = np.where(far, np.nan, v) if far.sum() <= _STRAYS * good.sum() else v
     kept = np.any([np.isfinite(v) for v in measured.values()], axis=0)
     return replace(record, measured=measured).take(np.flatnonzero(kept))
-
-
-def _strays(c: Array, J: Array, rpm: Array) -> NDArray[np.bool_]:
-    """Which coefficients are far off the curve through all, or of the ends of the speeds through the others, (P,)."""
-    good = np.isfinite(c)
-
-    def off(through: NDArray[np.bool_]) -> Array:
-        curve = CoefficientCurve.of(np.where(through, c, np.nan), J, rpm, _ANY_ROTOR)
-        return np.where(good, c - curve(J, rpm), 0.0)
-
-    alone = np.zeros(c.size, dtype=bool)
-    for end in (np.argmin, np.argmax) if good.sum() > _FEWEST else ():
-        k = int(np.flatnonzero(good)[end(rpm[good])])
-        others = good & (np.arange(c.size) != k)
-        alone[k] = abs(off(others)[k]) > _FAR_END * abs(float(np.median(c[others])))
-    left = off(good & ~alone)
-    middle = float(np.median(left[good]))
-    spread = 1.48 * float(np.median(np.abs(left[good] - middle)))
-    far = np.abs(left - middle) > max(_FAR * spread, _FAR_SHARE * float(np.max(np.abs(c[good]))))
-    return (far if far.sum() <= _STRAYS * good.sum() else np.zeros_like(far)) | alone
