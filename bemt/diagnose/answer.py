@@ -148,6 +148,11 @@ class Diagnosis:
         return self.found.problem
 
     @property
+    def in_reference(self) -> tuple[str, ...]:
+        """Effects of the answer that the case leaves out and the reference shows as well."""
+        return tuple(i for i in self.said.effects if i in self.problem.shared)
+
+    @property
     def off(self) -> dict[str, tuple[float, bool]]:
         """How far each channel is from the case: median of the ratio, less 1 [1]; or how far most go, and True."""
         p, out = self.problem, {}

@@ -31,7 +31,7 @@ from bemt.diagnose.answer import Diagnosis
 from bemt.diagnose.assemble import build
 from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.shared import shared
+from bemt.diagnose.shared_physics import ask_reference
 
 if TYPE_CHECKING:
     from bemt.case import Case
@@ -115,7 +115,7 @@ def _diagnose(
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
     candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
-    problem, candidates = shared(problem, candidates)
+    problem, candidates = ask_reference(problem, candidates)
     say("weighing explanations")
     found = evidence.weigh(problem, candidates)
     say("bootstrapped nulls")

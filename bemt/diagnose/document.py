@@ -81,7 +81,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "fit": {c: {k: or_null(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
         "sets": [list(s) for s in said.sets],
-        "in_reference": sorted(i for i in said.effects if i in d.problem.shared),
+        "in_reference": sorted(d.in_reference),
         "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
@@ -344,10 +344,9 @@ def headline(d: Diagnosis) -> str:
 
 def _in_both(d: Diagnosis) -> str:
     """What the case leaves out and the reference shows as well, of the effects that are claimed."""
-    ids = [i for i in d.decision.effects if i in d.problem.shared]
-    if not ids:
+    if not d.in_reference:
         return ""
-    which = "it" if len(d.decision.effects) == 1 else " and ".join(_title(i) for i in ids)
+    which = "it" if len(d.said.effects) == 1 else " and ".join(_title(i) for i in d.in_reference)
     return f"; the case leaves {which} out, and the reference shows it as well"
 
 

@@ -70,9 +70,9 @@ class Evidence:
         return next(c for c in self.candidates if c.id == name)
 
     def log_bayes(self, what: Explanation, over: Explanation = NONE, real: bool = False) -> float:
-        """Natural logarithm of the odds of the readings under one explanation over another, "none" for one.
+        """Natural logarithm of the odds of the readings under one explanation over another.
 
-        If so asked of a rotor that is as far off the solver as real ones are, where some setting is of such a rotor.
+        With ``real`` only settings of a rotor as far off the solver as measured ones are count, where there are any.
         """
         states = tuple(s for s in self.states if s.hyper.real > 0.0) if real else ()
         states = states or self.states

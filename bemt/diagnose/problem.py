@@ -188,7 +188,7 @@ class Problem:
     offset: Array = field(default_factory=lambda: np.zeros(0))
     # The parts under other laws, each off by about its uncertainty in one number
     variants: tuple[tuple[Part, ...], ...] = ()
-    # Physics that a reference shows as well as the recording (:mod:`bemt.diagnose.shared`)
+    # Physics that a reference shows as well as the recording (:mod:`bemt.diagnose.shared_physics`)
     shared: frozenset[str] = frozenset()
     # Readings that were solved already, by the effects added
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)

@@ -32,6 +32,7 @@ from bemt.diagnose.thresholds import (
     LEFT_OVER,
     NAMED,
     NEAR,
+    NEARLY,
     PARTNER,
     PREDICTS,
     PROVEN,
@@ -184,7 +185,7 @@ def _nulls_look_like_it(a: VerdictQuery) -> Decision | None:
 
     Of two recordings without a case a load that clearly changed is not said to be none.
     """
-    small = (a.p_value > 5.0 * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
+    small = (a.p_value > NEARLY * GATE and a.level < LEVEL) or (not a.alone and a.likeliest_none)
     moved = a.pair is not None and ratio_check.clear_changes(a.pair)
     if a.p_value > a.gate and (a.P[NONE] > 0.5 or (small and not moved)):
         return _nothing(a, _by_chance(a))

@@ -255,11 +255,15 @@ def _referenced(found: Evidence) -> bool:
 
 
 def _with_reference(part: Part) -> Problem:
-    """Plan with the same points measured once more without the cause; readings are those of the baseline."""
+    """Plan with the same points measured once more without the cause; readings are those of the baseline.
+
+    What every rotor has and the case leaves out is in both: such a run does not show it by itself.
+    """
     f = part.flow
     own = {"thrust_N": f.T0, "torque_Nm": f.Q0}
     measured = {k: own.get(k, v) for k, v in part.record.measured.items()}
-    return assemble((part, replace(part, record=replace(part.record, measured=measured, reference=True))))
+    both = assemble((part, replace(part, record=replace(part.record, measured=measured, reference=True))))
+    return replace(both, shared=both.missing)
 
 
 @dataclass(frozen=True)

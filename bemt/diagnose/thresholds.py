@@ -1,13 +1,13 @@
 """Numbers that the rules of the verdict ask with: how much is enough for which answer."""
 
 __all__ = [
-    "ANOTHER", "BESIDE", "BOTH", "EARNED", "END", "ENOUGH", "EXACT", "EXPECTED", "GATE", "IN_SET", "LARGEST", "LEAST",
-    "LEFT_OVER", "LIKE", "LIKELY", "MOST", "NAMED", "NEAR", "PARTNER", "PREDICTS", "PROVEN", "RARE", "ROUGH", "SETTLED",
-    "SMALL", "SURE", "UNCHANGED", "VAGUE",
+    "ANOTHER", "BESIDE", "BOTH", "EARNED", "END", "ENOUGH", "EXACT", "EXPECTED", "GATE", "IN_SET", "LARGEST",
+    "LEAST", "LEFT_OVER", "LIKE", "LIKELY", "MOST", "NAMED", "NEAR", "NEARLY", "PARTNER", "PREDICTS", "PROVEN",
+    "RARE", "ROUGH", "SETTLED", "SMALL", "SURE", "UNCHANGED", "VAGUE",
 ]  # fmt: skip
 
-GATE = 0.01
-"""Largest p-value at which a mismatch counts as one [1]."""
+GATE, NEARLY = 0.01, 5.0
+"""Largest p-value at which a mismatch counts as one; factor on it within which it nearly does [1]."""
 SURE = 0.85
 """Probability from which a class of effects is an answer [1]."""
 NAMED = 0.95

@@ -37,6 +37,7 @@ from bemt.diagnose.thresholds import (
     MOST,
     NAMED,
     NEAR,
+    NEARLY,
     PARTNER,
     PROVEN,
     RARE,
@@ -181,8 +182,8 @@ class VerdictQuery:
 
     @cached_property
     def share(self) -> dict[str, float]:
-        """Probability that each effect is at work, largest first; see :attr:`missing`."""
-        return {i: p / (self._doubt if self.missing else 1.0) for i, p in self._kept[1].items()}
+        """Probability that each effect is at work, largest first; see :attr:`always_there`."""
+        return {i: p / (self._doubt if self.always_there else 1.0) for i, p in self._kept[1].items()}
 
     @property
     def _doubt(self) -> float:
@@ -190,7 +191,7 @@ class VerdictQuery:
         return 1.0 - self.P[NONE] * (1.0 - 1.0 / prior.ALWAYS)
 
     @cached_property
-    def missing(self) -> bool:
+    def always_there(self) -> bool:
         """Whether the cause is one effect that every rotor has and the case leaves out, surely beside all others."""
         lacks = set.intersection(*(set(p.missing) for p in self.found.problem.parts))
         one = bool(self.leading) and not self.leading.pair and set(self.leading) <= lacks
@@ -198,8 +199,8 @@ class VerdictQuery:
 
     @property
     def gate(self) -> float:
-        """Largest p-value at which a mismatch counts as one; five times that where the cause is there beforehand."""
-        return GATE * (5.0 if self.missing else 1.0)
+        """Largest p-value at which a mismatch counts as one; of a cause that is there beforehand it need only nearly."""
+        return GATE * (NEARLY if self.always_there else 1.0)
 
     @property
     def dropped(self) -> bool:
@@ -252,7 +253,7 @@ class VerdictQuery:
     @property
     def needed(self) -> float:
         """Log odds over nothing from which it counts."""
-        if self.missing:
+        if self.always_there:
             return float(np.log(NAMED / (1.0 - NAMED) / prior.ALWAYS))
         if self.on or self.expected:
             return PROVEN if self.on else EXPECTED

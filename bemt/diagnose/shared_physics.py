@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bemt.diagnose.signatures import Candidate
 
 
-def shared(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
+def ask_reference(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
     """Problem that knows what its runs share; candidates were solved in both.
 
     Of what a reference clearly lacks (a code that can switch it off made it) only the recording's part stays.
