@@ -199,7 +199,7 @@ class VerdictQuery:
 
     @property
     def gate(self) -> float:
-        """Largest p-value at which a mismatch counts as one; of a cause that is there beforehand it need only nearly."""
+        """Largest p-value at which a mismatch counts; it need only nearly where the cause is there beforehand."""
         return GATE * (NEARLY if self.always_there else 1.0)
 
     @property
