@@ -20,9 +20,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bemt.base.units import G0, INCH
-from bemt.design import choose
-from bemt.design.motors_file import KnownMotor
-from bemt.readers._uiuc_names import class_of, parse_file_name
+from bemt.data.readers._uiuc_names import class_of, parse_file_name
+from bemt.tools.design import choose
+from bemt.tools.design.motors_file import KnownMotor
 
 Array = NDArray[np.float64]
 LBF = 4.4482216

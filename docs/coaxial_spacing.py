@@ -18,8 +18,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import bemt
-from bemt.dataset import Dataset
-from bemt.readers import read
+from bemt.data.readers import read
+from bemt.physics.dataset import Dataset
 
 HERE = Path(__file__).resolve().parent
 PAIRS = (("15x5", 15, 5000.0), ("11x5", 11, 6000.0))

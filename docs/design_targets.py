@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.units import INCH
-from bemt.case import load_case
-from bemt.design.blade_design import Design, design_blade
-from bemt.design.requirement import DesignPoint
+from bemt.rotors.case import load_case
+from bemt.tools.design.blade_design import Design, design_blade
+from bemt.tools.design.requirement import DesignPoint
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / "design.md"

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import mujoco
 
-from bemt.case import load_case
-from bemt.case.load import with_changes
-from bemt.drive import drive_result
-from bemt.exports import exports
-from bemt.exports.base import Job
+from bemt.rotors.case import load_case
+from bemt.rotors.case.load import with_changes
+from bemt.tools.drive import drive_result
+from bemt.tools.exports import exports
+from bemt.tools.exports.base import Job
 
 CASE = Path(__file__).resolve().parent.parent / "cases/prop_10x5/case.toml"
 MASS = 1.8  # of the vehicle [kg]

@@ -17,17 +17,17 @@ from pathlib import Path
 from typing import get_origin
 
 from bemt.base.toml import FieldLimits, Table, expected, limits_of
-from bemt.case import Case, load_case
-from bemt.case.prepare import prepare_case
-from bemt.case.schema import GROUPS, CaseFile
-from bemt.case.unknowns import completed
-from bemt.cfd.schema import AxesTable, CampaignFile
-from bemt.diagnose.nuisance import PRIORS
-from bemt.drive.motor_file import MotorToml
-from bemt.drive.thrusters_result import ThrustersFile
-from bemt.readers.cfd_run import RunColumn, RunColumns, RunToml
-from bemt.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
-from bemt.report import effects_list
+from bemt.data.readers.cfd_run import RunColumn, RunColumns, RunToml
+from bemt.data.readers.recording_toml import ColumnsTable, ColumnTable, RecordingToml
+from bemt.judge.diagnose.nuisance import PRIORS
+from bemt.results.report import effects_list
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.schema import GROUPS, CaseFile
+from bemt.rotors.case.unknowns import completed
+from bemt.tools.cfd.schema import AxesTable, CampaignFile
+from bemt.tools.drive.motor_file import MotorToml
+from bemt.tools.drive.thrusters_result import ThrustersFile
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 """Cases on the pages: the shipped ones, whatever else is in the folder."""

@@ -10,8 +10,8 @@ import sys
 
 import numpy as np
 
-from bemt.bem import solver
-from bemt.sections.neuralfoil import neuralfoil_polar
+from bemt.physics.bem import solver
+from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from geometry.airfoil import naca4
 from geometry.laws import helix
 from geometry.rotor import Rotor

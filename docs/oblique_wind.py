@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import resample
 
 import bemt
-from bemt.bem import oblique, solver
+from bemt.physics.bem import oblique, solver
 
 HERE = Path(__file__).resolve().parent
 RPM, SPEED = 8500.0, 5.0

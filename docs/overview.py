@@ -16,9 +16,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bemt.case import load_case
-from bemt.case.prepare import k1k2_case, prepare_case
-from bemt.sweep import sweep
+from bemt.results.sweep import sweep
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import k1k2_case, prepare_case
 
 ROOT = Path(__file__).resolve().parents[1]
 TARGET = ROOT / "docs" / "img" / "overview.png"

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from bemt.base.tables import write_atomic
-from bemt.case import load_case
-from bemt.exports import exports
-from bemt.exports.base import Job, LoadsExport
-from bemt.exports.manifest import entry
-from bemt.exports.performance import oblique_loads, solve_points
+from bemt.rotors.case import load_case
+from bemt.tools.exports import exports
+from bemt.tools.exports.base import Job, LoadsExport
+from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from simulators import PROGRAMS, installed

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from bemt.base.tables import write_atomic
-from bemt.exports import exports
-from bemt.exports.base import Job, LoadsExport
+from bemt.tools.exports import exports
+from bemt.tools.exports.base import Job, LoadsExport
 
 SLUG_FT3, LBF, FT_LBF = 515.378818, 4.4482216152605, 1.3558179483314
 """A density, a force and a moment of JSBSim in kg/m3, N and N m."""

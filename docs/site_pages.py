@@ -22,19 +22,21 @@ LINK = re.compile(r"(?<=\]\()([^)\s#]+)(#[^)\s]*)?(?=\))")
 PLACES = {"README.md": "index.md"}  # other files keep their path; those of docs/ are at the top
 API = {  # page: title, introduction, names
     "api_propeller.md": ("Propellers", "`import bemt` loads nothing else until it is used.", (
-        "bemt.library.rotors.propeller", "bemt.library.rotors.load", "bemt.library.rotors.Propeller")),
+        "bemt.app.library.rotors.propeller", "bemt.app.library.rotors.load", "bemt.app.library.rotors.Propeller")),
     "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on.", (
-        *(f"bemt.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
-        *(f"bemt.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor", "CalibratedRotor",
+        *(f"bemt.app.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
+        *(f"bemt.app.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor",
+         "CalibratedRotor",
                                                 "export", "ExportedCase", "report", "cite")),
-        "bemt.library.blades.design", "bemt.design.blade_design.Design",
-        "bemt.case.sources.Source",
-        "bemt.diagnose.contrast.Contrast", "bemt.drive.drive_result.DriveResult", "bemt.drive.drive_result.DriveBand")),
+        "bemt.app.library.blades.design", "bemt.tools.design.blade_design.Design",
+        "bemt.rotors.case.sources.Source",
+        "bemt.judge.diagnose.contrast.Contrast", "bemt.tools.drive.drive_result.DriveResult",
+        "bemt.tools.drive.drive_result.DriveBand")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
-        "bemt.dataset.points", "bemt.dataset.make", "bemt.base.errors.InputError",
+        "bemt.physics.dataset.points", "bemt.physics.dataset.make", "bemt.base.errors.InputError",
         "bemt.base.errors.Fault")),
     "api_contracts.md": ("Plug-in contracts", "One file each, found by scanning; [examples](adding.md).", (
-        "bemt.effects.base", "bemt.readers", "bemt.exports.base", "bemt.commands")),
+        "bemt.physics.effects.base", "bemt.data.readers", "bemt.tools.exports.base", "bemt.app.commands")),
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
@@ -107,7 +109,7 @@ def relinked(text: str, source: Path) -> str:
 
 def commands() -> str:
     """Page of all commands, from their parsers."""
-    from bemt.commands.cli import GROUPS, build_parser
+    from bemt.app.commands.cli import GROUPS, build_parser
 
     parser = build_parser()
     groups: dict[str, list[str]] = {name: [] for name in GROUPS}

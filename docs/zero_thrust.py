@@ -13,10 +13,10 @@ import jsbsim
 import numpy as np
 
 from bemt.base.tables import write_atomic
-from bemt.case import load_case
-from bemt.exports import exports
-from bemt.exports.base import Job
-from bemt.exports.performance import solve_points
+from bemt.rotors.case import load_case
+from bemt.tools.exports import exports
+from bemt.tools.exports.base import Job
+from bemt.tools.exports.performance import solve_points
 
 CASE = Path(__file__).resolve().parent.parent / "cases/prop_10x5/case.toml"
 RPM = 8000.0

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bemt.proof import proof_text
+from bemt.judge.proof import proof_text
 
 ROOT = Path(__file__).resolve().parents[1]
 SIZES = ("8x5", "10x5", "12x6", "14x8")

@@ -13,7 +13,7 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bemt.sections.polars import Polar
+    from bemt.physics.sections.polars import Polar
     from geometry.duct import Duct
     from geometry.mesh import MeshModel, Options
     from geometry.rotor import Rotor
@@ -83,7 +83,7 @@ _SOLIDS: dict[object, MeshModel] = {}
 @pytest.fixture
 def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Mesh a rotor that is bit for bit one that was meshed before no second time; a command reads its case anew."""
-    from bemt.exports.openfoam import write
+    from bemt.tools.cfd.openfoam import write
     from geometry import export
     from geometry.mesh import build
 
@@ -113,7 +113,7 @@ def polar() -> Polar:
     """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
     import numpy as np
 
-    from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
+    from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
 
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     linear = 5.9 * (alpha + np.radians(4.0))

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt import effects
-from bemt.bem import model as bem
-from bemt.case import Case, load_case
-from bemt.case.prepare import prepare_case
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, record
-from bemt.effects.base import Effect, Reading
+from bemt.judge.diagnose import chain, record
+from bemt.physics import effects
+from bemt.physics.bem import model as bem
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects.base import Effect, Reading
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.prepare import prepare_case
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
 NOISE = 0.01

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
-from bemt.flight.answer import answer_on
-from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
-from bemt.flight.read import read_log
-from bemt.flight.text import text
+from bemt.tools.flight.answer import answer_on
+from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.tools.flight.read import read_log
+from bemt.tools.flight.text import text
 
 Array = NDArray[np.float64]
 G = 9.80665

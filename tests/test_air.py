@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt.air import GAMMA, R_DRY, Air, isa_pressure, saturation_pressure, sutherland
 from bemt.base.errors import InputError
+from bemt.physics.air import GAMMA, R_DRY, Air, isa_pressure, saturation_pressure, sutherland
 
 # ISO 2533 / U.S. Standard Atmosphere 1976, by geopotential altitude: H [m], T [K], p [Pa], rho [kg/m3], a [m/s].
 ISA = [

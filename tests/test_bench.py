@@ -8,9 +8,9 @@ import bench_work as benchwork
 import numpy as np
 import pytest
 
-from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.bem import solver
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bemt.base import cache
-from bemt.sections import neuralfoil as polars_neuralfoil
-from bemt.sections.neuralfoil import tunnel_polar
-from bemt.sections.polars import ALPHA_GRID, Polar
+from bemt.physics.sections import neuralfoil as polars_neuralfoil
+from bemt.physics.sections.neuralfoil import tunnel_polar
+from bemt.physics.sections.polars import ALPHA_GRID, Polar
 from geometry.airfoil import naca
 
 SECTIONS = {"0012": naca("0012"), "4412": naca("4412")}
@@ -111,7 +111,7 @@ def test_installed_version_is_that_of_the_metadata() -> None:
 def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
     tunnel_polar(SECTIONS["4412"])
     code = (
-        "import sys; from bemt.sections.neuralfoil import tunnel_polar as f; from geometry.airfoil import naca;"
+        "import sys; from bemt.physics.sections.neuralfoil import tunnel_polar as f; from geometry.airfoil import naca;"
         "f(naca('4412')); print(sorted({'neuralfoil', 'aerosandbox', 'scipy', 'numba'} & set(sys.modules)))"
     )
     root = Path(cache.__file__).parents[2]

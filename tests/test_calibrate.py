@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import coefficients as co
+from bemt.app.commands import cli
 from bemt.base.errors import InputError
-from bemt.commands import cli
+from bemt.physics import coefficients as co
 from bemt.rotors import k1k2_calibration as calibrate
 from bemt.rotors import k1k2_fit as fit
 from bemt.rotors import k1k2_points as gather

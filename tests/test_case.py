@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import Fault, InputError
-from bemt.case import Case, find_cases, load_case
+from bemt.rotors.case import Case, find_cases, load_case
 
 MALFORMED = Path(__file__).parent / "malformed"
 CASES = Path(__file__).resolve().parents[1] / "cases"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.commands.cli import main
+from bemt.rotors.case import load_case
 
 VALUES = [
     "1e308", "-1e308", "1" + "0" * 320, "nan", "inf", "-inf", "0", "-1", "1e-320", "true", '"x"', "[]", "{}", "[[1]]",

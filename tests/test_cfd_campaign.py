@@ -19,17 +19,17 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.cfd.balance import BALANCE_LIMIT, balance_of
-from bemt.cfd.campaign import run_campaign
-from bemt.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
-from bemt.cfd.schema import load_campaign
-from bemt.cfd.start import StartField, splice
-from bemt.cfd.summary import _Bemt, summary
-from bemt.cfd.worker import point_key, radial_of
-from bemt.commands.cli import main
-from bemt.exports.openfoam.write import settings_of
-from bemt.recordings.cfd_setup import GRID_FLOOR
+from bemt.data.recordings.cfd_setup import GRID_FLOOR
+from bemt.tools.cfd.balance import BALANCE_LIMIT, balance_of
+from bemt.tools.cfd.campaign import run_campaign
+from bemt.tools.cfd.openfoam.write import settings_of
+from bemt.tools.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
+from bemt.tools.cfd.schema import load_campaign
+from bemt.tools.cfd.start import StartField, splice
+from bemt.tools.cfd.summary import _Bemt, summary
+from bemt.tools.cfd.worker import point_key, radial_of
 
 pytestmark = pytest.mark.usefixtures("equal_solids_once")
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from bemt.base.averaging import keep_last, relation, revolution_average, steady_average, time_steps
 from bemt.base.errors import InputError
-from bemt.recordings import audit as au
-from bemt.recordings.audit import STATUSES, AuditLine, CfdFacts, audit, combined
-from bemt.recordings.audit_remarks import audit_rows, facts_from_remark
-from bemt.recordings.grid_study import grid_study, ratios
+from bemt.data.recordings import audit as au
+from bemt.data.recordings.audit import STATUSES, AuditLine, CfdFacts, audit, combined
+from bemt.data.recordings.audit_remarks import audit_rows, facts_from_remark
+from bemt.data.recordings.grid_study import grid_study, ratios
 
 
 @settings(max_examples=60, deadline=None)

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.readers.cfd_run import RunToml, toml_text
-from bemt.recordings.cfd_run import assemble
-from bemt.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
+from bemt.data.readers.cfd_run import RunToml, toml_text
+from bemt.data.recordings.cfd_run import assemble
+from bemt.data.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
 
 T, Q, RPM = 3.8, 0.062, 8000.0
 """Thrust [N], torque [N m] and speed of every run made here."""
@@ -197,7 +197,7 @@ def test_every_program_becomes_the_same_run(
 
 
 def load_run(path: str) -> Any:
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     return import_file(path)
 
@@ -504,7 +504,7 @@ def test_one_point_stands_beside_bemt_on_one_screen(
         assert load["u_both"] == pytest.approx(math.hypot(load["u_cfd"], load["u_bemt"]))
     assert {"grid study", "domain against disk"} <= {line["topic"] for line in found["audit"]}
     assert Path("out/recording.png").read_bytes().startswith(b"\x89PNG")
-    from bemt.compare import one_run
+    from bemt.judge.compare import one_run
 
     screen = one_run.text(found)
     assert len(screen.splitlines()) <= 40 and max(map(len, screen.splitlines())) <= 120

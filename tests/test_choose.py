@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.design import choose
-from bemt.design.answer import best_of_each, front
-from bemt.design.motors_file import KnownMotor, read_motors
-from bemt.drive import drive_result
+from bemt.tools.design import choose
+from bemt.tools.design.answer import best_of_each, front
+from bemt.tools.design.motors_file import KnownMotor, read_motors
+from bemt.tools.drive import drive_result
 
 FEW = ("9x6", "10x4.5", "11x5.5", "10x7")
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from bemt import __version__
+from bemt.app.commands import cli
 from bemt.base.errors import Fault, InputError
-from bemt.commands import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 MALFORMED = ROOT / "tests" / "malformed"
@@ -43,7 +43,7 @@ def test_help_is_fast_and_names_every_command() -> None:
 
 
 def test_importing_the_command_line_imports_nothing_heavy() -> None:
-    code = "import sys, bemt.commands.cli; bemt.commands.cli.build_parser(); print(*sorted(sys.modules))"
+    code = "import sys, bemt.app.commands.cli; bemt.app.commands.cli.build_parser(); print(*sorted(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     assert not loaded & {
@@ -143,7 +143,7 @@ def test_trouble_with_files_is_an_input_fault(
     def full(_: object) -> int:
         raise OSError(28, "No space left on device", "out/table.txt")
 
-    monkeypatch.setattr(f"bemt.commands.{command[0]}.run", full)
+    monkeypatch.setattr(f"bemt.app.commands.{command[0]}.run", full)
     assert cli.main(command) == 2
     assert capsys.readouterr().err == (
         "out/table.txt: got No space left on device; expected a file or folder that can be used.\n"
@@ -175,7 +175,7 @@ def test_a_library_that_fails_is_no_fault_of_the_input(
     def broken(_: object) -> int:
         raise OSError("libGL.so.1: cannot open shared object file")
 
-    monkeypatch.setattr("bemt.commands.validate.run", broken)
+    monkeypatch.setattr("bemt.app.commands.validate.run", broken)
     assert cli.main(["validate", "x"]) == 3
     assert "libGL.so.1: cannot open shared object file" in capsys.readouterr().err
 
@@ -211,7 +211,7 @@ def test_exit_code_follows_the_outcome(
             raise outcome
         return outcome
 
-    monkeypatch.setattr("bemt.commands.effects.run", run)
+    monkeypatch.setattr("bemt.app.commands.effects.run", run)
     assert cli.main(["effects"]) == code
     shown = capsys.readouterr()
     assert words in shown.err and shown.out == ""
@@ -259,7 +259,7 @@ def test_a_file_for_a_folder_is_refused_before_any_work(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(f"bemt.commands.{arguments[0]}.run", lambda args: begun.append(args.command))
+    monkeypatch.setattr(f"bemt.app.commands.{arguments[0]}.run", lambda args: begun.append(args.command))
     file = tmp_path / "file"
     file.write_text("")
     assert cli.main([*arguments, f"{file}{below}"]) == 2

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 import bemt
-from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.bem import coaxial, solver
-from bemt.bem import model as bem
-from bemt.bem.coaxial import Pair
-from bemt.case.load import with_changes
-from bemt.case.propagate import prepared
-from bemt.effects import standard, without
-from bemt.effects.coaxial_neighbour import CoaxialNeighbour
-from bemt.sections.polars import linear_polar
-from bemt.vortex_cylinder import ahead
-from bemt.wake import contracted
+from bemt.physics.air import Air
+from bemt.physics.bem import coaxial, solver
+from bemt.physics.bem import model as bem
+from bemt.physics.bem.coaxial import Pair
+from bemt.physics.effects import standard, without
+from bemt.physics.effects.coaxial_neighbour import CoaxialNeighbour
+from bemt.physics.sections.polars import linear_polar
+from bemt.physics.vortex_cylinder import ahead
+from bemt.physics.wake import contracted
+from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.propagate import prepared
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -40,7 +40,7 @@ def ideal(pitch: float = 0.08, chord: float = 0.03, R: float = 0.5) -> solver.Pr
     return solver.prepare(Rotor(blade, 2), [(0.75, linear_polar(SLOPE))], (), n_stations=120)
 
 
-def usual(pitch_in: float = 5.0, effects: tuple[bemt.effects.Effect, ...] | None = None) -> solver.Prepared:
+def usual(pitch_in: float = 5.0, effects: tuple[bemt.physics.effects.Effect, ...] | None = None) -> solver.Prepared:
     rotor = Rotor(helix(10 * 0.0254, pitch_in * 0.0254), 2)
     return solver.prepare(rotor, [(0.75, linear_polar(cd=0.012))], standard() if effects is None else effects)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt import coefficients as co
+from bemt.physics import coefficients as co
 
 positive = st.floats(1e-3, 1e3)
 signed = st.floats(-1e3, 1e3)

@@ -16,20 +16,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.compare.change_document import document
-from bemt.compare.contrast_figure import picture
-from bemt.compare.contrast_text import text
-from bemt.compare.drive_laws import LAWS
-from bemt.compare.recordings import RunChange
-from bemt.compare.stand_run import StandRun, stand_run
-from bemt.dataset import Dataset
-from bemt.diagnose.by_laws import changed
-from bemt.diagnose.contrast import compare
-from bemt.diagnose.law_rotor import CoefficientCurve
-from bemt.effects import catalogue
-from bemt.recordings.load import import_file
+from bemt.data.recordings.load import import_file
+from bemt.judge.compare.change_document import document
+from bemt.judge.compare.contrast_figure import picture
+from bemt.judge.compare.contrast_text import text
+from bemt.judge.compare.drive_laws import LAWS
+from bemt.judge.compare.recordings import RunChange
+from bemt.judge.compare.stand_run import StandRun, stand_run
+from bemt.judge.diagnose.by_laws import changed
+from bemt.judge.diagnose.contrast import compare
+from bemt.judge.diagnose.law_rotor import CoefficientCurve
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects import catalogue
 
 Array = NDArray[np.float64]
 D = 0.254

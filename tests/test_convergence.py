@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow
-from bemt.sections.polars import Polar, linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.sections.polars import Polar, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

@@ -1,4 +1,4 @@
-"""The promise of bemt.dataset: one currency, validated on entry, exact round trips, unknown stays unknown."""
+"""The promise of bemt.physics.dataset: one currency, validated on entry, exact round trips, unknown stays unknown."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import coefficients as co
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset, concat, from_pandas
+from bemt.physics import coefficients as co
+from bemt.physics.dataset import Dataset, concat, from_pandas
 
 
 def stand(**kwargs: object) -> Dataset:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import bemt
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.commands.cli import main
-from bemt.design import design_answer
-from bemt.design.best_label import standard
-from bemt.design.optimise import optimise
-from bemt.design.requirement import DesignPoint, point_of
-from bemt.design.shape import CONTROLS
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.tools.design import design_answer
+from bemt.tools.design.best_label import standard
+from bemt.tools.design.optimise import optimise
+from bemt.tools.design.requirement import DesignPoint, point_of
+from bemt.tools.design.shape import CONTROLS
 
 T, V, RPM, D_IN = 6.0, 15.0, 7000.0, 10.0
 

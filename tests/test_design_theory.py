@@ -7,21 +7,21 @@ import math
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import gradient
-from bemt.bem.model import Model
-from bemt.bem.solver import solve
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.design import optimise as search
-from bemt.design.materials import MATERIALS, SectionStrength, stress
-from bemt.design.minimum_loss import actuator_disk, minimum_loss, without_drag
-from bemt.design.problem import _CL, _W, BladeProblem
-from bemt.design.requirement import DesignPoint, required
-from bemt.design.shape import CONTROLS
-from bemt.effects import from_text
-from bemt.effects.tip_loss import TipLoss
-from bemt.sections.polars import linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import gradient
+from bemt.physics.bem.model import Model
+from bemt.physics.bem.solver import solve
+from bemt.physics.effects import from_text
+from bemt.physics.effects.tip_loss import TipLoss
+from bemt.physics.sections.polars import linear_polar
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.tools.design import optimise as search
+from bemt.tools.design.materials import MATERIALS, SectionStrength, stress
+from bemt.tools.design.minimum_loss import actuator_disk, minimum_loss, without_drag
+from bemt.tools.design.problem import _CL, _W, BladeProblem
+from bemt.tools.design.requirement import DesignPoint, required
+from bemt.tools.design.shape import CONTROLS
 from geometry.airfoil import naca
 from geometry.laws import from_laws
 from geometry.rotor import Rotor
@@ -200,7 +200,7 @@ def test_the_solvers_optimum_without_drag_is_that_of_betz(B: int, monkeypatch: p
 def _open_problem() -> tuple[BladeProblem, np.ndarray]:
     R = 0.127
     blade = from_laws(2 * R, pitch={"pitch": 0.17}, anchors=naca("4412"))
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
     model = Model(Rotor(blade, 2), [(0.75, neuralfoil_polar(naca("4412")))])
     points = [DesignPoint(6.0, 20.0), DesignPoint(8.0, 5.0, 9000.0)]

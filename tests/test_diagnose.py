@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt import effects
-from bemt.dataset import Dataset
-from bemt.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
-from bemt.diagnose.explanation import UNKNOWN
+from bemt.judge.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
+from bemt.judge.diagnose.explanation import UNKNOWN
+from bemt.physics import effects
+from bemt.physics.dataset import Dataset
 
 GRID = points("grid")
 

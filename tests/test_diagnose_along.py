@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.model import Model
-from bemt.case import Case, load_case
-from bemt.case.prepare import prepare_case
-from bemt.cfd.schema import load_campaign
-from bemt.diagnose.along_blade import EXPLAINED, BladeLoads, along, compare_along, read_blade_loads
+from bemt.judge.diagnose.along_blade import EXPLAINED, BladeLoads, along, compare_along, read_blade_loads
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.model import Model
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.tools.cfd.schema import load_campaign
 
 AIR = Air.from_density(1.225)
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import EXIT_OK
-from bemt.commands.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
 D = 0.254

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.case import Case, load_case
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, document, record
-from bemt.diagnose.answer import Diagnosis
-from bemt.diagnose.record import Record
+from bemt.judge.diagnose import chain, document, record
+from bemt.judge.diagnose.answer import Diagnosis
+from bemt.judge.diagnose.record import Record
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import Case, load_case
 
 pytestmark = pytest.mark.slow
 

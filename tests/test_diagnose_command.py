@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
+from bemt.app.commands.cli import build_parser, main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.commands.cli import build_parser, main
-from bemt.dataset import Dataset
-from bemt.diagnose import assemble, chain, document, record
-from bemt.diagnose.load import load
+from bemt.judge.diagnose import assemble, chain, document, record
+from bemt.judge.diagnose.load import load
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 
 def _recorded(path: Path, noise_seed: int) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from diagnosing import case, points, recording
 
-from bemt.diagnose import chain
-from bemt.diagnose.record import Record, from_series
+from bemt.judge.diagnose import chain
+from bemt.judge.diagnose.record import Record, from_series
 
 
 def run(seed: int, factor: float = 1.0, bow: float = 0.0) -> Record:

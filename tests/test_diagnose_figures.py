@@ -13,11 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from bemt.base import canvas
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, confusion, figures, figures_effects, fit, record
-from bemt.diagnose.explanation import NONE, Explanation
+from bemt.judge.diagnose import chain, confusion, figures, figures_effects, fit, record
+from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 ALL = set(figures.NAMES)
 LEFT_OUT = "compressibility"

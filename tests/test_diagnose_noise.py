@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from diagnosing import case, left_out, points, recording
 
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, noise
-from bemt.diagnose.assemble import build
-from bemt.diagnose.load import load
-from bemt.diagnose.record import from_series
-from bemt.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
-from bemt.effects.ground_effect import GroundEffect
-from bemt.gaussian.whitening import conditional, whitener
+from bemt.base.gaussian.whitening import conditional, whitener
+from bemt.judge.diagnose import chain, noise
+from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.load import load
+from bemt.judge.diagnose.record import from_series
+from bemt.judge.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects.ground_effect import GroundEffect
 from bemt.rotors.latents import AsBuilt
 
 

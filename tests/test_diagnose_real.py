@@ -14,13 +14,13 @@ import pytest
 from diagnosing import left_out
 from duct_fans import DUCT_76, FAN_76
 
-from bemt.case import Case, load_case
-from bemt.case.unknowns import section_of
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, document, record
-from bemt.diagnose.load import load
-from bemt.readers._uiuc_names import class_of
-from bemt.sections import rule as section_rule
+from bemt.data.readers._uiuc_names import class_of
+from bemt.judge.diagnose import chain, document, record
+from bemt.judge.diagnose.load import load
+from bemt.physics.dataset import Dataset
+from bemt.physics.sections import rule as section_rule
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.unknowns import section_of
 
 pytestmark = pytest.mark.slow
 
@@ -140,7 +140,7 @@ def test_the_duct_of_a_76_mm_fan_is_named_whatever_pitch_is_guessed(
 def test_the_density_of_four_kilometres_is_first_a_rotor_that_is_not_the_case_s(
     shared_data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, altitude: int, density: float
 ) -> None:
-    from bemt.proof.real import draw_real
+    from bemt.judge.proof.real import draw_real
 
     monkeypatch.setenv("BEMT_DATA", str(shared_data))
     items = draw_real(np.random.default_rng(0))

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt import effects
-from bemt.bem import model as bem
-from bemt.case import Case
-from bemt.dataset import Dataset
-from bemt.diagnose import assemble, document, evidence, gate, plan, record, rules, signatures, verdict
-from bemt.diagnose.signatures import effect_of
-from bemt.effects.base import Reading
+from bemt.judge.diagnose import assemble, document, evidence, gate, plan, record, rules, signatures, verdict
+from bemt.judge.diagnose.signatures import effect_of
+from bemt.physics import effects
+from bemt.physics.bem import model as bem
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects.base import Reading
+from bemt.rotors.case import Case
 
 pytestmark = pytest.mark.slow
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
-from bemt.case import load_case
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, wrong_rotor_check
-from bemt.diagnose.assemble import build
-from bemt.diagnose.load import load
-from bemt.diagnose.record import from_series
+from bemt.judge.diagnose import chain, wrong_rotor_check
+from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.load import load
+from bemt.judge.diagnose.record import from_series
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import load_case
 
 
 def slipped(what: str) -> Dataset:

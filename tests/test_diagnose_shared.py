@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from diagnosing import case, left_out, points, recording
 
-from bemt.case import Case
-from bemt.dataset import Dataset
-from bemt.diagnose import chain, document
-from bemt.diagnose.answer import Diagnosis
-from bemt.diagnose.assemble import build
-from bemt.diagnose.record import from_series
-from bemt.effects.base import Effect
-from bemt.effects.gain import ThrustGain
+from bemt.judge.diagnose import chain, document
+from bemt.judge.diagnose.answer import Diagnosis
+from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.record import from_series
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects.base import Effect
+from bemt.physics.effects.gain import ThrustGain
+from bemt.rotors.case import Case
 
 LACKS = left_out("compressibility", case())
 TRIED = ("compressibility", "thrust_gain", "untwist", "section", "pitch_offset", "rpm_scale", "air_density")

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt import effects
-from bemt.bem import model as bem
-from bemt.diagnose import (
+from bemt.judge.diagnose import (
     blocks,
     chain,
     confusion,
@@ -26,10 +24,12 @@ from bemt.diagnose import (
     thresholds,
     verdict,
 )
-from bemt.diagnose.assemble import build
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.record import from_series
-from bemt.proof.intervals import calibrate
+from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.record import from_series
+from bemt.judge.proof.intervals import calibrate
+from bemt.physics import effects
+from bemt.physics.bem import model as bem
 
 
 @pytest.fixture(scope="module")

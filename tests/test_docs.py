@@ -26,14 +26,14 @@ from types import ModuleType
 import pytest
 
 import bemt
-from bemt.case.load import case_of
+from bemt.rotors.case.load import case_of
 
 PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
 # docstring does say must be right.
 FACE = (
-    "bemt|bemt.library.answers|bemt.library.rotors|bemt.dataset.make|bemt.dataset.points|bemt.effects.base|bemt.readers"
-    "|bemt.exports|bemt.base.errors"
+    "bemt|bemt.app.library.answers|bemt.app.library.rotors|bemt.physics.dataset.make|bemt.physics.dataset.points|bemt.physics.effects.base|bemt.data.readers"
+    "|bemt.tools.exports|bemt.base.errors"
 )
 # Types of numbers that have a dimension: float, array_like, (N,) float, tuple of float; not counts, masks or records.
 NUMERIC = re.compile(r"^(tuple of )?(\([^()]*\) )*(float|array_like|ndarray)\b(?! of (int|bool|str))")
@@ -136,7 +136,9 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
     assert not faults, "\n".join(faults)
 
 
-@pytest.mark.parametrize("module", ["bemt.library.answers", "bemt.library.rotors", "bemt.dataset.points"])
+@pytest.mark.parametrize(
+    "module", ["bemt.app.library.answers", "bemt.app.library.rotors", "bemt.physics.dataset"]
+)
 def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
     """Its own, or a line of its class's; pytest runs them."""
     without = []
@@ -215,7 +217,7 @@ def test_the_two_commands_are_those_that_ci_runs(project: Path) -> None:
 
 
 def test_the_commands_of_the_page_exist(project: Path) -> None:
-    from bemt.commands.cli import build_parser
+    from bemt.app.commands.cli import build_parser
 
     page = (project / "docs" / "command_line.md").read_text(encoding="utf-8")
     table = re.findall(r"^\| `bemt ([^`]+)` \| (.*) \|$", page, flags=re.MULTILINE)
@@ -239,7 +241,7 @@ def test_the_structure_names_every_room(project: Path) -> None:
 
 
 def test_the_readme_is_short_and_its_commands_exist(project: Path) -> None:
-    from bemt.commands.cli import build_parser
+    from bemt.app.commands.cli import build_parser
 
     readme = (project / "README.md").read_text(encoding="utf-8")
     assert len(readme.split()) <= 900
@@ -278,7 +280,7 @@ DOCUMENTS = sorted(path.name for path in (Path(__file__).parents[1] / "docs").gl
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_the_commands_of_the_documents_exist(project: Path, document: str) -> None:
-    from bemt.commands.cli import build_parser
+    from bemt.app.commands.cli import build_parser
 
     for line in shell_commands((project / "docs" / document).read_text(encoding="utf-8")):
         if found := re.match(r"(?:.* -m )?bemt (.*)", line.rpartition("&& ")[2]):
@@ -289,8 +291,10 @@ def test_the_commands_of_the_documents_exist(project: Path, document: str) -> No
 @pytest.fixture
 def pages(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with the cases, whose plug-ins are scanned like the project's own."""
-    from bemt import commands, effects, exports
-    from bemt import readers as importers
+    from bemt.app import commands
+    from bemt.data import readers as importers
+    from bemt.physics import effects
+    from bemt.tools import exports
 
     shutil.copytree(project / "cases", tmp_path / "cases")
     monkeypatch.chdir(tmp_path)
@@ -332,8 +336,8 @@ def maker(project: Path) -> ModuleType:
 
 
 def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:
-    from bemt.diagnose import confusion, document, form, gate, plan, prior, thresholds
-    from bemt.diagnose.explanation import Explanation
+    from bemt.judge.diagnose import confusion, document, form, gate, plan, prior, thresholds
+    from bemt.judge.diagnose.explanation import Explanation
 
     text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
     assert maker.numbers(text) == text, "run python docs/make.py"
@@ -402,8 +406,8 @@ def test_the_changelog_speaks_of_this_version(project: Path) -> None:
 
 
 def test_the_picture_shows_today_s_numbers(project: Path, maker: ModuleType) -> None:
-    from bemt.case import load_case
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case import load_case
+    from bemt.rotors.case.prepare import prepare_case
 
     text = png_text((project / "docs" / "img" / "overview.png").read_bytes())
     drawn = json.loads(text["bemt"])["thrust_N"]

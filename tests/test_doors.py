@@ -13,21 +13,21 @@ import pytest
 
 import bemt
 from bemt.base.errors import InputError
-from bemt.case import Case, load_case
-from bemt.case.estimate import document as estimate
-from bemt.case.prepare import k1k2_case
-from bemt.case.propagate import propagate
-from bemt.compare.one_run import compare_run
-from bemt.dataset import Dataset
-from bemt.diagnose import assemble, record
-from bemt.drive import drive_result
-from bemt.drive.drive_result import solve as solve_drive
-from bemt.exports.base import Job
-from bemt.exports.openfoam.write import Run, settings_of
-from bemt.exports.performance import band_of, performance_of
-from bemt.report import curves
-from bemt.sweep.case import solve_case
-from bemt.sweep.grid.run import Grid, GridSolver
+from bemt.judge.compare.one_run import compare_run
+from bemt.judge.diagnose import assemble, record
+from bemt.physics.dataset import Dataset
+from bemt.results.report import curves
+from bemt.results.sweep.case import solve_case
+from bemt.results.sweep.grid.run import Grid, GridSolver
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.estimate import document as estimate
+from bemt.rotors.case.prepare import k1k2_case
+from bemt.rotors.case.propagate import propagate
+from bemt.tools.cfd.openfoam.write import Run, settings_of
+from bemt.tools.drive import drive_result
+from bemt.tools.drive.drive_result import solve as solve_drive
+from bemt.tools.exports.base import Job
+from bemt.tools.exports.performance import band_of, performance_of
 
 LABEL, ROOT = "10x5", Path(__file__).resolve().parents[1]
 RPM, V = (6000.0, 6000.0, 100.0, 15000.0), (0.0, 8.0, 30.0, 5.0)

@@ -14,12 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import readers as importers
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.dataset import Dataset
-from bemt.drive import bench_map, map_export, map_scatter
-from bemt.drive.map_points import join, map_points, points
+from bemt.data import readers as importers
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import bench_map, map_export, map_scatter
+from bemt.tools.drive.map_points import join, map_points, points
 
 
 def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> Dataset:

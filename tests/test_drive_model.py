@@ -14,14 +14,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bemt import effects
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.commands.cli import main
-from bemt.drive import drive_result, mission, rotor_table, transient
-from bemt.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
-from bemt.drive.map_points import map_points
-from bemt.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
+from bemt.physics import effects
+from bemt.rotors.case import load_case
+from bemt.tools.drive import drive_result, mission, rotor_table, transient
+from bemt.tools.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
+from bemt.tools.drive.map_points import map_points
+from bemt.tools.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
 
 FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)
@@ -228,7 +228,7 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
 
 
 def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm = np.array([4000.0, 9000.0, 20000.0])

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.drive import motor_constant as mc
-from bemt.drive import motor_errors, motor_file, motor_generate, picture
+from bemt.tools.drive import motor_constant as mc
+from bemt.tools.drive import motor_errors, motor_file, motor_generate, picture
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 

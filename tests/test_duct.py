@@ -22,16 +22,16 @@ import duct_fans as fans
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import duct as duct_model
-from bemt.bem import solver
-from bemt.bem.duct_stream import Stream, jet_area
-from bemt.bem.model import Model, flow_of, respond
-from bemt.case import load_case
-from bemt.case.prepare import duct_unknowns, prepare_case
-from bemt.case.propagate import propagate
-from bemt.effects.oblique_inflow import ObliqueInflow
-from bemt.effects.tip_gap import TipGap
+from bemt.physics.air import Air
+from bemt.physics.bem import duct as duct_model
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct_stream import Stream, jet_area
+from bemt.physics.bem.model import Model, flow_of, respond
+from bemt.physics.effects.oblique_inflow import ObliqueInflow
+from bemt.physics.effects.tip_gap import TipGap
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import duct_unknowns, prepare_case
+from bemt.rotors.case.propagate import propagate
 from geometry.duct import Duct
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -15,20 +15,20 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from bemt import effects
-from bemt.air import Air
+from bemt.app.commands import cli
 from bemt.base.errors import InputError
-from bemt.bem import duct as duct_model
-from bemt.bem import kernel as K
-from bemt.bem import model as bem
-from bemt.bem import solver
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.commands import cli
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, RotorBuild
-from bemt.report import effects_list
-from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.sections.polars import Polar
+from bemt.physics import effects
+from bemt.physics.air import Air
+from bemt.physics.bem import duct as duct_model
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import model as bem
+from bemt.physics.bem import solver
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading, RotorBuild
+from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+from bemt.physics.sections.polars import Polar
+from bemt.results.report import effects_list
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 from geometry.airfoil import naca4
 from geometry.duct import Stator, around
 from geometry.laws import helix
@@ -356,7 +356,7 @@ def test_a_mistyped_kernel_number_is_refused() -> None:
 NEW = '''
 from dataclasses import dataclass
 
-from bemt.effects.base import RotorBuild, Effect, Parameter
+from bemt.physics.effects.base import RotorBuild, Effect, Parameter
 
 
 @dataclass(frozen=True)
@@ -376,14 +376,14 @@ class {cls}(Effect):
 
 @pytest.fixture
 def extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A second folder of the package bemt.effects."""
+    """A second folder of the package bemt.physics.effects."""
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
     effects.catalogue.cache_clear()
     yield tmp_path
     monkeypatch.undo()
     effects.catalogue.cache_clear()
     for path in tmp_path.glob("*.py"):
-        sys.modules.pop(f"bemt.effects.{path.stem}", None)
+        sys.modules.pop(f"bemt.physics.effects.{path.stem}", None)
 
 
 def test_a_new_effect_is_one_new_file(extra: Path) -> None:
@@ -427,7 +427,7 @@ def test_two_effects_of_one_id_are_refused(extra: Path) -> None:
 DECLARED = '''
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Flow, Parameter, Reading
+from bemt.physics.effects.base import Effect, Flow, Parameter, Reading
 
 
 @dataclass(frozen=True)
@@ -466,7 +466,7 @@ def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     monkeypatch.undo()
     effects.catalogue.cache_clear()
-    sys.modules.pop("bemt.effects.made_up", None)
+    sys.modules.pop("bemt.physics.effects.made_up", None)
 
 
 def printed(capsys: pytest.CaptureFixture[str], *options: str) -> str:

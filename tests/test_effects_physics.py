@@ -9,41 +9,41 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemt import effects
-from bemt.air import Air
-from bemt.bem import model as bem
-from bemt.bem import solver
-from bemt.effects import compressibility, drag_divergence, stall_delay
-from bemt.effects.air_density import AirDensity
-from bemt.effects.airspeed_offset import AirspeedOffset
-from bemt.effects.base import Effect, Flow, Loads, Reading
-from bemt.effects.battery_sag import BatterySag
-from bemt.effects.compressibility import Compressibility
-from bemt.effects.cross_talk import CrossTalk
-from bemt.effects.drag_divergence import DragDivergence
-from bemt.effects.drift import ThrustDrift
-from bemt.effects.gain import ThrustGain
-from bemt.effects.ground_effect import FORMS, GroundEffect
-from bemt.effects.inflow_lag import InflowLag
-from bemt.effects.lip_separation import LipSeparation
-from bemt.effects.motor_heating import MotorHeating
-from bemt.effects.nacelle import Nacelle
-from bemt.effects.oblique_inflow import ObliqueInflow
-from bemt.effects.pitch_offset import PitchOffset
-from bemt.effects.post_stall import PostStall
-from bemt.effects.recirculation import Recirculation
-from bemt.effects.rotor_inertia import RotorInertia, slope
-from bemt.effects.rpm_scale import RpmScale
-from bemt.effects.section import Section
-from bemt.effects.stall_delay import StallDelay
-from bemt.effects.supply_voltage import SupplyVoltage
-from bemt.effects.tip_gap import TipGap
-from bemt.effects.tunnel_blockage import TunnelBlockage
-from bemt.effects.unit_slip import UnitSlip
-from bemt.effects.untwist import Untwist
-from bemt.effects.zero import ThrustZero
-from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.sections.polars import ALPHA_GRID, Polar, linear_polar
+from bemt.physics import effects
+from bemt.physics.air import Air
+from bemt.physics.bem import model as bem
+from bemt.physics.bem import solver
+from bemt.physics.effects import compressibility, drag_divergence, stall_delay
+from bemt.physics.effects.air_density import AirDensity
+from bemt.physics.effects.airspeed_offset import AirspeedOffset
+from bemt.physics.effects.base import Effect, Flow, Loads, Reading
+from bemt.physics.effects.battery_sag import BatterySag
+from bemt.physics.effects.compressibility import Compressibility
+from bemt.physics.effects.cross_talk import CrossTalk
+from bemt.physics.effects.drag_divergence import DragDivergence
+from bemt.physics.effects.drift import ThrustDrift
+from bemt.physics.effects.gain import ThrustGain
+from bemt.physics.effects.ground_effect import FORMS, GroundEffect
+from bemt.physics.effects.inflow_lag import InflowLag
+from bemt.physics.effects.lip_separation import LipSeparation
+from bemt.physics.effects.motor_heating import MotorHeating
+from bemt.physics.effects.nacelle import Nacelle
+from bemt.physics.effects.oblique_inflow import ObliqueInflow
+from bemt.physics.effects.pitch_offset import PitchOffset
+from bemt.physics.effects.post_stall import PostStall
+from bemt.physics.effects.recirculation import Recirculation
+from bemt.physics.effects.rotor_inertia import RotorInertia, slope
+from bemt.physics.effects.rpm_scale import RpmScale
+from bemt.physics.effects.section import Section
+from bemt.physics.effects.stall_delay import StallDelay
+from bemt.physics.effects.supply_voltage import SupplyVoltage
+from bemt.physics.effects.tip_gap import TipGap
+from bemt.physics.effects.tunnel_blockage import TunnelBlockage
+from bemt.physics.effects.unit_slip import UnitSlip
+from bemt.physics.effects.untwist import Untwist
+from bemt.physics.effects.zero import ThrustZero
+from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+from bemt.physics.sections.polars import ALPHA_GRID, Polar, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 
@@ -630,8 +630,8 @@ def test_a_supply_obeys_its_voltage_balance(change: float) -> None:
 
 
 def test_a_wider_gap_costs_what_the_gap_of_another_case_costs() -> None:
-    from bemt.case import load_case
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case import load_case
+    from bemt.rotors.case.prepare import prepare_case
 
     def thrust(changed: dict[str, object]) -> float:
         case = load_case("cases/ds30/case.toml").replaced(changed)

@@ -8,9 +8,9 @@ import thesis as th
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.rotors import k1k2 as k
+from bemt.physics import k1k2 as k
+from bemt.physics.air import Air
 
 INCH, KGF = 0.0254, 9.80665
 lengths = st.floats(0.02, 3.0)

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 import bemt
-from bemt.air import Air
+from bemt.app.commands import cli
 from bemt.base.units import INCH
-from bemt.commands import cli
-from bemt.rotors import k1k2
+from bemt.physics import k1k2
+from bemt.physics.air import Air
 
 
 def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:

@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
-from bemt.case import Case, load_case
-from bemt.commands.cli import main
-from bemt.exports import exports, target_ids
-from bemt.exports.base import FEATURES, Files, Job, LoadsExport
-from bemt.exports.folder import export_case
-from bemt.exports.manifest import entry
-from bemt.exports.openfoam.write import Run, settings_of
-from bemt.exports.performance import solve_points
+from bemt.rotors.case import Case, load_case
+from bemt.tools.cfd.openfoam.write import Run, settings_of
+from bemt.tools.exports import exports, target_ids
+from bemt.tools.exports.base import FEATURES, Files, Job, LoadsExport
+from bemt.tools.exports.folder import export_case
+from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.performance import solve_points
 from geometry import export as module
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
@@ -396,7 +396,7 @@ def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job
 
 def test_px4_commands_what_its_simulator_gives(project: Path, job: Job) -> None:
     """The controller inverts THR_MDL_FAC, the simulated rotor gives T_MAX u: together, the thrust asked for."""
-    from bemt.exports.px4 import parameters
+    from bemt.tools.exports.px4 import parameters
 
     files = written("px4", job)
     sih, vehicle = (parameters(str(next(t for n, t in files.items() if n.endswith(end))))
@@ -428,7 +428,7 @@ def test_dfdc_gets_what_its_arrays_take_and_the_section_alone(fan: Job) -> None:
     assert 10 <= int(lines[rotor + 4][0]) <= 30
     first = next(k for k, line in enumerate(lines) if line[:2] == ["!", "Xisection"])
     zero, slope = (float(word) for word in lines[first + 3][:2])
-    from bemt.exports.blades import anchors_of
+    from bemt.tools.exports.blades import anchors_of
 
     ((_, polar, Re),) = anchors_of(fan)
     assert slope == pytest.approx(polar.cl_alpha(Re), rel=0.11) and slope < 1.2 * 2.0 * np.pi
@@ -538,7 +538,7 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
 
 def test_dfdc_puts_the_rotor_where_the_case_has_it(fan: Job, tmp_path: Path) -> None:
     """Behind the lip, wherever the origin of the file lies; a third of the length unless the case says more."""
-    from bemt.readers import dfdc
+    from bemt.data.readers import dfdc
 
     for stated, x in ((None, 20.0), (25.0, 25.0)):
         case = fan.case if stated is None else fan.case.replaced({"duct.rotor_position_mm": stated})

@@ -12,11 +12,11 @@ import pytest
 
 from bemt.base.toml import FieldLimits, Table, limits_of, validated
 from bemt.base.toml_text import Collector
-from bemt.case.schema import CaseFile
-from bemt.cfd.schema import CampaignFile
-from bemt.drive.motor_file import MotorToml
-from bemt.drive.thrusters_result import ThrustersFile
-from bemt.readers.recording_toml import RecordingToml
+from bemt.data.readers.recording_toml import RecordingToml
+from bemt.rotors.case.schema import CaseFile
+from bemt.tools.cfd.schema import CampaignFile
+from bemt.tools.drive.motor_file import MotorToml
+from bemt.tools.drive.thrusters_result import ThrustersFile
 
 MODELS: dict[str, type[Table]] = {
     "campaign": CampaignFile,

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import Case, load_case
-from bemt.case.propagate import propagate
-from bemt.commands.cli import main
-from bemt.compare.first_picture import against_band
-from bemt.dataset import Dataset
+from bemt.judge.compare.first_picture import against_band
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import Case, load_case
+from bemt.rotors.case.propagate import propagate
 
 
 @pytest.fixture(scope="module")

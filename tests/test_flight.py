@@ -14,25 +14,25 @@ import numpy as np
 import pytest
 from flight_files import broken_copies
 
+from bemt.app.commands.cli import main
+from bemt.app.library.rotors import rotor_of
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.commands.cli import main
-from bemt.diagnose.rule import decide
-from bemt.flight.answer import FlightAnswer, answer_on
-from bemt.flight.balance import axes_of, blade, features
-from bemt.flight.change import change_in
-from bemt.flight.identify import identify
-from bemt.flight.inflow import inflow
-from bemt.flight.judge import judge, weighed
-from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
-from bemt.flight.log import FlightLog
-from bemt.flight.mass import mass_faults
-from bemt.flight.picture import flight_picture
-from bemt.flight.read import read_log
-from bemt.flight.rules import BUILD, RULES
-from bemt.flight.simulator import motor_lag, simulator_constants
-from bemt.flight.wind import wind
-from bemt.library.rotors import rotor_of
+from bemt.judge.diagnose.rule import decide
+from bemt.rotors.case import load_case
+from bemt.tools.flight.answer import FlightAnswer, answer_on
+from bemt.tools.flight.balance import axes_of, blade, features
+from bemt.tools.flight.change import change_in
+from bemt.tools.flight.identify import identify
+from bemt.tools.flight.inflow import inflow
+from bemt.tools.flight.judge import judge, weighed
+from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.mass import mass_faults
+from bemt.tools.flight.picture import flight_picture
+from bemt.tools.flight.read import read_log
+from bemt.tools.flight.rules import BUILD, RULES
+from bemt.tools.flight.simulator import motor_lag, simulator_constants
+from bemt.tools.flight.wind import wind
 
 
 @pytest.fixture(scope="module")

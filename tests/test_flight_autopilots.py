@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from flight_files import Hover, broken_copies, dataflash, ulog
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.flight import log as flight_log
-from bemt.flight import px4
-from bemt.flight.answer import FlightAnswer, answer_on
-from bemt.flight.change import change_in
-from bemt.flight.inflow import inflow
-from bemt.flight.judge import judge
-from bemt.flight.layout import LAYOUTS, effect_matrix, layout_of
-from bemt.flight.log import FlightLog
-from bemt.flight.motor_speed import speed_changes
-from bemt.flight.read import read_log
+from bemt.tools.flight import log as flight_log
+from bemt.tools.flight import px4
+from bemt.tools.flight.answer import FlightAnswer, answer_on
+from bemt.tools.flight.change import change_in
+from bemt.tools.flight.inflow import inflow
+from bemt.tools.flight.judge import judge
+from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.motor_speed import speed_changes
+from bemt.tools.flight.read import read_log
 
 pytest.importorskip("pyulog")
 pytest.importorskip("pymavlink")
@@ -187,7 +187,7 @@ def test_a_long_log_keeps_its_stretches(tmp_path: Path, monkeypatch: pytest.Monk
     flight = Hover(seconds=60.0, unbalanced=(1, 2.0))
     whole = {k: read(tmp_path, k, flight, **m) for k, m in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True}))}
     monkeypatch.setattr(flight_log, "DENSE", 50_000)
-    monkeypatch.setattr("bemt.flight.ardupilot._CHUNK", 1 << 18)
+    monkeypatch.setattr("bemt.tools.flight.ardupilot._CHUNK", 1 << 18)
     monkeypatch.setattr(px4, "_LONG", 0)
     for kind, more in (("ardupilot", {"imu_hz": 1000.0}), ("px4", {"fifo": True})):
         thin, full = read(tmp_path, kind, flight, **more), whole[kind]

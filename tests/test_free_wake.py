@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numba import njit, prange
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.effects import standard
-from bemt.sections.polars import linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.effects import standard
+from bemt.physics.sections.polars import linear_polar
 from geometry.blade import from_stations
 from geometry.laws import chord_over_R
 from geometry.rotor import Rotor

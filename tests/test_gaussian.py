@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from bemt.gaussian.evidence import LinearTerms, log_sum, shares
-from bemt.gaussian.kernels import alike, modes, smooth
-from bemt.gaussian.reml import Restricted, contrasts
-from bemt.gaussian.whitening import conditional, leave_one_out, log_density, whitener
+from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
+from bemt.base.gaussian.kernels import alike, modes, smooth
+from bemt.base.gaussian.reml import Restricted, contrasts
+from bemt.base.gaussian.whitening import conditional, leave_one_out, log_density, whitener
 
 Array = np.ndarray
 

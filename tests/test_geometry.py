@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator  # type: ignore[import-untyped]
 
-from bemt.sections import rule as section_rule
+from bemt.physics.sections import rule as section_rule
 from geometry.airfoil import Airfoil, blend, naca, naca4, parse_dat, plate
 from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError, pchip

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.case import load_case
+from bemt.rotors.case import load_case
 from geometry.airfoil import naca4
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around

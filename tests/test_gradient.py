@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.bem import solver
-from bemt.bem.gradient import Gradient, gradient
-from bemt.bem.model import Model
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.effects import from_text
+from bemt.physics.bem import solver
+from bemt.physics.bem.gradient import Gradient, gradient
+from bemt.physics.bem.model import Model
+from bemt.physics.effects import from_text
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 STEP = 1e-6
 POINTS = (("prop_10x5", 12_000.0, 8.0), ("prop_14x8", 16_000.0, 0.0), ("ds30", 40_000.0, 20.0))
@@ -75,7 +75,7 @@ def test_effects_around_the_rotor_are_refused(project: Path) -> None:
 
 def test_openmdao_component(project: Path) -> None:
     om = pytest.importorskip("openmdao.api")
-    from bemt.bem.openmdao import rotor_component
+    from bemt.physics.bem.openmdao import rotor_component
 
     case = load_case(project / "cases/prop_10x5/case.toml")
     ready = prepare_case(case)

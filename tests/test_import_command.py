@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.commands.cli import main
-from bemt.recordings.choice import Choice
-from bemt.recordings.load import document, import_file
+from bemt.app.commands.cli import main
+from bemt.data.recordings.choice import Choice
+from bemt.data.recordings.load import document, import_file
 
 PERIOD = 0.5
 
@@ -194,7 +194,7 @@ def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[st
 def test_a_reader_that_fails_loses_its_own_file_only(
     put: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bemt.readers import fluent_report
+    from bemt.data.readers import fluent_report
 
     def broken(path: object) -> None:
         raise IndexError("list index out of range")

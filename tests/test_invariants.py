@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.effects import Effect, standard, without
-from bemt.sections.polars import Polar, linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.effects import Effect, standard, without
+from bemt.physics.sections.polars import Polar, linear_polar
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 from geometry.blade import Blade, from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -20,79 +20,102 @@ from pathlib import Path
 
 import pytest
 
-COMPILED = "bem.kernel|bem.residual|bem.vecmath"  # the only files with numba at the top
+COMPILED = "physics.bem.kernel|physics.bem.residual|physics.bem.vecmath"  # the only files with numba at the top
 
 # Rooms from the ground up. A module may import rooms further up this list and its own; nothing below it.
 # A room is patterns of module names below `bemt.` (`|` joins two); the first that matches holds.
 ROOMS: tuple[str, ...] = (
+    # base: knows no rotor
     "base|base.*",
-    "gaussian|gaussian.*",
-    "air",
-    "coefficients",
-    "vortex_cylinder",
-    "wake",
-    "dataset|dataset.*",
-    "sections|sections.*",
-    "effects|effects.*",
-    "bem|bem.*",
-    "rotors.k1k2",  # the law; its fit needs recordings
-    "readers|readers.*",
-    "recordings|recordings.*",
+    # physics
+    "physics.air",
+    "physics.coefficients",
+    "physics.vortex_cylinder",
+    "physics.wake",
+    "physics.dataset|physics.dataset.*",
+    "physics.sections|physics.sections.*",
+    "physics.effects|physics.effects.*",
+    "physics.bem|physics.bem.*",
+    "physics.k1k2",
+    "physics",
+    # data
+    "data.readers|data.readers.*",
+    "data.recordings|data.recordings.*",
+    "data",
     "rotors|rotors.*",
-    "case|case.*",
-    "drive|drive.*",
-    "design|design.*",
-    "sweep|sweep.*",
-    "validate|validate.*",
-    "compare|compare.*",
-    "diagnose|diagnose.*",
-    "proof|proof.*",
-    "flight|flight.*",
-    "exports|exports.*",
-    "cfd|cfd.*",
-    "report|report.*",
-    "library|library.*",
-    "commands|commands.*",
+    # judge
+    "judge.compare|judge.compare.*",
+    "judge.diagnose|judge.diagnose.*",
+    "judge.proof|judge.proof.*",
+    "judge",
+    # results
+    "results.sweep|results.sweep.*",
+    "results.report|results.report.*",
+    "results",
+    "tools|tools.*",
+    # app
+    "app.library|app.library.*",
+    "app.commands|app.commands.*",
+    "app",
     "__main__",
 )
+# A tool imports no other tool, and nothing else imports a tool: they are found by scanning. An export target that
+# belongs to a tool follows the contract of exports, which alone asks for it.
+TOOL = re.compile(r"bemt\.tools\.(\w+)")
+CONTRACTS = {("bemt.tools.cfd.openfoam.target", "bemt.tools.exports.base")}
 # What may touch the world outside, and how. What is not named touches nothing.
 MAY: dict[str, set[str]] = {
-    "bemt.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
+    "bemt.app.commands.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
     "bemt.base.checkout": {"files"},
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},
-    "bemt.case|bemt.case.*": {"files"},
+    "bemt.rotors.case|bemt.rotors.case.*": {"files"},
     "bemt.rotors.population": {"files"},
-    "bemt.readers|bemt.readers.*": {"files"},
-    "bemt.recordings.adapt|bemt.recordings.archive|bemt.recordings.database|bemt.recordings.load": {"files"},
+    "bemt.data.readers|bemt.data.readers.*": {"files"},
+    "bemt.data.recordings.adapt": {"files"},
+    "bemt.data.recordings.archive": {"files"},
+    "bemt.data.recordings.database": {"files"},
+    "bemt.data.recordings.load": {"files"},
     "bemt.rotors.k1k2_points|bemt.rotors.k1k2_calibration": {"files"},
-    "bemt.recordings.cfd_files|bemt.recordings.cfd_options|bemt.recordings.cfd_run": {"files"},
-    "bemt.sweep.grid.*|bemt.sweep.store|bemt.validate.points": {"files"},
-    "bemt.sweep.batch": {"files", "environment"},
-    "bemt.diagnose.figures|bemt.diagnose.folder|bemt.diagnose.rotor_calibration": {"files"},
-    "bemt.diagnose.interval_scales": {"files"},
-    "bemt.proof.prove": {"files", "clock", "environment"},
-    "bemt.proof.follow|bemt.proof.loop|bemt.proof.pairs|bemt.proof.real|bemt.proof.seal": {"files"},
-    "bemt.exports.*": {"files"},
-    "bemt.flight.read|bemt.flight.ardupilot|bemt.flight.crazyflie|bemt.flight.px4|bemt.flight.table": {"files"},
-    "bemt.cfd.*": {"files", "clock", "environment"},
-    "bemt.library.*": {"files"},
-    "bemt.design.motors_file": {"files"},
-    "bemt.drive.*_file|bemt.drive.*_folder|bemt.drive.*_result": {"files"},
-    "bemt.report|bemt.report.*": {"files"},
+    "bemt.data.recordings.cfd_files|bemt.data.recordings.cfd_options|bemt.data.recordings.cfd_run": {"files"},
+    "bemt.results.sweep.grid.*|bemt.results.sweep.store|bemt.rotors.validate.points": {"files"},
+    "bemt.results.sweep.batch": {"files", "environment"},
+    "bemt.judge.diagnose.figures|bemt.judge.diagnose.folder|bemt.judge.diagnose.rotor_calibration": {"files"},
+    "bemt.judge.diagnose.interval_scales": {"files"},
+    "bemt.judge.proof.prove": {"files", "clock", "environment"},
+    "bemt.judge.proof.follow": {"files"},
+    "bemt.judge.proof.loop": {"files"},
+    "bemt.judge.proof.pairs": {"files"},
+    "bemt.judge.proof.real": {"files"},
+    "bemt.judge.proof.seal": {"files"},
+    "bemt.tools.exports.*": {"files"},
+    "bemt.tools.flight.read": {"files"},
+    "bemt.tools.flight.ardupilot": {"files"},
+    "bemt.tools.flight.crazyflie": {"files"},
+    "bemt.tools.flight.px4": {"files"},
+    "bemt.tools.flight.table": {"files"},
+    "bemt.tools.cfd.*": {"files", "clock", "environment"},
+    "bemt.app.library.*": {"files"},
+    "bemt.tools.design.motors_file": {"files"},
+    "bemt.tools.drive.*_file|bemt.tools.drive.*_folder|bemt.tools.drive.*_result": {"files"},
+    "bemt.results.report|bemt.results.report.*": {"files"},
     "geometry.export": {"files"},
 }
 
 # What makes the data of the proof must know nothing of what is proved, not even through others.
-BLIND = "bemt.proof.truth*|bemt.proof.stand*|bemt.proof.rigs|bemt.proof.causes|bemt.proof.separation"
-UNSEEN = "bemt.bem|bemt.bem.*|bemt.effects|bemt.effects.*|bemt.sections|bemt.sections.*|bemt.diagnose|bemt.diagnose.*"
+BLIND = "bemt.judge.proof.truth*|bemt.judge.proof.stand*|" + "|".join(
+    f"bemt.judge.proof.{x}" for x in ("rigs", "causes", "separation")
+)
+UNSEEN = "|".join(
+    f"bemt.{x}|bemt.{x}.*" for x in ("physics.bem", "physics.effects", "physics.sections", "judge.diagnose")
+)
 
 HEAVY = {
     "OCP", "aerosandbox", "cadquery", "casadi", "dask", "distributed", "jinja2", "manifold3d", "matplotlib",
     "neuralfoil", "pandas", "pyarrow", "pyvista", "scipy", "sklearn", "trimesh", "vtk", "vtkmodules", "wisdem",
 }  # fmt: skip
-LIGHT = "bemt|bemt.__main__|bemt.commands|bemt.commands.*|bemt.base.errors"  # imported by --help: standard library only
+LIGHT = "bemt|bemt.__main__|bemt.app.commands|bemt.app.commands.*|bemt.base.errors"  # --help: standard library only
 
 FILE_CALLS = {
     "open", "read_text", "write_text", "read_bytes", "write_bytes", "mkdir", "unlink", "rename", "touch", "iterdir",
@@ -148,7 +171,7 @@ def imports(tree: ast.Module) -> Iterator[Import]:
 
 
 def targets(found: Iterable[Import], modules: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
-    """Modules that imports mean: ``from bemt import air`` is bemt.air, ``from bemt.air import Air`` too."""
+    """Modules that imports mean: ``from bemt.physics import air`` is bemt.physics.air, ``import Air`` from it too."""
     for base, names, line, when in found:
         inner = [f"{base}.{name}" for name in names if f"{base}.{name}" in modules]
         yield from ((name, line, when) for name in inner)
@@ -221,9 +244,13 @@ def violations(modules: Mapping[str, str]) -> list[str]:
             if top == "bemt" and target != "bemt" and home is not None:
                 there = place(target)
                 own = there is not None and there[1] == home[1]
+                tool, other = TOOL.match(name), TOOL.match(target)
+                if other and (tool is None or tool[1] != other[1]) and (name, target) not in CONTRACTS:
+                    found.append(f"{name}:{line}: {target} is a tool; it is found by scanning")
                 if there is not None and not own and there[0] >= home[0]:
                     found.append(f"{name}:{line}: {target} is not below it")
-                if match(name, "bemt.effects.*") and match(target, "bemt.effects.*") and target != "bemt.effects.base":
+                effect = "bemt.physics.effects.*"
+                if match(name, effect) and match(target, effect) and target != "bemt.physics.effects.base":
                     found.append(f"{name}:{line}: an effect is one file, got {target}")
             if when == "top" and target != name:
                 graph.setdefault(name, set()).add(target)
@@ -278,7 +305,12 @@ def tree(project: Path) -> dict[str, str]:
 
 
 def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
-    assert {"bemt.commands.cli", "bemt.bem.solver", "bemt.effects.tip_loss", "geometry.blade"} <= set(tree)
+    assert {
+        "bemt.app.commands.cli",
+        "bemt.physics.bem.solver",
+        "bemt.physics.effects.tip_loss",
+        "geometry.blade",
+    } <= set(tree)
     assert not violations(tree), "\n".join(violations(tree))
 
 
@@ -286,51 +318,104 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
     ("module", "line", "complaint"),
     [
         ("geometry.blade", "from bemt.base.units import INCH", "geometry knows nothing of bemt, got bemt.base.units"),
-        ("geometry.blade", "def f():\n    import bemt.air", "geometry knows nothing of bemt, got bemt.air"),
-        ("geometry.blade", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.air import Air",
-         "geometry knows nothing of bemt, got bemt.air"),
-        ("bemt.base.units", "from bemt.air import Air", "bemt.air is not below it"),
-        ("bemt.base.units", "from bemt.bem import solver", "bemt.bem.solver is not below it"),
-        ("bemt.sections.polars", "def f():\n    from bemt.bem.solver import solve", "bemt.bem.solver is not below it"),
-        ("bemt.bem.model", "import bemt.case.prepare", "bemt.case.prepare is not below it"),
-        ("bemt.effects.swirl", "import bemt.effects.tip_loss", "an effect is one file, got bemt.effects.tip_loss"),
-        ("bemt.effects.swirl", "from bemt.readers import read", "bemt.readers is not below it"),
-        ("bemt.sweep.batch", "from bemt.cfd import worker", "bemt.cfd.worker is not below it"),
-        ("bemt.sweep.batch", "from bemt.commands.cli import main", "bemt.commands.cli is not below it"),
+        (
+            "geometry.blade",
+            "def f():\n    import bemt.physics.air",
+            "geometry knows nothing of bemt, got bemt.physics.air",
+        ),
+        (
+            "geometry.blade",
+            "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from bemt.physics.air import Air",
+            "geometry knows nothing of bemt, got bemt.physics.air",
+        ),
+        ("bemt.base.units", "from bemt.physics.air import Air", "bemt.physics.air is not below it"),
+        ("bemt.base.units", "from bemt.physics.bem import solver", "bemt.physics.bem.solver is not below it"),
+        (
+            "bemt.physics.sections.polars",
+            "def f():\n    from bemt.physics.bem.solver import solve",
+            "bemt.physics.bem.solver is not below it",
+        ),
+        ("bemt.physics.bem.model", "import bemt.rotors.case.prepare", "bemt.rotors.case.prepare is not below it"),
+        (
+            "bemt.physics.effects.swirl",
+            "import bemt.physics.effects.tip_loss",
+            "an effect is one file, got bemt.physics.effects.tip_loss",
+        ),
+        ("bemt.physics.effects.swirl", "from bemt.data.readers import read", "bemt.data.readers is not below it"),
+        (
+            "bemt.results.sweep.batch",
+            "from bemt.tools.cfd import worker",
+            "bemt.tools.cfd.worker is a tool; it is found by scanning",
+        ),
+        ("bemt.results.sweep.batch", "from bemt.app.commands.cli import main", "bemt.app.commands.cli is not below it"),
         ("bemt.novelty", "", "has no place in the flow; give it one in ROOMS"),
-        ("bemt.air", "from .units import INCH", "relative import; write the whole name"),
-        ("bemt.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
-        ("bemt.bem.solver", "def f():\n    print(1)", "print in the pure core: print()"),
-        ("bemt.bem.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
-        ("bemt.bem.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),
-        ("bemt.air", "from pathlib import Path\nPath('x').read_text()", "files in the pure core: Path('x').read_text"),
-        ("bemt.air", "import os\nos.replace('a', 'b')", "files in the pure core: os.replace"),
-        ("bemt.effects.swirl", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
-        ("bemt.bem.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
-        ("bemt.case", "import os\nos.getenv('X')", "environment in the pure core: os.getenv"),
-        ("bemt.bem.solver", "def f():\n    import time", "clock in the pure core: import time"),
-        ("bemt.dataset", "import datetime\ndatetime.datetime.now()", "clock in the pure core: datetime.datetime.now"),
+        ("bemt.physics.air", "from .units import INCH", "relative import; write the whole name"),
+        ("bemt.physics.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
+        ("bemt.physics.bem.solver", "def f():\n    print(1)", "print in the pure core: print()"),
+        ("bemt.physics.bem.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
+        ("bemt.physics.bem.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),
+        (
+            "bemt.physics.air",
+            "from pathlib import Path\nPath('x').read_text()",
+            "files in the pure core: Path('x').read_text",
+        ),
+        ("bemt.physics.air", "import os\nos.replace('a', 'b')", "files in the pure core: os.replace"),
+        ("bemt.physics.effects.swirl", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
+        ("bemt.physics.bem.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
+        ("bemt.rotors.case", "import os\nos.getenv('X')", "environment in the pure core: os.getenv"),
+        ("bemt.physics.bem.solver", "def f():\n    import time", "clock in the pure core: import time"),
+        (
+            "bemt.physics.dataset",
+            "import datetime\ndatetime.datetime.now()",
+            "clock in the pure core: datetime.datetime.now",
+        ),
         ("geometry.duct", "print('x')", "print in the pure core: print()"),
-        ("bemt.sections.polars", "import neuralfoil", "neuralfoil at the top; import it in the function"),
+        ("bemt.physics.sections.polars", "import neuralfoil", "neuralfoil at the top; import it in the function"),
         ("geometry.rotor", "import cadquery as cq", "cadquery at the top; import it in the function"),
-        ("bemt.dataset", "class A:\n  import pandas", "pandas at the top; import it in the function"),
-        ("bemt.dataset", "try:\n    import scipy.optimize\nexcept ImportError:\n    pass",
-         "scipy.optimize at the top; import it in the function"),
-        ("bemt.bem.duct", "from numba import njit", "numba at the top; import it in the function"),
-        ("bemt.commands.cli", "import numpy as np", "numpy; --help imports the standard library"),
-        ("bemt.commands.cli", "import bemt.sweep", "bemt.sweep; --help imports the standard library"),
-        ("bemt.commands.sweep", "import bemt.sweep", "bemt.sweep; --help imports the standard library"),
-        ("bemt.recordings.load", "def f():\n    print(1)", "print in the pure core: print()"),
+        ("bemt.physics.dataset", "class A:\n  import pandas", "pandas at the top; import it in the function"),
+        (
+            "bemt.physics.dataset",
+            "try:\n    import scipy.optimize\nexcept ImportError:\n    pass",
+            "scipy.optimize at the top; import it in the function",
+        ),
+        ("bemt.physics.bem.duct", "from numba import njit", "numba at the top; import it in the function"),
+        ("bemt.app.commands.cli", "import numpy as np", "numpy; --help imports the standard library"),
+        (
+            "bemt.app.commands.cli",
+            "import bemt.results.sweep",
+            "bemt.results.sweep; --help imports the standard library",
+        ),
+        (
+            "bemt.app.commands.sweep",
+            "import bemt.results.sweep",
+            "bemt.results.sweep; --help imports the standard library",
+        ),
+        ("bemt.data.recordings.load", "def f():\n    print(1)", "print in the pure core: print()"),
         ("bemt.base.errors", "import numpy", "numpy; --help imports the standard library"),
-        ("bemt.proof.truth", "import bemt.bem.solver", "must not see bemt.bem.solver"),
-        ("bemt.proof.truth_world", "def f():\n    from bemt.effects import standard", "must not see bemt.effects"),
-        ("bemt.proof.truth_duct", "from bemt.bem import duct", "must not see bemt.bem.duct"),
-        ("bemt.proof.stand", "from bemt import sweep",
-         "must not see bemt.bem.model through bemt.sweep"),
-        ("bemt.proof.truth_section", "from bemt import case", "must not see bemt.sections.rule through bemt.case"),
-        ("bemt.base.tables", "def f():\n    import bemt.sections.polars", "bemt.sections.polars is not below it"),
+        ("bemt.judge.proof.truth", "import bemt.physics.bem.solver", "must not see bemt.physics.bem.solver"),
+        (
+            "bemt.judge.proof.truth_world",
+            "def f():\n    from bemt.physics.effects import standard",
+            "must not see bemt.physics.effects",
+        ),
+        ("bemt.judge.proof.truth_duct", "from bemt.physics.bem import duct", "must not see bemt.physics.bem.duct"),
+        (
+            "bemt.judge.proof.stand",
+            "from bemt.results import sweep",
+            "must not see bemt.physics.bem.model through bemt.results.sweep",
+        ),
+        (
+            "bemt.judge.proof.truth_section",
+            "from bemt.rotors import case",
+            "must not see bemt.physics.sections.rule through bemt.rotors.case",
+        ),
+        (
+            "bemt.base.tables",
+            "def f():\n    import bemt.physics.sections.polars",
+            "bemt.physics.sections.polars is not below it",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, complaint: str) -> None:
     head, _, body = tree.get(module, "").partition("from __future__ import annotations")
     after = violations({**tree, module: f"{head}from __future__ import annotations\n{line}\n{body}"})
@@ -341,8 +426,16 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
 @pytest.mark.parametrize(
     ("package", "line", "complaint"),
     [
-        ("bemt.base", "from bemt.commands import data", "bemt.base.folders:1: bemt.commands.data is not below it"),
-        ("bemt.proof", "from bemt.bem import solver", "bemt.proof.truth:1: must not see bemt.bem.solver"),
+        (
+            "bemt.base",
+            "from bemt.app.commands import data",
+            "bemt.base.folders:1: bemt.app.commands.data is not below it",
+        ),
+        (
+            "bemt.judge.proof",
+            "from bemt.physics.bem import solver",
+            "bemt.judge.proof.truth:1: must not see bemt.physics.bem.solver",
+        ),
     ],
 )
 def test_what_a_package_brings_along_counts(tree: dict[str, str], package: str, line: str, complaint: str) -> None:
@@ -360,11 +453,11 @@ def test_what_needs_it_may_import_and_touch() -> None:
     assert not violations(
         {
             "bemt": "",
-            "bemt.sections.polars": "def f():\n    import neuralfoil",
-            "bemt.bem.kernel": "import numba",
-            "bemt.readers": "import os\ndef f(p: 'os.PathLike[str]'):\n    return open(p)",
-            "bemt.bem.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import bemt.compare",
-            "bemt.bem.model": "from bemt.bem import duct",
+            "bemt.physics.sections.polars": "def f():\n    import neuralfoil",
+            "bemt.physics.bem.kernel": "import numba",
+            "bemt.data.readers": "import os\ndef f(p: 'os.PathLike[str]'):\n    return open(p)",
+            "bemt.physics.bem.duct": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import bemt.judge.compare",
+            "bemt.physics.bem.model": "from bemt.physics.bem import duct",
         }
     )
 
@@ -393,7 +486,7 @@ def test_help_imports_the_standard_library_only(project: Path) -> None:
 
 
 def test_a_sweep_needs_no_solids_and_no_pictures(project: Path) -> None:
-    command = "from bemt.commands.cli import main\nassert main(['sweep', 'cases/prop_8x5', '--json']) == 0"
+    command = "from bemt.app.commands.cli import main\nassert main(['sweep', 'cases/prop_8x5', '--json']) == 0"
     found = loaded(command, project, BEMT_CACHE="off")
     assert {"bemt", "geometry", "numpy"} <= found
     assert not found & {"neuralfoil", "aerosandbox", "casadi"}  # the rule's sections are tabulated

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import bemt
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -30,7 +30,7 @@ def test_importing_it_loads_nothing() -> None:
 
 
 def test_rooms_of_the_same_name_are_called_like_functions() -> None:
-    from bemt.diagnose import plan  # noqa: F401 - the room stays a package
+    from bemt.judge.diagnose import plan  # noqa: F401 - the room stays a package
 
     assert callable(bemt.diagnose) and callable(bemt.drive) and callable(bemt.compare)
     with pytest.raises(bemt.InputError, match="^kv: got 1"):
@@ -40,7 +40,7 @@ def test_rooms_of_the_same_name_are_called_like_functions() -> None:
 @pytest.mark.parametrize("name", ["compare", "design", "diagnose", "drive", "report", "validate"])
 def test_help_of_a_room_is_that_of_its_function_and_runs_no_example_twice(name: str) -> None:
     room = getattr(bemt, name)
-    shown, function = pydoc.plain(pydoc.render_doc(room)), getattr(bemt.library, name)
+    shown, function = pydoc.plain(pydoc.render_doc(room)), getattr(bemt.app.library, name)
     assert "Parameters" in shown and f"bemt.{name}(" in shown and str(function.__doc__).splitlines()[0] in shown
     assert not any(test.examples for test in doctest.DocTestFinder(recurse=False).find(room))
 

@@ -11,13 +11,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow
-from bemt.effects import standard
-from bemt.effects.lifting_surface import LiftingSurface, slope_ratio
-from bemt.effects.tip_loss import TipLoss
-from bemt.sections.polars import ALPHA_GRID, linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.effects import standard
+from bemt.physics.effects.lifting_surface import LiftingSurface, slope_ratio
+from bemt.physics.effects.tip_loss import TipLoss
+from bemt.physics.sections.polars import ALPHA_GRID, linear_polar
 from geometry.blade import from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

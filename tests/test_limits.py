@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.effects import Effect, standard
-from bemt.effects.high_induction import HighInduction
-from bemt.effects.swirl import Swirl
-from bemt.effects.tip_loss import TipLoss
-from bemt.sections.polars import Polar, linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.effects import Effect, standard
+from bemt.physics.effects.high_induction import HighInduction
+from bemt.physics.effects.swirl import Swirl
+from bemt.physics.effects.tip_loss import TipLoss
+from bemt.physics.sections.polars import Polar, linear_polar
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 from geometry.blade import Blade, Stations, from_stations
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import bemt
-from bemt.case import case_of, fresh, load_case
-from bemt.case.unknowns import section_of
-from bemt.commands.cli import main
+from bemt.app.commands.cli import main
+from bemt.rotors.case import case_of, fresh, load_case
+from bemt.rotors.case.unknowns import section_of
 
 STATIONS = "r_over_R,chord_over_R,beta_deg\n0.2,0.14,35\n0.5,0.19,22\n0.75,0.16,15\n1.0,0.06,10\n"
 

@@ -12,13 +12,13 @@ import pytest
 from numpy.typing import NDArray
 
 import bemt
-from bemt.air import Air
 from bemt.base.errors import InputError
-from bemt.bem import oblique, solver
-from bemt.effects import Effect, standard
-from bemt.effects.flapping import Flapping
-from bemt.sections.neuralfoil import neuralfoil_polar
-from bemt.sections.polars import linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import oblique, solver
+from bemt.physics.effects import Effect, standard
+from bemt.physics.effects.flapping import Flapping
+from bemt.physics.sections.neuralfoil import neuralfoil_polar
+from bemt.physics.sections.polars import linear_polar
 from geometry.airfoil import naca4
 from geometry.blade import Blade
 from geometry.laws import helix

@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.cfd.worker import history_of
-from bemt.commands.cli import main
-from bemt.exports.openfoam import Body, Settings, Sweep, case_files
-from bemt.exports.openfoam.grid import extent, mrf_zone
-from bemt.exports.openfoam.write import Run, settings_of, write_openfoam
+from bemt.rotors.case import load_case
+from bemt.tools.cfd.openfoam import Body, Settings, Sweep, case_files
+from bemt.tools.cfd.openfoam.grid import extent, mrf_zone
+from bemt.tools.cfd.openfoam.write import Run, settings_of, write_openfoam
+from bemt.tools.cfd.worker import history_of
 from geometry.mesh import Options
 from geometry.mesh_duct import plan_stator
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.diagnose import form, pair_evidence
-from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.state import State
+from bemt.judge.diagnose import form, pair_evidence
+from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.judge.diagnose.state import State
 
 PAIR = Explanation.of("ground_effect", "untwist")
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bemt.air import Air
-from bemt.bem import kernel as K
-from bemt.bem import plain, solver
-from bemt.effects import catalogue
-from bemt.sections.polars import linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import plain, solver
+from bemt.physics.effects import catalogue
+from bemt.physics.sections.polars import linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

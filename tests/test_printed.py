@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.case import load_case
-from bemt.case.propagate import propagate
-from bemt.commands.cli import main
+from bemt.app.commands.cli import main
+from bemt.rotors.case import load_case
+from bemt.rotors.case.propagate import propagate
 from geometry.airfoil import naca4
 from geometry.blade import from_stations
 from geometry.common import GeometryError

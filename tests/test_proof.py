@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.effects import catalogue
-from bemt.proof import (
+from bemt.data.recordings.load import import_file
+from bemt.judge.proof import (
     causes,
     draw,
     items,
@@ -35,9 +34,10 @@ from bemt.proof import (
     truth_wake,
     truth_world,
 )
-from bemt.proof.items import Bench, Item
-from bemt.proof.stand import Stand, covariance, full_scales, record
-from bemt.recordings.load import import_file
+from bemt.judge.proof.items import Bench, Item
+from bemt.judge.proof.stand import Stand, covariance, full_scales, record
+from bemt.physics.effects import catalogue
+from bemt.rotors.case import load_case
 
 P_ROOM, T_ROOM = 101325.0, 20.0
 

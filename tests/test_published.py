@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.duct import duct_flow
-from bemt.effects import Effect, standard
-from bemt.effects.lifting_surface import LiftingSurface
-from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import duct_flow
+from bemt.physics.effects import Effect, standard
+from bemt.physics.effects.lifting_surface import LiftingSurface
+from bemt.physics.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from geometry.airfoil import Airfoil, naca, naca4, parse_dat
 from geometry.blade import from_stations
 from geometry.duct import Duct

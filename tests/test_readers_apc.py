@@ -1,4 +1,4 @@
-"""The promise of bemt.readers.apc: PE0 and PER3 in SI units, checked against themselves, nothing dropped."""
+"""The promise of bemt.data.readers.apc: PE0 and PER3 in SI units, checked against themselves, nothing dropped."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset
-from bemt.readers import apc
+from bemt.data import readers as importers
+from bemt.data.readers import apc
+from bemt.physics.dataset import Dataset
 
 NAMES = ["STATION", "CHORD", "PITCH", "PITCH", "PITCH", "SWEEP", "THICKNESS", "TWIST", "MAX-THICK", "CROSS-SECTION"]
 NAMES += ["ZHIGH", "CGY", "CGZ"]

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.commands.cli import main
-from bemt.readers import aerodyn, detect, dfdc, qprop, xrotor
-from bemt.readers._stations import read_stations
-from bemt.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
+from bemt.data.readers import aerodyn, detect, dfdc, qprop, xrotor
+from bemt.data.readers._stations import read_stations
+from bemt.physics.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 QPROP = """
 A 6x3 folder
@@ -155,7 +155,7 @@ def test_numbers_and_units_of_each_file(files: dict[str, Path]) -> None:
 
 def test_sections_that_fit_are_found_again() -> None:
     """A table made of a section gives the section back: lift to 1e-6, drag to 1e-4 of itself."""
-    from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
+    from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
     known = (
         (fit_xrotor, XrotorSection(np.radians(-2.0), 6.0, 1.2, -0.7, 0.2, 0.12, 0.011, 0.35, 0.009, 1.2e5, -0.45)),

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset
-from bemt.readers import _cfd
-from bemt.recordings.load import document, import_file
+from bemt.data import readers as importers
+from bemt.data.readers import _cfd
+from bemt.data.recordings.load import document, import_file
+from bemt.physics.dataset import Dataset
 
 RNG = np.random.default_rng(20)
 N = 40

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.readers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
-from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
+from bemt.data import readers as importers
+from bemt.data.readers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
+from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
 KINDS = {m.KIND: m for m in (polar_aerodyn, polar_c81, polar_csv, polar_xfoil)}
 ALPHA = np.arange(-12.0, 16.5, 1.0)

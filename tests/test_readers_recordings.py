@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt import readers as importers
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.base.units import G0
-from bemt.dataset import Dataset
-from bemt.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
-from bemt.readers._headings import heading, surely_shaft_speed
-from bemt.readers._split import NO_VALUE
-from bemt.recordings.channels import named
-from bemt.recordings.load import import_file
-from bemt.recordings.reduce import reduce, reduction
+from bemt.data import readers as importers
+from bemt.data.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
+from bemt.data.readers._headings import heading, surely_shaft_speed
+from bemt.data.readers._split import NO_VALUE
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.load import import_file
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.physics.dataset import Dataset
 
 RC_HEAD = (
     "Time (s),ESC signal (µs),Servo 1 (µs),AccX (g),Torque (N·m),Thrust (gf),Voltage (V),Current (A),"
@@ -759,8 +759,8 @@ def test_power_that_is_volts_times_amps_is_electrical(write: Write) -> None:
 
 
 def test_several_set_ups_in_one_file_are_said_and_not_diagnosed_together(write: Write, project: Path) -> None:
-    from bemt.case import load_case
-    from bemt.diagnose.load import load
+    from bemt.judge.diagnose.load import load
+    from bemt.rotors.case import load_case
 
     rows = "".join(f"{name},{rpm},{rpm / 1000}\n" for name in ("APC 10x5", "APC 11x5.5") for rpm in (4000, 6000, 8000))
     file = write(f"Propeller,rpm,thrust_N\n{rows}")
@@ -794,8 +794,8 @@ def test_a_bare_speed_is_offered_as_the_one_that_is_missing(more: str, lines: tu
 def test_a_speed_in_doubt_is_never_replaced_by_that_of_the_case(
     heading: str, cell: str, words: str, write: Write, project: Path
 ) -> None:
-    from bemt.case import load_case
-    from bemt.diagnose.load import load
+    from bemt.judge.diagnose.load import load
+    from bemt.rotors.case import load_case
 
     rows = "".join(f"{cell.format(n)},{n * n / 1e5:.3f},{n * n / 4e6:.4f}\n" for n in range(500, 1500, 100))
     file, case = str(write(f"{heading},thrust_N,torque_Nm\n{rows}")), load_case(project / "cases" / "prop_10x5")
@@ -823,8 +823,8 @@ def test_a_heading_with_two_units_has_none(head: str, write: Write) -> None:
 
 
 def test_a_recording_toml_that_is_there_is_the_file_to_give(write: Write, project: Path) -> None:
-    from bemt.case import load_case
-    from bemt.diagnose.load import load
+    from bemt.judge.diagnose.load import load
+    from bemt.rotors.case import load_case
 
     file = write("speed,thrust_N,torque_Nm\n400,3,0.04\n600,7,0.09\n800,12,0.16\n")
     told = file.with_name("recording.toml")

@@ -1,4 +1,4 @@
-"""The promise of bemt.readers.references: recorded values with unit, uncertainty and source, or a refusal."""
+"""The promise of bemt.data.readers.references: recorded values with unit, uncertainty and source, or a refusal."""
 # ruff: noqa: E501 - a table of exact messages
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.readers import references
+from bemt.data import readers as importers
+from bemt.data.readers import references
 
 HEAD = "quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3\n"
 

@@ -1,4 +1,4 @@
-"""The promise of bemt.readers.uiuc: every file of the archive imports, or is refused with a reason."""
+"""The promise of bemt.data.readers.uiuc: every file of the archive imports, or is refused with a reason."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import readers as importers
 from bemt.base.errors import InputError
-from bemt.readers import uiuc
-from bemt.readers._uiuc_names import parse_file_name
+from bemt.data import readers as importers
+from bemt.data.readers import uiuc
+from bemt.data.readers._uiuc_names import parse_file_name
 
 GEOMETRY = "r/R    c/R     beta\n0.15 0.11 {0:.3f}\n0.50 0.18 {1:.3f}\n0.75 0.15 {2:.3f}\n1.00 0.05 {3:.3f}\n"
 STATIC = "RPM    CT       CP\n2000.0 0.0950 0.0450\n4000.0 0.1000 0.0455\n"

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.case import load_case
-from bemt.compare.drive_laws import LAWS
-from bemt.diagnose.contrast import compare
-from bemt.effects import catalogue
-from bemt.proof import follow, prove, score
-from bemt.proof.items import Item
-from bemt.proof.pairs import draw_pairs, followed, pairs
-from bemt.recordings.load import import_file
+from bemt.data.recordings.load import import_file
+from bemt.judge.compare.drive_laws import LAWS
+from bemt.judge.diagnose.contrast import compare
+from bemt.judge.proof import follow, prove, score
+from bemt.judge.proof.items import Item
+from bemt.judge.proof.pairs import draw_pairs, followed, pairs
+from bemt.physics.effects import catalogue
+from bemt.rotors.case import load_case
 
 
 @pytest.fixture(scope="module")

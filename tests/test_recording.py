@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import readers as importers
-from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.readers import recording_toml
+from bemt.data import readers as importers
+from bemt.data.readers import recording_toml
+from bemt.physics.air import Air
 
 TABLE = "t,F,M,eRPM,U\n" + "".join(f"{20 * k},{-(100 + k)},{2 * k + 40},{70000 + 700 * k},11.1\n" for k in range(12))
 

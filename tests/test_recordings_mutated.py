@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset
-from bemt.recordings.channels import named
-from bemt.recordings.load import import_file
-from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.recordings.reduce import reduction
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.load import import_file
+from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.data.recordings.reduce import reduction
+from bemt.physics.dataset import Dataset
 
 INJURIES = (
     "cut", "garble", "bytes", "encoding", "huge", "tiny", "swap columns", "drop column", "double column", "rename",

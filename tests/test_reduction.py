@@ -14,17 +14,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt import coefficients as co
-from bemt import readers as importers
-from bemt.air import Air
+from bemt.app.commands.cli import main
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.dataset import Dataset
-from bemt.recordings.channels import named
-from bemt.recordings.plateaus import Plateaus, find, standard_error
-from bemt.recordings.points import is_samples
-from bemt.recordings.reduce import reduce, reduction
+from bemt.data import readers as importers
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.plateaus import Plateaus, find, standard_error
+from bemt.data.recordings.points import is_samples
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air
+from bemt.physics.dataset import Dataset
 
 D = 0.254
 K_T, K_Q = 2.0e-7, 3.0e-9

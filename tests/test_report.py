@@ -25,17 +25,17 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.page import render
-from bemt.commands.cli import main
-from bemt.report import book_html
-from bemt.report.cfd import attach, cfd_runs
-from bemt.report.found_files import safe_files
-from bemt.report.front import summary
-from bemt.report.gather import attach_diagnoses, gather
-from bemt.report.plot import Mark, Plot, Trace, figure, ticks
-from bemt.report.rotor_view import viewer
-from bemt.report.verdicts import verdict
-from bemt.sweep.comparison import Comparison
+from bemt.results.report import book_html
+from bemt.results.report.cfd import attach, cfd_runs
+from bemt.results.report.found_files import safe_files
+from bemt.results.report.front import summary
+from bemt.results.report.gather import attach_diagnoses, gather
+from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks
+from bemt.results.report.rotor_view import viewer
+from bemt.results.report.verdicts import verdict
+from bemt.results.sweep.comparison import Comparison
 
 CASE = """
 schema = "bemt.case/1"
@@ -467,7 +467,7 @@ def test_plots_keep_their_numbers_and_leave_out_what_is_not_one() -> None:
     )
     out = figure(plot)
     assert out is not None and [t["name"] for t in out["traces"]] == ["a"]
-    page = render("bemt.report", "report.html", pages=[{"id": "a", "name": "a", "title": "a", "top": [],
+    page = render("bemt.results.report", "report.html", pages=[{"id": "a", "name": "a", "title": "a", "top": [],
                   "sections": [("a", [("figures", [out])])]}], title="", lead="", foot="")  # fmt: skip
     ((head, *rows),) = tables(page)
     assert [[float(v) for v in row[1:4]] for row in rows] == [[0.0, 1.0, 0.1], [2.0, 3.0, 0.1]]
@@ -524,7 +524,7 @@ def test_command_writes_two_files_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
     made: tuple[dict[str, Any], Path],
 ) -> None:
-    monkeypatch.setattr("bemt.report.gather.gather", lambda paths, out, progress: made[0])
+    monkeypatch.setattr("bemt.results.report.gather.gather", lambda paths, out, progress: made[0])
     assert main(["report", str(made[1] / "cases"), "--out", str(tmp_path / "r")]) == 2
     assert sorted(p.name for p in (tmp_path / "r").iterdir()) == ["report.html", "report.md"]
     assert "report.html" in capsys.readouterr().out
@@ -808,7 +808,7 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
 
 
 def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.report.cfd import fidelities, fidelity_sections
+    from bemt.results.report.cfd import fidelities, fidelity_sections
 
     folder = tmp_path / "disk"
     folder.mkdir()

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bemt.commands.cli import main
-from bemt.validate.propellers import validate
+from bemt.app.commands.cli import main
+from bemt.rotors.validate.propellers import validate
 
 # Section tables come from a network whose releases differ in the last digits.
 TOLERANCE = 2e-3

@@ -117,7 +117,7 @@ def test_the_search_follows_the_claim_and_is_no_fixed_sentence(monkeypatch):
 
 
 def test_every_reading_gives_the_number_it_claims():
-    from bemt.rotors.k1k2 import K1, K2, thrust
+    from bemt.physics.k1k2 import K1, K2, thrust
 
     units = {"kgf": KGF, "N": 1.0, "lbf": 4.4482216152605, "ozf": 4.4482216152605 / 16}
     readings = th.ds30_readings()
@@ -179,7 +179,7 @@ def test_statistics_of_the_database(shared_data):
 
 def test_statistics_on_a_made_up_folder(tmp_path):
     """CT made from the formula itself: every ratio is 1 exactly, and the zero of thrust is P/D."""
-    from bemt.rotors.k1k2 import K1, K2
+    from bemt.physics.k1k2 import K1, K2
 
     CT0 = 3.141592653589793 / 4 * 0.6**2 * (K1 / 0.6) ** K2
     static = "".join(f"{rpm} {CT0:.9f} 0.05\n" for rpm in (3000, 6000))

@@ -14,12 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt.air import Air
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow
-from bemt.effects import catalogue, standard, without
-from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.sections.polars import Polar, linear_polar
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.effects import catalogue, standard, without
+from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+from bemt.physics.sections.polars import Polar, linear_polar
 from geometry.blade import from_stations
 from geometry.rotor import Rotor
 

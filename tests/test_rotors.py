@@ -17,9 +17,9 @@ from population_fit import Rotors, with_families
 
 from bemt.__main__ import main
 from bemt.base.errors import InputError
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate, solve_at
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import propagate, solve_at
 from bemt.rotors.conditioning import condition
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
@@ -27,9 +27,9 @@ from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import WEIGHTS, Population, population, sizes
 from bemt.rotors.predict import Prediction, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.rotors.validate import built
+from bemt.rotors.validate.built import MeasuredRotor
 from bemt.rotors.validity import Validity
-from bemt.validate import built
-from bemt.validate.built import MeasuredRotor
 
 K = len(NAMES)
 CASE = """schema = "bemt.case/1"
@@ -506,10 +506,10 @@ def test_paired_difference_knows_its_chance() -> None:
 def test_peer_agrees_with_the_solver_on_the_same_physics() -> None:
     """CCBlade on a light propeller, same stations, tables and physics: thrust and power within a few percent."""
     pytest.importorskip("wisdem", reason="the optional package wisdem is not installed")
-    from bemt import effects
-    from bemt.air import Air
-    from bemt.bem.model import Model
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics import effects
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
     from geometry.airfoil import naca
     from geometry.laws import from_laws
     from geometry.rotor import Rotor

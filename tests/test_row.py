@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bemt.bem.packing import zero_and_slope
-from bemt.effects.base import RotorBuild
-from bemt.effects.cascade import Cascade
-from bemt.sections.polars import ALPHA_GRID, Polar
-from bemt.sections.row import row_lift, weinig_factor
+from bemt.physics.bem.packing import zero_and_slope
+from bemt.physics.effects.base import RotorBuild
+from bemt.physics.effects.cascade import Cascade
+from bemt.physics.sections.polars import ALPHA_GRID, Polar
+from bemt.physics.sections.row import row_lift, weinig_factor
 from geometry.airfoil import Airfoil, naca4
 
 Array = NDArray[np.float64]
@@ -160,7 +160,7 @@ def test_far_apart_a_row_is_single_sections() -> None:
 
 
 def test_measured_compressor_cascades() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
     for form, spread, bias in (("potential", 0.14, 0.09), ("carter", 0.20, 0.10)):
         off = []
@@ -173,7 +173,7 @@ def test_measured_compressor_cascades() -> None:
 
 
 def test_the_isolated_zero_lift_angle_misses_what_cascades_show() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
     scatter = {}
     for share in (0.0, 1.0):
@@ -188,7 +188,7 @@ def test_the_isolated_zero_lift_angle_misses_what_cascades_show() -> None:
 
 
 def test_a_blade_without_sections_gets_one_of_its_zero_lift_angle() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
     section = naca4(0.04, 0.5, 0.10)
     polar = neuralfoil_polar(section)
@@ -201,7 +201,7 @@ def test_a_blade_without_sections_gets_one_of_its_zero_lift_angle() -> None:
 
 
 def test_separated_flow_does_not_know_the_row() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
     section = naca4(0.04, 0.4, 0.10)
     polar = neuralfoil_polar(section)

@@ -13,9 +13,9 @@ import pytest
 
 from bemt.base import units
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset
-from bemt.recordings.check import Finding, check
-from bemt.recordings.load import import_file
+from bemt.data.recordings.check import Finding, check
+from bemt.data.recordings.load import import_file
+from bemt.physics.dataset import Dataset
 
 INCH = units.INCH
 KGF, LBF = units.KGF, units.LBF

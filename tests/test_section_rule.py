@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt import bem
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.effects import catalogue, standard
-from bemt.sections import neuralfoil
-from bemt.sections import rule as section_rule
-from bemt.sections.neuralfoil import tunnel_polar
-from bemt.sections.polars import DEFAULT_RE, Polar
-from bemt.validate.propellers import validate
+from bemt.physics import bem
+from bemt.physics.effects import catalogue, standard
+from bemt.physics.sections import neuralfoil
+from bemt.physics.sections import rule as section_rule
+from bemt.physics.sections.neuralfoil import tunnel_polar
+from bemt.physics.sections.polars import DEFAULT_RE, Polar
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.validate.propellers import validate
 from geometry.airfoil import Airfoil, naca
 from geometry.laws import helix
 from geometry.rotor import Rotor

@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from bemt.sections import four_digit, neuralfoil
-from bemt.sections.rule import FAMILIES, RuleSection, airfoil
+from bemt.physics.sections import four_digit, neuralfoil
+from bemt.physics.sections.rule import FAMILIES, RuleSection, airfoil
 from geometry.airfoil import Airfoil, naca, naca4
 
 
@@ -64,7 +64,7 @@ cache.find_spec = lambda name: None if name == "neuralfoil" else find(name)
 import bemt
 print(bemt.propeller("10x5").solve(6000).thrust_N)
 from bemt.base.errors import InputError
-from bemt.sections.neuralfoil import tunnel_polar
+from bemt.physics.sections.neuralfoil import tunnel_polar
 from geometry.airfoil import naca
 try:
     tunnel_polar(naca("2415"))

@@ -13,15 +13,15 @@ import pytest
 from numba import njit
 from scipy.optimize import brentq
 
-from bemt import bem
-from bemt.air import Air
-from bemt.bem import kernel, residual, solver, vecmath
-from bemt.bem.duct import DuctFlow
-from bemt.effects import Effect, RotorBuild, standard, without
-from bemt.effects.lifting_surface import LiftingSurface
-from bemt.effects.swirl import Swirl
-from bemt.effects.tip_loss import TipLoss
-from bemt.sections.polars import Polar, linear_polar
+from bemt.physics import bem
+from bemt.physics.air import Air
+from bemt.physics.bem import kernel, residual, solver, vecmath
+from bemt.physics.bem.duct import DuctFlow
+from bemt.physics.effects import Effect, RotorBuild, standard, without
+from bemt.physics.effects.lifting_surface import LiftingSurface
+from bemt.physics.effects.swirl import Swirl
+from bemt.physics.effects.tip_loss import TipLoss
+from bemt.physics.sections.polars import Polar, linear_polar
 from geometry.blade import Stations
 from geometry.rotor import Rotor
 
@@ -164,7 +164,7 @@ def test_section_tables_are_read_as_they_are(rotor: Rotor, layout: str) -> None:
              par[o + 9], par[o + 10] / 340.0**2, par[o + 11], par[o + 12], par[o + 13], par[o + 16])  # fmt: skip
         return lookup(alpha, lre, W * W, np.int32(base), tab, g)
 
-    from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE
+    from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE
 
     rng = np.random.default_rng(4)
     for _ in range(500):
@@ -298,7 +298,7 @@ def test_import_compiles_nothing() -> None:
     code = (
         "from numba.core import event\n"
         "with event.install_recorder('numba:compile') as record:\n"
-        "    import bemt.bem.solver, bemt.bem.kernel as K\n"
+        "    import bemt.physics.bem.solver, bemt.physics.bem.kernel as K\n"
         'assert not record.buffer and not K.entry(False, "plain").compiled.signatures'
     )
     subprocess.run([sys.executable, "-c", code], check=True)

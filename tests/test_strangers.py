@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import readers
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.commands.cli import main
-from bemt.readers._stations import read_stations
-from bemt.recordings.channels import named
-from bemt.recordings.load import import_file
+from bemt.data import readers
+from bemt.data.readers._stations import read_stations
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.load import import_file
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 

@@ -22,18 +22,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bemt.app.commands.cli import main
 from bemt.base.tables import csv_block, json_text, number_text, plain
-from bemt.bem import Model
-from bemt.case import load_case
-from bemt.case.prepare import prepare_case
-from bemt.commands.cli import main
-from bemt.rotors.k1k2 import U_MEASURED
-from bemt.sweep import batch, fingerprint, sweep
-from bemt.sweep import batch as sweep_module
-from bemt.sweep.case import solve_case
-from bemt.sweep.comparison import Comparison
-from bemt.sweep.grid import run as grid_module
-from bemt.sweep.summary import summary
+from bemt.physics.bem import Model
+from bemt.physics.k1k2 import U_MEASURED
+from bemt.results.sweep import batch, fingerprint, sweep
+from bemt.results.sweep import batch as sweep_module
+from bemt.results.sweep.case import solve_case
+from bemt.results.sweep.comparison import Comparison
+from bemt.results.sweep.grid import run as grid_module
+from bemt.results.sweep.summary import summary
+from bemt.rotors.case import load_case
+from bemt.rotors.case.prepare import prepare_case
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665
@@ -430,7 +430,7 @@ def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: 
 
 
 def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.commands.cli import main
+    from bemt.app.commands.cli import main
 
     path = str(make_case(tmp_path))
     assert main(["sweep", path, "--quiet"]) == 0
@@ -485,7 +485,7 @@ def test_numbers_for_people_and_for_json() -> None:
     ("name", "kgf"), [("prop_8x5", 2.456), ("prop_10x5", 5.363), ("prop_12x6", 11.121), ("prop_14x8", 22.025)]
 )
 def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
-    from bemt.case.prepare import k1k2_case
+    from bemt.rotors.case.prepare import k1k2_case
 
     case = load_case(ROOT / "cases" / name)
     made = k1k2_case(case, None, np.array([case.rpm]), np.array([0.0]), case.air())
@@ -493,7 +493,7 @@ def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
 
 
 def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.commands.cli import main
+    from bemt.app.commands.cli import main
 
     shipped = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
     assert main(["sweep", *(str(project / "cases" / name) for name in shipped)]) == 0
@@ -509,8 +509,8 @@ def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.Capture
 def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bemt.commands.cli import main
-    from bemt.sweep.summary import summary
+    from bemt.app.commands.cli import main
+    from bemt.results.sweep.summary import summary
 
     monkeypatch.chdir(tmp_path)
     for folder in ("one", "two"):
@@ -545,7 +545,7 @@ def test_no_flag_is_dropped_from_the_screen() -> None:
 
 
 def test_a_flagged_point_is_no_plain_agreement() -> None:
-    from bemt.report.verdicts import stand
+    from bemt.results.report.verdicts import stand
 
     plain = Comparison(S=101.0, D=100.0, u_input=5.0, u_D=0.5)
     flagged = replace(plain, doubts=("supersonic tip",))
@@ -554,7 +554,7 @@ def test_a_flagged_point_is_no_plain_agreement() -> None:
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
-    from bemt.sweep.summary import summary
+    from bemt.results.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 12.0, "flags": []}
     known = {"u_num": 0.0, "u_input": 0.5, "u_D": math.nan, "u_val": math.nan, "model": "bemt", "quantity": "thrust_N"}
@@ -572,7 +572,7 @@ def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand
 
 
 def test_a_screen_of_many_cases_is_still_one_screen() -> None:
-    from bemt.sweep.summary import summary
+    from bemt.results.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "flags": ["a flag"], "rpm": 6000.0}
     one = {"faults": [], "assumptions": [], "audit": [], "grid": None, "comparisons": []}

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bemt.app.commands import report
 from bemt.base.checkout import commit
 from bemt.base.errors import InputError
 from bemt.base.tables import csv_text
-from bemt.case import load_case
-from bemt.commands import report
-from bemt.drive import motor_file
+from bemt.rotors.case import load_case
+from bemt.tools.drive import motor_file
 
 CASES = Path(__file__).resolve().parents[1] / "cases"
 HASH = "0123456789abcdef0123456789abcdef01234567"

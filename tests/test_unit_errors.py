@@ -8,11 +8,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from bemt import effects
 from bemt.base import unit_errors
 from bemt.base import units as u
-from bemt.drive.motor_errors import FACTORS
-from bemt.recordings.slips import slips
+from bemt.data.recordings.slips import slips
+from bemt.physics import effects
+from bemt.tools.drive.motor_errors import FACTORS
 
 KINDS = ("force", "torque", "rotation", "airspeed", "density", "power", "electrical_power", "current", "voltage",
          "length", "diameter", "efficacy", "pressure", "temperature", "time", "angle", "fraction",

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt import effects
+from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
-from bemt.commands.cli import main
-from bemt.readers import uiuc
-from bemt.sections import rule as section_rule
-from bemt.validate import points, propellers
+from bemt.data.readers import uiuc
+from bemt.physics import effects
+from bemt.physics.sections import rule as section_rule
+from bemt.rotors.validate import points, propellers
 
 R_R = np.linspace(0.15, 1.0, 18)
 C_R = 0.12 + 0.08 * np.sin(np.pi * R_R) - 0.06 * R_R
@@ -144,8 +144,8 @@ def test_fixed_reynolds_number_removes_the_dependence_on_speed(tmp_path: Path) -
 
 
 def test_rule_is_one_table_for_small_and_one_for_large_reynolds_numbers() -> None:
-    from bemt.sections.neuralfoil import neuralfoil_polar, tunnel_polar
-    from bemt.sections.polars import DEFAULT_RE
+    from bemt.physics.sections.neuralfoil import neuralfoil_polar, tunnel_polar
+    from bemt.physics.sections.polars import DEFAULT_RE
 
     shape = section_rule.airfoil(section_rule.sections()[0])
     rule = neuralfoil_polar(shape)

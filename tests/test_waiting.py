@@ -13,12 +13,12 @@ import pytest
 
 import bemt
 from bemt.base.cache import Kept
-from bemt.bem import model as bem
-from bemt.case import lattice
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate
-from bemt.effects.compressibility import Compressibility
-from bemt.effects.swirl import Swirl
+from bemt.physics.bem import model as bem
+from bemt.physics.effects.compressibility import Compressibility
+from bemt.physics.effects.swirl import Swirl
+from bemt.rotors.case import lattice
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import propagate
 
 
 @pytest.fixture

@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt import coefficients as co
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air
+from bemt.physics.dataset import Dataset
 
 K1 = 1.0 / 3.29546
 """Coefficient of D/p [-], reference [1]."""

@@ -10,9 +10,9 @@ of its diameters the wake is a turbulent jet whose speed falls as 1/z (Albertson
 ASCE 115, not checked).
 
 How fast the wake contracts: a cylinder, which is not let contract, gives v (1 + s) = 2 v - A, with A of
-:func:`bemt.vortex_cylinder.ahead`, and s = 0.2 at 0.1 diameters.  In hover the measured wake is all but contracted
-there (:func:`contracted`), so that s = 0.75.  Between the two, s goes linearly with v / w, from the cylinder of a
-lightly loaded rotor to the measured wake of hover (own choice).
+:func:`bemt.physics.vortex_cylinder.ahead`, and s = 0.2 at 0.1 diameters.  In hover the measured wake is all but
+contracted there (:func:`contracted`), so that s = 0.75.  Between the two, s goes linearly with v / w, from the cylinder
+of a lightly loaded rotor to the measured wake of hover (own choice).
 """
 
 from __future__ import annotations

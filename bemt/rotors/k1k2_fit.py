@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.rotors import k1k2 as empirical
+from bemt.physics import k1k2 as empirical
 from bemt.rotors.k1k2_points import FitPoints
 
 HUBER = 1.345

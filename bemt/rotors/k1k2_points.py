@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
-from bemt import readers as importers
-from bemt.air import Air, isa_pressure
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
-from bemt.dataset import Dataset
-from bemt.readers import apc, uiuc
-from bemt.readers._uiuc_names import parse_file_name
+from bemt.data import readers as importers
+from bemt.data.readers import apc, uiuc
+from bemt.data.readers._uiuc_names import parse_file_name
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air, isa_pressure
+from bemt.physics.dataset import Dataset
 
 RHO = 1.225
 """Density where a source states none [kg/m3]; coefficients do not depend on it."""

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.effects.base import Effect
+from bemt.physics.effects.base import Effect
 
 if TYPE_CHECKING:
-    from bemt.effects.base import RotorBuild
+    from bemt.physics.effects.base import RotorBuild
 
 KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
 """How the blade of a case is known; ``reference``: from a run of this very rotor."""

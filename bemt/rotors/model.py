@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
 from bemt.base.arrays import Array
+from bemt.physics import coefficients as co
 from bemt.rotors.latents import AsBuilt, Prior, Sensed, as_built
 from bemt.rotors.population import population
 from bemt.rotors.predict import Prediction, Solve, predict, sense
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.model import Model
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
     from bemt.rotors.latents import Prior
     from bemt.rotors.reference import ReferenceRun
 

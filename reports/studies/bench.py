@@ -32,8 +32,8 @@ from bench_work import BLADES, DIAMETER, RE, RPM, Work, prepare
 from numpy.typing import ArrayLike
 
 from bemt import __version__
-from bemt import coefficients as co
-from bemt.air import Air
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air
 
 SCHEMA = "bemt.bench/1"
 
@@ -54,7 +54,7 @@ def cpu_us(call: Callable[[], Any], points: int, repeats: int, seconds: float = 
 
 def measure(work: Work, quick: bool = False) -> dict[str, Any]:
     """Time our solver on the work. [us]"""
-    from bemt.bem import solver
+    from bemt.physics.bem import solver
 
     air = Air.from_density()
     rpm, V = work.rpm, work.V

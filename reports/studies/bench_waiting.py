@@ -42,11 +42,11 @@ rpm, V = np.linspace(2000.0, 9000.0, 10000), np.linspace(0.0, 20.0, 10000)
 out = {"one_point_ms": 1e3 * best(lambda: rotor.solve(6000), 5 * repeats)}
 out["many_points_s"] = best(lambda: rotor.solve(rpm, V), repeats)
 if cases:
-    from bemt.case import find_cases, load_case
+    from bemt.rotors.case import find_cases, load_case
     try:
-        from bemt.compare.sweep.case import solve_case  # until 0.2
+        from bemt.judge.compare.sweep.case import solve_case  # until 0.2
     except ImportError:
-        from bemt.sweep.case import solve_case
+        from bemt.results.sweep.case import solve_case
     loaded = [load_case(file) for file in find_cases([cases])]
     solve_case(loaded[0])  # compiled
     def sweep():

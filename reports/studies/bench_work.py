@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
 from bemt.base.errors import Fault, InputError
+from bemt.physics import coefficients as co
 
 if TYPE_CHECKING:
-    from bemt.bem.solver import Prepared
+    from bemt.physics.bem.solver import Prepared
 
 Array = NDArray[np.float64]
 DATA = Path(__file__).with_name("bench_data")
@@ -111,7 +111,7 @@ def generate(folder: Path | str) -> list[Path]:
     beta = atan(pitch/(2 pi r)) with 5 in of pitch on 10 in, chord ``apc_like``; 30 equal elements from r/R 0.15 to 1,
     values at their centres.  The table: every degree from -180 to 180.
     """
-    from bemt.sections.neuralfoil import tunnel_polar
+    from bemt.physics.sections.neuralfoil import tunnel_polar
     from geometry.airfoil import naca
     from geometry.laws import chord_over_R
 
@@ -142,9 +142,9 @@ def generate(folder: Path | str) -> list[Path]:
 
 def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepared:
     """Prepare the rotor of the work."""
-    from bemt.bem import solver
-    from bemt.effects import standard
-    from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
+    from bemt.physics.bem import solver
+    from bemt.physics.effects import standard
+    from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
     from geometry.airfoil import naca
     from geometry.blade import Stations, from_stations
     from geometry.rotor import Rotor

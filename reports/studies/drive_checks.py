@@ -9,9 +9,9 @@ import drive_identify as identify
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.dataset import Dataset
-from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.drive.rotor_table import quadratic
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
+from bemt.tools.drive.rotor_table import quadratic
 
 Array = NDArray[np.float64]
 

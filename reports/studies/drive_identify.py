@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
-from bemt.drive import transient
-from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.drive.rotor_table import RotorMap, quadratic
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import transient
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
+from bemt.tools.drive.rotor_table import RotorMap, quadratic
 
 Array = NDArray[np.float64]
 FREE: dict[str, tuple[float, float, float]] = {

@@ -18,12 +18,12 @@ import drive_identify as identify
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
-from bemt.dataset import Dataset
-from bemt.drive import map_points, picture
-from bemt.drive.drive_model import Drive
+from bemt.data import readers as importers
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import map_points, picture
+from bemt.tools.drive.drive_model import Drive
 
 Array = NDArray[np.float64]
 KGF = 9.80665

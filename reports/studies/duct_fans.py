@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.units import KGF
-from bemt.case import Case
-from bemt.case.load import case_of
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate
+from bemt.rotors.case import Case
+from bemt.rotors.case.load import case_of
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import propagate
 
 Array = NDArray[np.float64]
 

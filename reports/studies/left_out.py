@@ -19,18 +19,18 @@ from population_fit import fit
 
 from bemt import __version__
 from bemt.base.tables import json_text, plain, write_atomic
-from bemt.coefficients import M_tip
+from bemt.physics.coefficients import M_tip
 from bemt.rotors.conditioning import condition
 from bemt.rotors.latents import Prior
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
+from bemt.rotors.validate.built import Expected, Observed, Pool, expect, law, lying, observe
+from bemt.rotors.validate.points import J_SHARE, KINDS, Folder, counted, read_folders
+from bemt.rotors.validate.propellers import effects_without, where
 from bemt.rotors.validity import Validity
-from bemt.validate.built import Expected, Observed, Pool, expect, law, lying, observe
-from bemt.validate.points import J_SHARE, KINDS, Folder, counted, read_folders
-from bemt.validate.propellers import effects_without, where
 
 if TYPE_CHECKING:
-    from bemt.effects import Effect
+    from bemt.physics.effects import Effect
 
 SCHEMA = "bemt.left_out/3"
 RUN_POINTS = 24

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from bemt.air import Air
-    from bemt.sections.polars import Polar
+    from bemt.physics.air import Air
+    from bemt.physics.sections.polars import Polar
     from geometry.rotor import Rotor
 
 Array = NDArray[np.float64]

@@ -20,11 +20,11 @@ import numpy as np
 import thesis as th
 
 from bemt import __version__
-from bemt import coefficients as co
-from bemt.air import Air
 from bemt.base.folders import find_data
 from bemt.base.units import INCH, KGF, RPM
-from bemt.rotors import k1k2 as k
+from bemt.physics import coefficients as co
+from bemt.physics import k1k2 as k
+from bemt.physics.air import Air
 
 SCHEMA = "bemt.reproduce/1"
 WIDTH = 100
@@ -42,7 +42,7 @@ def uiuc_statistics(folder: Path) -> dict[str, Any]:
     Thrust follows from CT at 1.225 kg/m3: density cancels in the ratio, and so does n.  Propellers without a nominal
     pitch are left out; 3- and 4-blade ones are kept, as the model has no blade count.
     """
-    from bemt.readers.uiuc import scan_folder
+    from bemt.data.readers.uiuc import scan_folder
 
     static: list[np.ndarray] = []
     x: list[np.ndarray] = []

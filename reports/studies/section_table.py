@@ -1,4 +1,4 @@
-"""Make the shipped table of NACA four-digit sections, bemt/sections/four_digit.npz, by runs of NeuralFoil.
+"""Make the shipped table of NACA four-digit sections, bemt/physics/sections/four_digit.npz, by runs of NeuralFoil.
 
 ``python reports/studies/section_table.py write`` makes the table (20 s); ``check`` compares it with NeuralFoil at
 random sections, table and rotor (1 min). Both need ``pip install "bemt[neuralfoil]"``.
@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base import cache
-from bemt.sections import four_digit, neuralfoil
-from bemt.sections.polars import DEFAULT_RE
+from bemt.physics.sections import four_digit, neuralfoil
+from bemt.physics.sections.polars import DEFAULT_RE
 from geometry.airfoil import naca4
 
 NODES = {
@@ -48,8 +48,8 @@ def write(path: Path) -> None:
 
 def check(count: int) -> None:
     """Errors of the table at random sections: cl and cd from -4 to 10 deg, CT and CP of a 10x5 that has them."""
-    from bemt.bem.model import Model
-    from bemt.library import propeller
+    from bemt.app.library import propeller
+    from bemt.physics.bem.model import Model
 
     random = np.random.default_rng(1)
     rotor = propeller("10x5").case.rotor()

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt import coefficients as co
 from bemt.base import unit_errors
 from bemt.base.units import G0, INCH, KGF, LBF
-from bemt.rotors import k1k2 as k
+from bemt.physics import coefficients as co
+from bemt.physics import k1k2 as k
 
 REPRODUCED = "reproduced"
 ROUNDING = "reproduced within rounding"

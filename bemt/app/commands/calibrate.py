@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options, _terminal
 
 NAME = "calibrate"
 HELP = "refit K1/K2 on measured propellers, with intervals and scores"

@@ -6,8 +6,8 @@ import argparse
 import shlex
 from pathlib import Path
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options, _terminal
 
 NAME = "calibrate-rotor"
 HELP = "learn a rotor's blade as built from a reference run of it"
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Condition, write, print; 1 if the fit did not converge."""
     from bemt.base.tables import json_text
-    from bemt.diagnose.rotor_calibration import calibrate, document, text, write
+    from bemt.judge.diagnose.rotor_calibration import calibrate, document, text, write
 
     with _terminal.progress(args.quiet or args.json) as say:
         case, found = calibrate(args.reference, args.case, say)

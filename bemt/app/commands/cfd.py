@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options, _terminal
 
 NAME = "cfd"
 HELP = "run a campaign of OpenFOAM cases and record the results"
@@ -30,10 +30,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run what is not recorded yet, or summarise a folder of campaigns; 1 if a point did not converge."""
     from bemt.base.tables import json_text
-    from bemt.cfd import campaign as campaigns
+    from bemt.tools.cfd import campaign as campaigns
 
     if campaigns.is_folder_of_campaigns(args.campaign):
-        from bemt.cfd.summary import summary, summary_text
+        from bemt.tools.cfd.summary import summary, summary_text
 
         found = summary(args.campaign)
         print(json_text(found) if args.json else summary_text(found), end="")

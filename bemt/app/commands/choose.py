@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 NAME = "choose"
 HELP = "which propeller and which motor constant reach a thrust, with the probability that they do"
@@ -55,7 +55,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Rank; 1 if nothing meets the target with the probability asked for."""
     from bemt.base.tables import json_text
-    from bemt.design import answer, choose
+    from bemt.tools.design import answer, choose
 
     table = choose(
         args.thrust, args.cells, kv=args.kv, motors=args.motors or (),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options
 
 NAME = "cite"
 HELP = "list the sources that the answer for a case stands on"
@@ -23,9 +23,9 @@ def run(args: argparse.Namespace) -> int:
     """Print the sources."""
     import shutil
 
+    from bemt.app.library.rotors import rotor_of
     from bemt.base.tables import json_text
-    from bemt.case import sources
-    from bemt.library.rotors import rotor_of
+    from bemt.rotors.case import sources
 
     case = rotor_of(args.case).case
     width = min(100, shutil.get_terminal_size((100, 24)).columns)

@@ -18,10 +18,10 @@ from collections.abc import Iterable, Sequence
 from types import ModuleType
 from typing import Any
 
-import bemt.commands
+import bemt.app.commands
 from bemt import __version__
+from bemt.app.commands._terminal import coloured
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
-from bemt.commands._terminal import coloured
 
 EXIT_INTERRUPTED = 130
 GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
@@ -117,8 +117,8 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
 
 def commands() -> dict[str, ModuleType]:
     """Find every file of this folder that defines a command, by the command's name."""
-    names = [info.name for info in pkgutil.iter_modules(bemt.commands.__path__) if not info.name.startswith("_")]
-    files = [importlib.import_module(f"bemt.commands.{name}") for name in names if name != "cli"]
+    names = [info.name for info in pkgutil.iter_modules(bemt.app.commands.__path__) if not info.name.startswith("_")]
+    files = [importlib.import_module(f"bemt.app.commands.{name}") for name in names if name != "cli"]
     return {file.NAME: file for file in files if hasattr(file, "NAME")}
 
 

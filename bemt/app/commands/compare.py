@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options, _terminal
 
 if TYPE_CHECKING:
-    from bemt.diagnose.contrast import Contrast
+    from bemt.judge.diagnose.contrast import Contrast
 
 NAME = "compare"
 HELP = "say what changed between two recordings, or compare one CFD run with BEMT (RUN --case CASE)"
@@ -42,9 +42,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare, write, print."""
     from bemt.base.tables import json_text
-    from bemt.compare import two_grids, two_runs
-    from bemt.compare.contrast_text import text
-    from bemt.diagnose.contrast import compare
+    from bemt.judge.compare import two_grids, two_runs
+    from bemt.judge.compare.contrast_text import text
+    from bemt.judge.diagnose.contrast import compare
 
     if args.b is None:
         return _one_run(args)
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 def _one_run(args: argparse.Namespace) -> int:
     """One CFD run beside the model of a case."""
     from bemt.base.errors import Fault, InputError
-    from bemt.compare import one_run
+    from bemt.judge.compare import one_run
 
     if not args.case:
         hint = "Two recordings, A B, need none"
@@ -89,8 +89,8 @@ def _draw_first(args: argparse.Namespace, files: list[str]) -> None:
     if not args.out or args.no_figures:
         return
     from bemt.base.tables import write_atomic
-    from bemt.diagnose.figures_recording import FIRST, first_picture
-    from bemt.diagnose.load import load_all
+    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.load import load_all
 
     cases, records = load_all(files, [args.case])
     out = Path(args.out)
@@ -117,12 +117,12 @@ def _show(args: argparse.Namespace, document: dict[str, Any], screen: str, whole
 def _write(out: Path, answer: Contrast, figures: bool) -> None:
     """Write comparison.json, its text and a picture."""
     from bemt.base.tables import json_text, write_atomic
-    from bemt.compare.contrast_text import text
+    from bemt.judge.compare.contrast_text import text
 
     out.mkdir(parents=True, exist_ok=True)
     write_atomic(out / "comparison.json", json_text(answer.document))
     write_atomic(out / "comparison.txt", text(answer.document, details=True) + "\n")
     if figures:
-        from bemt.compare.contrast_figure import picture
+        from bemt.judge.compare.contrast_figure import picture
 
         write_atomic(out / "comparison.png", picture(answer.change, answer.document))

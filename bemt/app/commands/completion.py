@@ -20,8 +20,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the script."""
+    from bemt.app.commands.cli import build_parser
     from bemt.base.errors import needs
-    from bemt.commands.cli import build_parser
 
     shtab = needs("shtab", "completion")
     parser = build_parser()

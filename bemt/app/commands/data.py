@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options, _terminal
 
 NAME = "data"
 HELP = "download a public database of measured propellers into the cache"
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Download what is not there yet."""
     from bemt.base.tables import json_text
-    from bemt.recordings import database
+    from bemt.data.recordings import database
 
     folder = database.folder_of(args.kind, args.dir)
     with _terminal.progress() as say:

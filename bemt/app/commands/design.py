@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options, _terminal
 
 NAME = "design"
 HELP = "design chord and twist of a blade for a thrust; writes a case next to the best label and the ideal"
@@ -58,10 +58,10 @@ def run(args: argparse.Namespace) -> int:
     from bemt.base.errors import Fault, InputError
     from bemt.base.tables import json_text
     from bemt.base.units import INCH
-    from bemt.case import load_case, new_folder
-    from bemt.design import design_answer
-    from bemt.design.blade_design import design_blade, name_of
-    from bemt.design.requirement import DesignPoint, point_of
+    from bemt.rotors.case import load_case, new_folder
+    from bemt.tools.design import design_answer
+    from bemt.tools.design.blade_design import design_blade, name_of
+    from bemt.tools.design.requirement import DesignPoint, point_of
 
     points = [point_of(text) for text in args.point]
     if args.thrust is not None:

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options, _terminal
 
 if TYPE_CHECKING:
-    from bemt.diagnose.suggest import Given
+    from bemt.judge.diagnose.suggest import Given
 
 NAME = "diagnose"
 HELP = "say which physics or stand fault explains why a recording differs from the model"
@@ -69,11 +69,11 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose, write, print."""
     from bemt.base.errors import InputError
     from bemt.base.tables import json_text
-    from bemt.diagnose import folder
-    from bemt.diagnose.along_blade import along
-    from bemt.diagnose.chain import diagnose
-    from bemt.diagnose.document import document, text
-    from bemt.diagnose.load import cases_of, load_all
+    from bemt.judge.diagnose import folder
+    from bemt.judge.diagnose.along_blade import along
+    from bemt.judge.diagnose.chain import diagnose
+    from bemt.judge.diagnose.document import document, text
+    from bemt.judge.diagnose.load import cases_of, load_all
 
     args.case, args.recordings = _options.sorted_out(args.case, args.recordings)
     _both_there(args)
@@ -124,7 +124,7 @@ def _both_there(args: argparse.Namespace) -> None:
 def _too_few(args: argparse.Namespace, got: str, say: Callable[[str], None] | None) -> int:
     """One point cannot be diagnosed: it is shown with the model, and what would decide."""
     from bemt.base.tables import json_text
-    from bemt.compare import one_run
+    from bemt.judge.compare import one_run
 
     document = one_run.compare_run(args.recordings[0], args.case[0], say) | {"verdict": "insufficient", "effects": []}
     if args.json:
@@ -136,7 +136,7 @@ def _too_few(args: argparse.Namespace, got: str, say: Callable[[str], None] | No
 
 def _given(args: argparse.Namespace) -> Given:
     """What was asked, for the command of the next step."""
-    from bemt.diagnose.suggest import Given
+    from bemt.judge.diagnose.suggest import Given
 
     words = ["--case", *args.case]
     for option, values in (("--off", args.off), ("--only", args.only or ())):

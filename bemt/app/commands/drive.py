@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 NAME = "drive"
 HELP = "thrust, current and hover of a rotor with its motor, from a label or from a case with a table [drive]"
@@ -32,7 +32,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve the drive; 1 if hover or airspeed is beyond it, or a point is unconverged."""
     from bemt.base.tables import json_text
-    from bemt.drive import drive_result
+    from bemt.tools.drive import drive_result
 
     case = drive_result.case_for(
         args.case, kv=args.kv, cells=args.cells, mass_kg=args.mass, rotors=args.rotors, capacity_Ah=args.capacity

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options
 
 NAME = "effects"
 HELP = "list every effect: parameters, ranges, sources, signature"
@@ -23,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue."""
     from bemt.base.tables import json_text
-    from bemt.report import effects_list
+    from bemt.results.report import effects_list
 
     made = json_text(effects_list.document()) if args.json else effects_list.markdown() if args.markdown else ""
     print(made or effects_list.text() + "\n", end="")

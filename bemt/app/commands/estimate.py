@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options
 
 NAME = "estimate"
 HELP = "thrust and power from a label such as 10x5, with bands; K1/K2 for comparison"
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     from bemt.base.errors import InputError
     from bemt.base.tables import json_text
-    from bemt.case.estimate import document, text
+    from bemt.rotors.case.estimate import document, text
 
     try:
         found = document(args.label, args.rpm, args.airspeed or (), args.blades, args.chord_mm, args.measured_pitch_in,

@@ -6,11 +6,11 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_INPUT, EXIT_OK
-from bemt.commands import _options, _terminal
 
 if TYPE_CHECKING:
-    from bemt.exports.printing import Print
+    from bemt.tools.exports.printing import Print
 
 NAME = "export"
 HELP = "write a case for CAD, CFD, simulators and design tools"
@@ -22,7 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the files and manifest.json")
-    from bemt.exports import target_ids
+    from bemt.tools.exports import target_ids
 
     kinds = target_ids()
     what = f"one or more (default stl): {', '.join(kinds)}"
@@ -83,7 +83,7 @@ def _printing(parser: argparse.ArgumentParser) -> None:
 def _request(args: argparse.Namespace) -> Print | None:
     """What is to be printed; None for a rotor as its sections say."""
     from bemt.base.errors import Fault, InputError
-    from bemt.exports.printing import Print, asked
+    from bemt.tools.exports.printing import Print, asked
 
     recess, hexagon = (None if pair is None else (pair[0], pair[1]) for pair in (args.recess_mm, args.hex_mm))
     request = Print(None, args.trailing_edge_mm, args.tip_round, None, args.hub_diameter_mm, args.hub_height_mm,
@@ -98,8 +98,8 @@ def _request(args: argparse.Namespace) -> Print | None:
 def run(args: argparse.Namespace) -> int:
     """Write every valid target of every valid case; 2 if one was refused."""
     from bemt.base.tables import json_text
-    from bemt.exports import folder
-    from bemt.exports.openfoam.write import Run
+    from bemt.tools.cfd.openfoam.write import Run
+    from bemt.tools.exports import folder
 
     request = _request(args)
     flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,

@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 if TYPE_CHECKING:
-    from bemt.flight.answer import FlightAnswer
+    from bemt.tools.flight.answer import FlightAnswer
 
 NAME = "fly"
 HELP = "identify the rotors of a flight log, and compare it with healthy flights"
@@ -51,11 +51,11 @@ def run(args: argparse.Namespace) -> int:
     """Read, identify, judge, print."""
     from bemt.base.errors import Fault, InputError
     from bemt.base.tables import json_text
-    from bemt.flight.answer import answer_on
-    from bemt.flight.read import read_log
+    from bemt.tools.flight.answer import answer_on
+    from bemt.tools.flight.read import read_log
 
     if args.layout == "list":
-        from bemt.flight.layout import LAYOUTS
+        from bemt.tools.flight.layout import LAYOUTS
 
         print("\n".join(f"{name:<14} {places}" for name, places in LAYOUTS.items()))
         return EXIT_OK
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
         answers.append(_with_model(answer, args.case) if args.case else answer)
     learnt, code = _learn(args, answers) if args.out_case else ("", EXIT_OK)
     if args.picture:
-        from bemt.flight.picture import flight_picture
+        from bemt.tools.flight.picture import flight_picture
 
         Path(args.picture).write_bytes(flight_picture(answers[0], args.mass))
     if args.json:
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
             end="",
         )
     elif not args.quiet:
-        from bemt.flight.text import text
+        from bemt.tools.flight.text import text
 
         print("\n\n".join([*(text(a) for a in answers), *([learnt] if learnt else [])]))
     return code
@@ -98,11 +98,11 @@ def _learn(args: argparse.Namespace, answers: list[FlightAnswer]) -> tuple[str, 
     """Write the case with the rotor as the flights show it; gives what to print, and the exit code."""
     import shlex
 
+    from bemt.app.library.rotors import rotor_of
     from bemt.base.errors import Fault, InputError
-    from bemt.case.load import with_changes
-    from bemt.diagnose.rotor_calibration import document, text, write
-    from bemt.flight.rotor_case import learn_from_flights
-    from bemt.library.rotors import rotor_of
+    from bemt.judge.diagnose.rotor_calibration import document, text, write
+    from bemt.rotors.case.load import with_changes
+    from bemt.tools.flight.rotor_case import learn_from_flights
 
     if not args.case:
         raise InputError(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
@@ -132,9 +132,9 @@ def _with_model(answer: FlightAnswer, case: str) -> FlightAnswer:
 
     import numpy as np
 
+    from bemt.app.library.rotors import rotor_of
     from bemt.base.errors import Fault, InputError
-    from bemt.flight.answer import Predicted
-    from bemt.library.rotors import rotor_of
+    from bemt.tools.flight.answer import Predicted
 
     speeds = answer.found.rotors.get("mean rpm")
     if speeds is None:

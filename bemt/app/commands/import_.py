@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bemt.commands import _options
+from bemt.app.commands import _options
 
 if TYPE_CHECKING:
-    from bemt.compare.first_picture import PredictionView
+    from bemt.judge.compare.first_picture import PredictionView
 
 NAME = "import"
 HELP = "read CFD, bench or vendor data: channels, means, drift, warnings"
@@ -60,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
     """Read and show every file, and the CFD run that they make; the worst result sets the exit code."""
     from bemt.base.errors import Fault, InputError
     from bemt.base.tables import json_text
-    from bemt.recordings import cfd_options, load
-    from bemt.recordings.choice import asked
+    from bemt.data.recordings import cfd_options, load
+    from bemt.data.recordings.choice import asked
 
     if args.picture and not args.case:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     names = ("unit", "column", "sign", "sector", "zones", "axis", "airspeed", "density", "reference", "setup")
     insist = any(getattr(args, name) for name in (*names, "run_toml"))
     if insist and (table := _table(args)):
-        from bemt.recordings.stated import write_recording
+        from bemt.data.recordings.stated import write_recording
 
         if not args.run_toml:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
@@ -98,10 +98,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _table(args: argparse.Namespace) -> str | None:
     """The one table of measurements whose columns the options are about; None where they are about a CFD run."""
-    from bemt import readers
     from bemt.base.errors import InputError
-    from bemt.readers.cfd_run import KIND as RUN
-    from bemt.recordings.cfd_files import PROGRAMS
+    from bemt.data import readers
+    from bemt.data.readers.cfd_run import KIND as RUN
+    from bemt.data.recordings.cfd_files import PROGRAMS
 
     others = ("sector", "zones", "axis", "airspeed", "density", "reference", "setup")
     if len(args.files) != 1 or any(getattr(args, name) for name in others) or Path(args.files[0]).is_dir():
@@ -118,8 +118,8 @@ def _beside(args: argparse.Namespace, run_toml: str) -> PredictionView | None:
     if not args.case:
         return None
     from bemt.base.tables import write_atomic
-    from bemt.diagnose.figures_recording import first_picture
-    from bemt.diagnose.load import load_all
+    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.load import load_all
 
     speed = [args.rpm] if args.rpm is not None and not run_toml else []
     wind = [args.airspeed] if args.airspeed is not None and not run_toml else []

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 NAME = "map"
 HELP = "fit a map from pulse width to thrust and its inverse to a bench recording"
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit, write, print; 1 if the drive cannot give the requested thrust."""
     from bemt.base.tables import json_text
-    from bemt.drive import map_result
+    from bemt.tools.drive import map_result
 
     found = map_result.fit(args.files, args.sign, args.nodes, args.name, args.thrust, args.voltage, args.out)
     print(json_text(found.document) if args.json else map_result.text(found), end="")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 NAME = "motor"
 HELP = "compare the motor constant from data sheet, back-EMF and torque sensor"
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Generate, judge, print; 1 when the methods disagree."""
     from bemt.base.tables import json_text
-    from bemt.drive import motor_result
+    from bemt.tools.drive import motor_result
 
     motor_result.check_options(args.file, args.generate, args.seed, args.plant, args.out)
     if args.generate:

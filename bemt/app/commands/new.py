@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, Fault, InputError
-from bemt.commands import _options
 
 NAME = "new"
 HELP = "write a case folder from a label, stations, a scan or the diameter of a fan"
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the folder and print the next command."""
     import shlex
 
-    from bemt.case import new_folder
+    from bemt.rotors.case import new_folder
 
     if args.diameter_in is not None:
         if args.diameter_mm is not None:

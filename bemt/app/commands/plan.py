@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options, _terminal
 
 NAME = "plan"
 HELP = "say which effects a test plan can see, before you measure"
@@ -29,8 +29,8 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from bemt.base.tables import json_text, write_atomic
-    from bemt.diagnose import plan
-    from bemt.diagnose.load import cases_of
+    from bemt.judge.diagnose import plan
+    from bemt.judge.diagnose.load import cases_of
 
     cases = cases_of([args.case], args.off, 1)
     with _terminal.progress(args.quiet or args.json) as say:

@@ -6,8 +6,8 @@ import argparse
 import os
 from pathlib import Path
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.commands import _options, _terminal
 
 NAME = "prove"
 HELP = "hide causes in recordings, diagnose them, score the answers"
@@ -38,8 +38,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Hide, diagnose, score; 0 if every target is met, 1 if some are missed."""
     from bemt.base.tables import json_text
-    from bemt.proof import follow, loop, proof_text
-    from bemt.proof.prove import prove
+    from bemt.judge.proof import follow, loop, proof_text
+    from bemt.judge.proof.prove import prove
 
     if args.follow and not (args.out and args.size == "real"):
         got = f"--size {args.size}" + ("" if args.out else " without --out")
@@ -66,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
 def _intervals(folders: list[str], out: str | None) -> int:
     """Write the factors on the intervals."""
     from bemt.base.tables import json_text, write_atomic
-    from bemt.diagnose.interval_scales import FILE
-    from bemt.proof.intervals import calibrate, misses
+    from bemt.judge.diagnose.interval_scales import FILE
+    from bemt.judge.proof.intervals import calibrate, misses
 
     sets, found = zip(*(misses(Path(folder)) for folder in folders), strict=True)
     write_atomic(Path(out or ".") / FILE, json_text(calibrate([m for some in found for m in some], sets)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from bemt.commands import _options, _terminal
+from bemt.app.commands import _options, _terminal
 
 NAME = "report"
 HELP = "write the validation report: one HTML file and a summary"
@@ -44,7 +44,7 @@ def _about(args: argparse.Namespace) -> dict[str, str]:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report; the exit code is that of the sweep behind it."""
-    from bemt.report import HTML_NAME, write
+    from bemt.results.report import HTML_NAME, write
 
     paths = [] if args.recording and args.paths == ["."] else args.paths
     paths, args.recording = _options.sorted_out(paths, args.recording) if args.recording else (paths, [])

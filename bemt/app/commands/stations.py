@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK
-from bemt.commands import _options
 
 NAME = "stations"
 HELP = "turn the blade of a CAD model, scan or design file into a case"
@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from bemt.base.tables import json_text
-    from bemt.case import from_blade_file, from_solid
+    from bemt.rotors.case import from_blade_file, from_solid
 
     path = Path(args.file)
     blade = from_blade_file.read_blade(path, args.unit)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_UNCONVERGED
-from bemt.commands import _options, _terminal
 
 NAME = "sweep"
 HELP = "solve cases and compare them with recorded values"
@@ -41,10 +41,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve, print, and with ``--strict`` check BEMT against the recorded values."""
     from bemt.base.tables import json_text
-    from bemt.case import find_cases
-    from bemt.sweep.batch import off_tolerance, sweep
-    from bemt.sweep.summary import summary
-    from bemt.sweep.text import case_text, overview_text
+    from bemt.results.sweep.batch import off_tolerance, sweep
+    from bemt.results.sweep.summary import summary
+    from bemt.results.sweep.text import case_text, overview_text
+    from bemt.rotors.case import find_cases
 
     with _terminal.progress(args.quiet) as say:
         document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=say,

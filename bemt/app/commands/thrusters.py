@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options
 
 NAME = "thrusters"
 HELP = "allocate force and roll moment to the thrusters of a vehicle"
@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Allocate, write, print; 1 if the command is beyond the thrusters."""
     from bemt.base.tables import json_text
-    from bemt.drive import thrusters_result
+    from bemt.tools.drive import thrusters_result
 
     found, shown, met = thrusters_result.share(args.file, args.force, args.moment, args.out)
     print(json_text(found) if args.json else shown, end="")

@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     if not 1024 <= args.port <= 65535:
         raise InputError(Fault("--port", "", f"{args.port}", "1024 to 65535"))
     needs("streamlit", "ui")
-    page = resources.files("bemt.library") / "page.py"
+    page = resources.files("bemt.app.library") / "page.py"
     options = {
         "server.address": "localhost", "server.port": args.port, "server.headless": str(args.no_browser).lower(),
         "browser.gatherUsageStats": "false", "server.fileWatcherType": "none", "server.maxUploadSize": 50,

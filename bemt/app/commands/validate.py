@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from bemt.app.commands import _options, _terminal
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.commands import _options, _terminal
 
 NAME = "validate"
 HELP = "compare BEMT with a folder of measured propellers (UIUC layout)"
@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare; 1 when points did not converge."""
     from bemt.base.tables import json_text
-    from bemt.validate.propellers import effects_without, text, validate, where, write
+    from bemt.rotors.validate.propellers import effects_without, text, validate, where, write
 
     effects = effects_without(args.off)
     found = [where(name) for name in args.folders]

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bemt.app.library.given import in_words_of_the_library, number, numbers, path_text
+from bemt.app.library.rotors import Propeller, load, rotor_of
 from bemt.base.errors import Fault, InputError, system_fault
-from bemt.dataset import Dataset, from_pandas
-from bemt.library.given import in_words_of_the_library, number, numbers, path_text
-from bemt.library.rotors import Propeller, load, rotor_of
+from bemt.physics.dataset import Dataset, from_pandas
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.case.sources import Source
-    from bemt.compare.as_measured import AsMeasured
-    from bemt.diagnose.plan import Plan
+    from bemt.judge.compare.as_measured import AsMeasured
+    from bemt.judge.diagnose.plan import Plan
+    from bemt.rotors.case.sources import Source
 
 __all__ = [
     "CalibratedRotor", "ExportedCase", "TestPlan", "calibrate_rotor", "cite", "estimate", "export", "plan", "report",
@@ -79,7 +79,7 @@ def estimate(
         ...
     bemt.base.errors.InputError: density_kg_m3: got 1225; expected 0.01 to 10 kg/m3. In g/m3? Divide by 1000.
     """
-    from bemt.case import estimate as estimating
+    from bemt.rotors.case import estimate as estimating
 
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair)).tolist() for pair in asked)
@@ -101,7 +101,7 @@ class TestPlan:
 
     Parameters
     ----------
-    found : bemt.diagnose.plan.Plan
+    found : bemt.judge.diagnose.plan.Plan
         The complete result.
 
     Examples
@@ -123,20 +123,20 @@ class TestPlan:
     @property
     def detectable(self) -> dict[str, str]:
         """Each effect: yes, maybe or no at its ordinary strength."""
-        from bemt.diagnose.plan import DETECTABLE
+        from bemt.judge.diagnose.plan import DETECTABLE
 
         return {effect: DETECTABLE[word] for effect, word in self.found.sight.items()}
 
     @property
     def text(self) -> str:
         """The tables, as on the command line."""
-        from bemt.diagnose.plan import text
+        from bemt.judge.diagnose.plan import text
 
         return text(self.found)
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to plain values of schema ``bemt.plan/1``."""
-        from bemt.diagnose.plan import document
+        from bemt.judge.diagnose.plan import document
 
         return document(self.found)
 
@@ -173,7 +173,7 @@ def plan(
         ...
     bemt.base.errors.InputError: points: got columns airspeed_m_s; expected a column rpm.
     """
-    from bemt.diagnose import plan as planning
+    from bemt.judge.diagnose import plan as planning
 
     with in_words_of_the_library():
         case = rotor_of(propeller).case
@@ -203,7 +203,7 @@ class CalibratedRotor:
     ----------
     source : Propeller
         The propeller as its case describes it.
-    found : bemt.compare.as_measured.AsMeasured
+    found : bemt.judge.compare.as_measured.AsMeasured
         What the runs say.
     recordings : tuple of str
         The files.
@@ -225,13 +225,13 @@ class CalibratedRotor:
     @property
     def text(self) -> str:
         """The answer, as on the command line."""
-        from bemt.diagnose.rotor_calibration import text
+        from bemt.judge.diagnose.rotor_calibration import text
 
         return text(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to plain values of schema ``bemt.rotor_calibration/1``."""
-        from bemt.diagnose.rotor_calibration import document
+        from bemt.judge.diagnose.rotor_calibration import document
 
         return document(self.source.case, self.found, self.recordings)
 
@@ -248,7 +248,7 @@ class CalibratedRotor:
         Propeller
             The rotor with its narrower band.
         """
-        from bemt.diagnose.rotor_calibration import write
+        from bemt.judge.diagnose.rotor_calibration import write
 
         with in_words_of_the_library():
             write(self.source.case, self.found, self.recordings, path_text("folder", folder))
@@ -283,7 +283,7 @@ def calibrate_rotor(
     Examples
     --------
     >>> import tempfile
-    >>> from bemt.library import propeller
+    >>> from bemt.app.library import propeller
     >>> folder = Path(tempfile.mkdtemp())
     >>> case = propeller("10x5").write(folder / "case")
     >>> d = load(case).solve(rpm=[4000, 6000, 8000])
@@ -296,7 +296,7 @@ def calibrate_rotor(
     >>> bool(measured.u["thrust_N"][0] < 0.7 * d.u["thrust_N"][1])
     True
     """
-    from bemt.diagnose.rotor_calibration import calibrate
+    from bemt.judge.diagnose.rotor_calibration import calibrate
 
     given = [recordings] if isinstance(recordings, (str, os.PathLike)) else list(recordings)
     paths = tuple(path_text("recordings", one) for one in given)
@@ -330,14 +330,14 @@ class ExportedCase:
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that were written now."""
-        from bemt.exports.folder import listed
+        from bemt.tools.exports.folder import listed
 
         return tuple(self.folder / name for name in listed(self.manifest))
 
     @property
     def text(self) -> str:
         """What was written and how well it holds the case, as on the command line."""
-        from bemt.exports.folder import text
+        from bemt.tools.exports.folder import text
 
         return text(self.manifest, self.folder)
 
@@ -384,9 +384,9 @@ def export(
         ...
     bemt.base.errors.InputError: formats: got 'qpropp'; expected one of ...
     """
-    from bemt.exports import target_ids
-    from bemt.exports.folder import export_case
-    from bemt.exports.openfoam.write import Run, check_run
+    from bemt.tools.cfd.openfoam.write import Run, check_run
+    from bemt.tools.exports import target_ids
+    from bemt.tools.exports.folder import export_case
 
     wanted = [formats] if isinstance(formats, str) else list(formats)
     known = target_ids()
@@ -440,7 +440,7 @@ def report(
         ...
     bemt.base.errors.InputError: no/such/case: got ...
     """
-    from bemt.report import write
+    from bemt.results.report import write
 
     given = [cases] if isinstance(cases, (str, os.PathLike)) else list(cases)
     about = {"title": title, "author": author, "date": date}
@@ -459,7 +459,7 @@ def cite(propeller: Propeller | str) -> tuple[Source, ...]:
 
     Returns
     -------
-    tuple of bemt.case.sources.Source
+    tuple of bemt.rotors.case.sources.Source
         Each with ``kind``, ``name`` and ``source``.
 
     Examples
@@ -470,6 +470,6 @@ def cite(propeller: Propeller | str) -> tuple[Source, ...]:
     >>> sorted({s.kind for s in found})
     ['band', 'comparison', 'effect', 'method', 'sections']
     """
-    from bemt.case.sources import sources
+    from bemt.rotors.case.sources import sources
 
     return sources(rotor_of(propeller).case)

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.app.library.given import in_words_of_the_library, number, path_text
+from bemt.app.library.rotors import Propeller, rotor_of
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
-from bemt.case import case_of
-from bemt.dataset import Dataset, from_pandas
-from bemt.library.given import in_words_of_the_library, number, path_text
-from bemt.library.rotors import Propeller, rotor_of
+from bemt.physics.dataset import Dataset, from_pandas
+from bemt.rotors.case import case_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.diagnose.answer import Diagnosis
-    from bemt.diagnose.contrast import Contrast
-    from bemt.diagnose.record import Record
-    from bemt.drive.drive_result import DriveResult
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.contrast import Contrast
+    from bemt.judge.diagnose.record import Record
+    from bemt.tools.drive.drive_result import DriveResult
 
 __all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
 
@@ -58,7 +58,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  #
     >>> read(file).thrust_N.round(2)
     array([3.33, 4.81])
     """
-    from bemt.recordings.load import as_dataset, import_file
+    from bemt.data.recordings.load import as_dataset, import_file
 
     return as_dataset(import_file(path_text("path", path), format))
 
@@ -69,7 +69,7 @@ class Answer:
 
     Parameters
     ----------
-    diagnosis : bemt.diagnose.answer.Diagnosis
+    diagnosis : bemt.judge.diagnose.answer.Diagnosis
         The complete result.
     propeller : Propeller
         The propeller that was compared with the recording.
@@ -79,7 +79,7 @@ class Answer:
     The blades of this recording are 1.5 deg steeper than those of its reference:
 
     >>> import numpy as np
-    >>> from bemt.library import propeller
+    >>> from bemt.app.library import propeller
     >>> p = propeller("10x5")
     >>> rpm, J = np.repeat([5000.0, 10000.0, 15000.0], 6), np.tile(np.linspace(0.0, 0.5, 6), 3)
     >>> turned = p.replaced({"blade.beta_offset_deg": 2.2}).solve(rpm, J=J, bands=False)
@@ -122,14 +122,14 @@ class Answer:
     @property
     def text(self) -> str:
         """The answer as text, as on the command line."""
-        from bemt.diagnose.document import text
+        from bemt.judge.diagnose.document import text
 
         return text(self.diagnosis)
 
     @property
     def improved(self) -> Propeller | None:
         """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
-        from bemt.diagnose.improve import improved_case
+        from bemt.judge.diagnose.improve import improved_case
 
         text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
@@ -142,7 +142,7 @@ class Answer:
         dict
             Schema ``bemt.diagnosis/1``.
         """
-        from bemt.diagnose.document import document
+        from bemt.judge.diagnose.document import document
 
         return document(self.diagnosis)
 
@@ -160,7 +160,7 @@ class Answer:
             The files.
         """
         from bemt.base.errors import system_fault
-        from bemt.diagnose import figures
+        from bemt.judge.diagnose import figures
 
         try:
             return figures.draw(self.diagnosis, Path(path_text("folder", folder)))
@@ -210,9 +210,9 @@ def diagnose(
     """
     from dataclasses import replace
 
-    from bemt.diagnose import load as loading
-    from bemt.diagnose import record as records
-    from bemt.diagnose.chain import diagnose as run
+    from bemt.judge.diagnose import load as loading
+    from bemt.judge.diagnose import record as records
+    from bemt.judge.diagnose.chain import diagnose as run
 
     rotor = rotor_of(propeller)
 
@@ -263,7 +263,7 @@ def drive(
 
     Returns
     -------
-    bemt.drive.drive_result.DriveResult
+    bemt.tools.drive.drive_result.DriveResult
         ``.full``, ``.hover``, ``.text``, ``.to_dict()``; each value with its band.
 
     Raises
@@ -278,7 +278,7 @@ def drive(
     >>> bool(7.0 < d.full["thrust_N"].value < 13.0)
     True
     """
-    from bemt.drive import drive_result
+    from bemt.tools.drive import drive_result
 
     given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
     for name, value in (*given.items(), ("airspeed_m_s", airspeed_m_s)):
@@ -306,7 +306,7 @@ def compare(
 
     Returns
     -------
-    bemt.diagnose.contrast.Contrast
+    bemt.judge.diagnose.contrast.Contrast
         ``.document`` is the answer in the format ``bemt.comparison/1``.
 
     Raises
@@ -329,7 +329,7 @@ def compare(
     >>> print(found.text.splitlines()[0])
     Gain error of the thrust cell, or second rotor on the same axis (thrust -10.0% and torque +0.0%).
     """
-    from bemt.diagnose import contrast
+    from bemt.judge.diagnose import contrast
 
     diameter = contrast.label_diameter(None) if diameter_m is None else number("diameter_m", diameter_m)
     if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
@@ -363,6 +363,6 @@ def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
         ...
     bemt.base.errors.InputError: no/such/folder: got ...
     """
-    from bemt.validate import propellers
+    from bemt.rotors.validate import propellers
 
     return propellers.validate(propellers.where(path_text("folder", folder)))

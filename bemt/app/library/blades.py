@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from numbers import Real
 from typing import TYPE_CHECKING
 
+from bemt.app.library.given import in_words_of_the_library, path_text
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.library.given import in_words_of_the_library, path_text
 
 if TYPE_CHECKING:
-    from bemt.design.blade_design import Design
+    from bemt.tools.design.blade_design import Design
 
 __all__ = ["design"]
 
@@ -53,7 +53,7 @@ def design(
     max_tip_mach, stall_margin : float
         Helical tip Mach number; share of the section's largest lift that is kept in hand. [1]
     material, safety : str, float
-        One of `bemt.design.materials.MATERIALS`; strength over stress at least.
+        One of `bemt.tools.design.materials.MATERIALS`; strength over stress at least.
     density_kg_m3 : float, optional
         Air density; 1.225 by default. [kg/m3]
     duct : path, optional
@@ -82,9 +82,9 @@ def design(
 
     The page on design (docs/design.md) has one that is designed.
     """
-    from bemt.case import load_case
-    from bemt.design.blade_design import design_blade
-    from bemt.design.requirement import DesignPoint
+    from bemt.rotors.case import load_case
+    from bemt.tools.design.blade_design import design_blade
+    from bemt.tools.design.requirement import DesignPoint
 
     given = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
              "blades": blades, "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,

@@ -16,7 +16,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 __all__ = ["conditions", "in_words_of_the_library", "number", "numbers", "path_text", "turned"]
 

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bemt.app.library.given import conditions, in_words_of_the_library, number, numbers, path_text, turned
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
 from bemt.base.tables import number_of
-from bemt.bem.coaxial import LOADS, RATIOS
-from bemt.case import Case, case_of, find_cases, fresh, load_case
-from bemt.dataset import Dataset
-from bemt.library.given import conditions, in_words_of_the_library, number, numbers, path_text, turned
+from bemt.physics.bem.coaxial import LOADS, RATIOS
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.bem.gradient import Gradient
-    from bemt.bem.model import Model
+    from bemt.physics.bem.gradient import Gradient
+    from bemt.physics.bem.model import Model
 
 __all__ = ["Propeller", "load", "propeller"]
 
@@ -42,7 +42,7 @@ class Propeller:
 
     Parameters
     ----------
-    case : bemt.case.Case
+    case : bemt.rotors.case.Case
         Geometry, air, model and declared unknowns.
     text : str
         The case as text, as written by :meth:`write`.
@@ -160,7 +160,7 @@ class Propeller:
         >>> bool(d.thrust_N[1] > 2 * d.thrust_N[0]), bool(d.H_force_N[1] > 0)
         (True, True)
         """
-        from bemt.case import lattice
+        from bemt.rotors.case import lattice
 
         n, V, angle = turned(self.case, *conditions(self.case, rpm, airspeed_m_s, J), angle_deg)
         density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
@@ -314,8 +314,8 @@ class Propeller:
         """
         import pandas as pd
 
-        from bemt.bem import kernel as K
-        from bemt.bem import solver
+        from bemt.physics.bem import kernel as K
+        from bemt.physics.bem import solver
 
         n, V = conditions(self.case, rpm, airspeed_m_s, J)
         if n.size != 1:
@@ -360,7 +360,7 @@ class Propeller:
         >>> g.beta.shape, bool(g.pitch[0] > 0), bool(g.airspeed[0] < 0)
         ((2, 40), True, True)
         """
-        from bemt.bem.gradient import gradient
+        from bemt.physics.bem.gradient import gradient
 
         one, V = conditions(self.case, rpm, airspeed_m_s, J)
         if one.size != 1:
@@ -370,7 +370,7 @@ class Propeller:
     @cached_property
     def _model(self) -> Model:
         """The rotor prepared once."""
-        from bemt.case.prepare import prepare_case
+        from bemt.rotors.case.prepare import prepare_case
 
         return prepare_case(self.case)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.gaussian.whitening import triangular
+from bemt.base.gaussian.whitening import triangular
 
 
 def log_sum(log_values: ArrayLike, log_weights: ArrayLike = 0.0, axis: int = -1) -> Array:

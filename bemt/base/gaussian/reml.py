@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.gaussian.whitening import whitener
+from bemt.base.gaussian.whitening import whitener
 
 _RANK, _TINY = 1e-8, 1e-9
 

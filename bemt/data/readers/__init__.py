@@ -5,8 +5,8 @@ A reader is a module of this package (its name does not start with ``_``) that d
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True if the head of a file (:data:`HEAD_BYTES` bytes, or text) has this format;
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
-  with all its faults. Use :class:`bemt.readers._recording.Builder` or :func:`bemt.readers._columns.dataset`. Readers of
-  blades and polars return the object of their own package instead;
+  with all its faults. Use :class:`bemt.data.readers._recording.Builder` or :func:`bemt.data.readers._columns.dataset`.
+  Readers of blades and polars return the object of their own package instead;
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
 
@@ -32,7 +32,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml_text import Collector
-from bemt.readers._packed import MAX_BYTES, packed, unpacked
+from bemt.data.readers._packed import MAX_BYTES, packed, unpacked
 
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
@@ -130,7 +130,7 @@ def _other_code(raw: bytes) -> str:
 @lru_cache(maxsize=4)  # every reader asks about the head of one file
 def _shown_code(head: bytes) -> str | None:
     """Code in which the head of a file shows a known word."""
-    from bemt.readers._words import FOREIGN
+    from bemt.data.readers._words import FOREIGN
 
     for code in _CODES:
         text = head.decode(code, errors="ignore").lower()

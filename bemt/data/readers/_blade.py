@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.readers import SourceText, load_text, number
-from bemt.sections.parametric import QpropSection, XrotorSection
-from bemt.sections.polars import DEFAULT_RE, Polar
+from bemt.data.readers import SourceText, load_text, number
+from bemt.physics.sections.parametric import QpropSection, XrotorSection
+from bemt.physics.sections.polars import DEFAULT_RE, Polar
 
 SPAN_DEG = (-20.0, 25.0)
 """Angles of the written tables; beyond them flat-plate laws continue."""

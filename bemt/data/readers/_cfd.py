@@ -21,9 +21,9 @@ from bemt.base.arrays import Array
 from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers._columns import Channel, dataset
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers._columns import Channel, dataset
+from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")

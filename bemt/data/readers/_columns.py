@@ -11,8 +11,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
-from bemt.dataset import Dataset
-from bemt.dataset.channels import channel_fault, unit_in
+from bemt.physics.dataset import Dataset
+from bemt.physics.dataset.channels import channel_fault, unit_in
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """What importers of recordings share: cells that become channels, and rows that need a flag.
 
-Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.readers._split`), every cell a
-number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.readers._headings`.
+Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.data.readers._split`), every cell
+a number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.data.readers._headings`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import load_text
-from bemt.readers._columns import Channel, dataset
-from bemt.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
-from bemt.readers._large import NumberTable
-from bemt.readers._samples import clock_seconds, spikes
-from bemt.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
-from bemt.readers._words import english, quantities
+from bemt.data.readers import load_text
+from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
+from bemt.data.readers._large import NumberTable
+from bemt.data.readers._samples import clock_seconds, spikes
+from bemt.data.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
+from bemt.data.readers._words import english, quantities
+from bemt.physics.dataset import Dataset
 
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
 """Throttle beyond which it is no fraction; greatest one from which it is percent. [1]"""

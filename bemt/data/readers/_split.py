@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from bemt.base import units
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
-from bemt.readers import SourceText, number
-from bemt.readers._unit_text import unit_of
-from bemt.readers._words import english, quantities
+from bemt.data.readers import SourceText, number
+from bemt.data.readers._unit_text import unit_of
+from bemt.data.readers._words import english, quantities
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20

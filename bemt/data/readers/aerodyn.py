@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.tables import number_of
-from bemt.readers import SourceText, head_text, load_text, number, polar_aerodyn
-from bemt.readers._blade import BladeFile, Cursor, as_count
-from bemt.sections.polars import Polar
+from bemt.data.readers import SourceText, head_text, load_text, number, polar_aerodyn
+from bemt.data.readers._blade import BladeFile, Cursor, as_count
+from bemt.physics.sections.polars import Polar
 
 KIND = "aerodyn"
 BLADE = True

@@ -29,8 +29,8 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, head_text, load_text, number
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.physics.dataset import Dataset
 
 KIND = "apc"
 SOURCE = "APC Propellers (Landing Products), published data file"

@@ -24,9 +24,8 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base.averaging import Mean
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, load_text, number
-from bemt.readers._cfd import (
+from bemt.data.readers import SourceText, load_text, number
+from bemt.data.readers._cfd import (
     Column,
     ExportRow,
     cells_of,
@@ -39,8 +38,9 @@ from bemt.readers._cfd import (
     slug,
     unique,
 )
-from bemt.readers._columns import Channel, channels_of, dataset
-from bemt.readers._headings import may_be_shaft_speed
+from bemt.data.readers._columns import Channel, channels_of, dataset
+from bemt.data.readers._headings import may_be_shaft_speed
+from bemt.physics.dataset import Dataset
 
 KIND = "cfd_post_csv"
 

@@ -1,7 +1,7 @@
 """``run.toml``: the files of one CFD run, and what they do not say of themselves.
 
 ``bemt import FILES --out run.toml`` writes it; every command takes it in place of the files. A reader that is given one
-returns the checked document; `bemt.recordings.cfd_run` makes the points of it.
+returns the checked document; `bemt.data.recordings.cfd_run` makes the points of it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 from bemt.base.toml import Table, entry, read_model
-from bemt.readers import head_text
-from bemt.readers._cfd import unit_of
+from bemt.data.readers import head_text
+from bemt.data.readers._cfd import unit_of
 
 KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {

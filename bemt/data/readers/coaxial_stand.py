@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base import units
-from bemt.dataset import Dataset
-from bemt.readers import first_cells
-from bemt.readers._columns import Channel
-from bemt.readers._headings import known
-from bemt.readers._recording import Builder
+from bemt.data.readers import first_cells
+from bemt.data.readers._columns import Channel
+from bemt.data.readers._headings import known
+from bemt.data.readers._recording import Builder
+from bemt.physics.dataset import Dataset
 
 KIND = "coaxial_stand"
 _SIDES = ("left", "right")

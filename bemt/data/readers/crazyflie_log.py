@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from bemt.base.toml_text import Collector
 from bemt.base.units import G0
-from bemt.dataset import Dataset
-from bemt.readers import load_bytes
-from bemt.readers._columns import Channel, dataset
+from bemt.data.readers import load_bytes
+from bemt.data.readers._columns import Channel, dataset
+from bemt.physics.dataset import Dataset
 
 KIND = "crazyflie_log"
 MAGIC = 0xBC

@@ -16,10 +16,10 @@ from __future__ import annotations
 import os
 import re
 
-from bemt.dataset import Dataset
-from bemt.readers import load_text
-from bemt.readers._cfd import Column, ExportRow, cells_of, head_lines, no_units, numeric_table, si_unit, unique
-from bemt.readers._columns import Channel, dataset
+from bemt.data.readers import load_text
+from bemt.data.readers._cfd import Column, ExportRow, cells_of, head_lines, no_units, numeric_table, si_unit, unique
+from bemt.data.readers._columns import Channel, dataset
+from bemt.physics.dataset import Dataset
 
 KIND = "design_points"
 

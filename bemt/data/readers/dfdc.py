@@ -8,9 +8,9 @@ import re
 import numpy as np
 
 from bemt.base.tables import number_of
-from bemt.readers import head_text
-from bemt.readers._blade import BladeFile, Cursor, as_count
-from bemt.readers.xrotor import read_section
+from bemt.data.readers import head_text
+from bemt.data.readers._blade import BladeFile, Cursor, as_count
+from bemt.data.readers.xrotor import read_section
 
 KIND = "dfdc"
 BLADE = True

@@ -15,11 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bemt.dataset import Dataset
-from bemt.readers import first_cells, load_text
-from bemt.readers._headings import heading, known
-from bemt.readers._recording import Builder
-from bemt.readers._split import split_table
+from bemt.data.readers import first_cells, load_text
+from bemt.data.readers._headings import heading, known
+from bemt.data.readers._recording import Builder
+from bemt.data.readers._split import split_table
+from bemt.physics.dataset import Dataset
 
 KIND = "drivecalc"
 _PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}

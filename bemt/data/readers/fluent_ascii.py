@@ -14,9 +14,9 @@ from __future__ import annotations
 import os
 
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import load_text
-from bemt.readers._cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
+from bemt.data.readers import load_text
+from bemt.data.readers._cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
+from bemt.physics.dataset import Dataset
 
 KIND = "fluent_ascii"
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import re
 
-from bemt.readers._cfd import Layout, head_lines
-from bemt.readers.fluent_report import column_of
+from bemt.data.readers._cfd import Layout, head_lines
+from bemt.data.readers.fluent_report import column_of
 
 KIND = "fluent_monitor"
 

@@ -23,11 +23,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from bemt.base.averaging import Mean, keep_last
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, load_text, number
-from bemt.readers._cfd import head_lines, si_unit, slug
-from bemt.readers._columns import Channel, dataset
-from bemt.readers.fluent_forces import blocks
+from bemt.data.readers import SourceText, load_text, number
+from bemt.data.readers._cfd import head_lines, si_unit, slug
+from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.fluent_forces import blocks
+from bemt.physics.dataset import Dataset
 
 KIND = "fluent_transcript"
 

@@ -16,11 +16,11 @@ import os
 import re
 from dataclasses import replace
 
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, load_text
-from bemt.readers._cfd import Column, ExportRow, head_lines, history, numeric_table, unique
-from bemt.readers._columns import Channel, channels_of, dataset
-from bemt.readers.fluent_report import column_of
+from bemt.data.readers import SourceText, load_text
+from bemt.data.readers._cfd import Column, ExportRow, head_lines, history, numeric_table, unique
+from bemt.data.readers._columns import Channel, channels_of, dataset
+from bemt.data.readers.fluent_report import column_of
+from bemt.physics.dataset import Dataset
 
 KIND = "fluent_xy"
 

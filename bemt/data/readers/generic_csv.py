@@ -3,7 +3,7 @@
 Units are read from ``Thrust (gf)``, ``Thrust [gf]``, ``thrust_gf`` and a few names without dimension (``J``, ``CT``).
 A heading without unit, or a table without headings, gives channels of unit "" and a warning: nothing is assumed. This
 reader is a fallback: it takes a file only when no reader of a particular format claims it. A ``recording.toml``
-beside the file (see :mod:`bemt.readers.recording_toml`) says what headings do not.
+beside the file (see :mod:`bemt.data.readers.recording_toml`) says what headings do not.
 """
 
 from __future__ import annotations
@@ -18,13 +18,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.dataset import Dataset
-from bemt.readers import head_text, load_text, number
-from bemt.readers._headings import Heading, heading, slug
-from bemt.readers._large import NumberTable, large_table
-from bemt.readers._recording import Builder
-from bemt.readers._split import SplitTable, decimal_mark, find_start, heading_cells, is_comment, split_line, split_table
-from bemt.readers._words import NEUTRAL, english
+from bemt.data.readers import head_text, load_text, number
+from bemt.data.readers._headings import Heading, heading, slug
+from bemt.data.readers._large import NumberTable, large_table
+from bemt.data.readers._recording import Builder
+from bemt.data.readers._split import (
+    SplitTable,
+    decimal_mark,
+    find_start,
+    heading_cells,
+    is_comment,
+    split_line,
+    split_table,
+)
+from bemt.data.readers._words import NEUTRAL, english
+from bemt.physics.dataset import Dataset
 
 KIND = "table"
 FALLBACK = True

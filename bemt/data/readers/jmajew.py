@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.dataset import Dataset
-from bemt.readers import first_cells
-from bemt.readers._headings import Heading, heading, known, slug
-from bemt.readers._recording import Builder, slip
+from bemt.data.readers import first_cells
+from bemt.data.readers._headings import Heading, heading, known, slug
+from bemt.data.readers._recording import Builder, slip
+from bemt.physics.dataset import Dataset
 
 KIND = "jmajew"
 _COLUMNS = {

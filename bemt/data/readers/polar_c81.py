@@ -18,9 +18,9 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers.polar_csv import PolarRow, assemble
-from bemt.sections.polars import Polar
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers.polar_csv import PolarRow, assemble
+from bemt.physics.sections.polars import Polar
 
 KIND = "polar_c81"
 

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.sections.polars import Polar
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+from bemt.physics.sections.polars import Polar
 
 KIND = "polar_csv"
 

@@ -28,9 +28,9 @@ import re
 from collections.abc import Iterable
 
 from bemt.base.errors import Fault, InputError
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers.polar_csv import PolarRow, assemble, row_of
-from bemt.sections.polars import Polar
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers.polar_csv import PolarRow, assemble, row_of
+from bemt.physics.sections.polars import Polar
 
 KIND = "polar_xfoil"
 

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from bemt.base import units
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers._columns import Channel, dataset
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers._columns import Channel, dataset
+from bemt.physics.dataset import Dataset
 
 KIND = "pybemt_ini"
 _LISTS = ("radius", "chord", "pitch")

@@ -29,13 +29,13 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import head_text, number
-from bemt.readers._headings import heading
-from bemt.readers._large import NumberTable
-from bemt.readers._recording import Builder, slip
-from bemt.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
-from bemt.readers._split import SplitTable
+from bemt.data.readers import head_text, number
+from bemt.data.readers._headings import heading
+from bemt.data.readers._large import NumberTable
+from bemt.data.readers._recording import Builder, slip
+from bemt.data.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
+from bemt.data.readers._split import SplitTable
+from bemt.physics.dataset import Dataset
 
 KIND = "rcbenchmark"
 _SPEEDS = ("electrical_rpm", "optical_rpm")

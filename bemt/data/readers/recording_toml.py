@@ -15,18 +15,18 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import create_model
 
-from bemt.air import Air
 from bemt.base import units
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.dataset import Dataset, concat
-from bemt.readers import head_text, load_text
-from bemt.readers._columns import Channel
-from bemt.readers._headings import Heading, heading, known
-from bemt.readers._large import large_table
-from bemt.readers._recording import Builder
-from bemt.readers._split import SplitTable, decimal_mark, some, split_table
+from bemt.data.readers import head_text, load_text
+from bemt.data.readers._columns import Channel
+from bemt.data.readers._headings import Heading, heading, known
+from bemt.data.readers._large import large_table
+from bemt.data.readers._recording import Builder
+from bemt.data.readers._split import SplitTable, decimal_mark, some, split_table
+from bemt.physics.air import Air
+from bemt.physics.dataset import Dataset, concat
 
 __all__ = ["KIND", "QUANTITIES", "RecordingToml", "read", "sniff"]
 

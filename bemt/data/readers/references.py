@@ -29,9 +29,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
-from bemt.readers import SourceText, head_text, load_text, number
-from bemt.readers._unit_text import WEIGHTS, unit_of
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers._unit_text import WEIGHTS, unit_of
+from bemt.physics.dataset import Dataset
 
 KIND = "references"
 KINDS = ("cfd", "bench", "vendor", "k1k2_printed", "k1k2", "bemt", "flight", "other")

@@ -9,9 +9,9 @@ import re
 import numpy as np
 
 from bemt.base.tables import number_of
-from bemt.readers import head_text
-from bemt.readers._blade import BladeFile, Cursor, as_count
-from bemt.sections.parametric import XrotorSection
+from bemt.data.readers import head_text
+from bemt.data.readers._blade import BladeFile, Cursor, as_count
+from bemt.physics.sections.parametric import XrotorSection
 
 KIND = "xrotor"
 BLADE = True

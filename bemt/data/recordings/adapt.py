@@ -13,13 +13,13 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
-from bemt.dataset.channels import unit_in
-from bemt.readers import polar_c81, uiuc
-from bemt.readers._columns import Channel, dataset
-from bemt.readers.apc import ApcPerformance
-from bemt.readers.references import Reference
-from bemt.sections.polars import Polar
+from bemt.data.readers import polar_c81, uiuc
+from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.apc import ApcPerformance
+from bemt.data.readers.references import Reference
+from bemt.physics.dataset import Dataset
+from bemt.physics.dataset.channels import unit_in
+from bemt.physics.sections.polars import Polar
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")

@@ -11,7 +11,7 @@ gives the equivalent free-stream speed
     V' = V (1 - a tau / (2 sqrt(1 + 2 tau))),    a = A / C,    tau = T / (rho A V^2),
 
 whose limit at rest is V' = -(a / (2 sqrt 2)) sqrt(T / (rho A)). The change of thrust follows from the straight line
-T ~ 1 - J / J0 with J0 = 1.19 P/D, the mean of measured propellers (:mod:`bemt.rotors.k1k2`). It is
+T ~ 1 - J / J0 with J0 = 1.19 P/D, the mean of measured propellers (:mod:`bemt.physics.k1k2`). It is
 one-dimensional and not used for a > 0.25.
 
 References
@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
+from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 
 STATUSES = ("fine", "doubtful", "fault", "not stated")
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from bemt.recordings.audit import CfdFacts, audit, audit_document
+from bemt.data.recordings.audit import CfdFacts, audit, audit_document
 
 _PHRASES: tuple[tuple[str, dict[str, Any]], ...] = (
     (r"cylinder of the (propeller|rotor|fan)'s (own )?diameter", {"domain_over_D": 1.0}),

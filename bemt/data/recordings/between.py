@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from bemt.recordings.findings import Finding
-from bemt.recordings.slips import ALIKE, MISCOUNT, Slip, slips
+from bemt.data.recordings.findings import Finding
+from bemt.data.recordings.slips import ALIKE, MISCOUNT, Slip, slips
 
 TOGETHER, FAR, NEAR = 0.35, math.log(2.0), 0.25
 """Logarithms of ratios: within which levels agree, from which they differ, within which a difference is a slip's."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bemt import readers
 from bemt.base.arrays import Array
 from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_average, steady_average
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
+from bemt.data import readers
+from bemt.physics.dataset import Dataset
 
 PROGRAMS: Mapping[str, str] = {
     "fluent_report": "Fluent", "fluent_monitor": "Fluent", "fluent_forces": "Fluent", "fluent_transcript": "Fluent",

@@ -16,11 +16,11 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
-from bemt.dataset import Dataset
-from bemt.readers._cfd import unit_of
-from bemt.readers._headings import may_be_shaft_speed
-from bemt.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.recordings.cfd_files import Settled, settled, zone_of
+from bemt.data.readers._cfd import unit_of
+from bemt.data.readers._headings import may_be_shaft_speed
+from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
+from bemt.data.recordings.cfd_files import Settled, settled, zone_of
+from bemt.physics.dataset import Dataset
 
 _ALONG = 3.0  # a thrust stands out of the side forces by this factor, or the shaft is not along an axis
 DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|kort", re.IGNORECASE)

@@ -8,14 +8,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bemt import readers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
-from bemt.readers._cfd import unit_of
-from bemt.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
-from bemt.recordings.cfd_loads import DUCT
+from bemt.data import readers
+from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
+from bemt.data.recordings.cfd_loads import DUCT
 
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")

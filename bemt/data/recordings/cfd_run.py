@@ -1,6 +1,6 @@
 """Files of one CFD run become the points of a recording: joined, units, zones, sector and sign applied once, averaged.
 
-Which column is which load: :mod:`bemt.recordings.cfd_loads`.
+Which column is which load: :mod:`bemt.data.recordings.cfd_loads`.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from bemt import readers
 from bemt.base.arrays import Array
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
-from bemt.dataset import Dataset
-from bemt.readers._cfd import unit_of
-from bemt.readers.cfd_run import RunToml
-from bemt.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
-from bemt.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
-from bemt.recordings.cfd_setup import with_grid_floor
-from bemt.recordings.grid_study import COVERAGE
+from bemt.data import readers
+from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd_run import RunToml
+from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
+from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
+from bemt.data.recordings.cfd_setup import with_grid_floor
+from bemt.data.recordings.grid_study import COVERAGE
+from bemt.physics.dataset import Dataset
 
 __all__ = ["NO_LOAD", "assemble", "document", "is_run", "run_at", "run_text"]
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.tables import number_text
-from bemt.dataset import Dataset
-from bemt.readers.references import Reference
-from bemt.recordings.audit import AuditLine, CfdFacts, audit
+from bemt.data.readers.references import Reference
+from bemt.data.recordings.audit import AuditLine, CfdFacts, audit
+from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset
+from bemt.physics.dataset import Dataset
 
 
 @dataclass(frozen=True)

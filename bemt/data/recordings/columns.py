@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bemt.air import LIQUID
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.recordings.findings import Facts, Finding, check_for
+from bemt.data.recordings.findings import Facts, Finding, check_for
+from bemt.physics.air import LIQUID
 
 SENSORS = (
     "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",

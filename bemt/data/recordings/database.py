@@ -20,7 +20,7 @@ from typing import Any
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, number_of
-from bemt.recordings.archive import download, unpacked
+from bemt.data.recordings.archive import download, unpacked
 
 SCHEMA = "bemt.data/1"
 RECORD = ".bemt-data.json"
@@ -73,7 +73,7 @@ def get(
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Put a database into a folder."""
-    from bemt.readers.uiuc import scan_folder
+    from bemt.data.readers.uiuc import scan_folder
 
     if source is not None and url is not None:
         raise InputError(Fault("", "--url", url, "none with --from, which downloads nothing", "Give one of the two"))

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.dataset import Dataset
-from bemt.recordings.channels import named
+from bemt.data.recordings.channels import named
+from bemt.physics.dataset import Dataset
 
 SEVERITIES = ("error", "warning", "note")
 ENOUGH = 200_000

@@ -1,8 +1,8 @@
 r"""What is in a file of results, with honest means.
 
 Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``). The files of one CFD run are
-shown as they are, and then as one run (`bemt.recordings.cfd_run`): joined, with the units, sign, sector and zones that
-the user states.
+shown as they are, and then as one run (`bemt.data.recordings.cfd_run`): joined, with the units, sign, sector and zones
+that the user states.
 
 Schema ``bemt.import/1``: ``runs`` is a list of CFD runs (``name``, ``files``, ``points``, ``averaged``, ``drift``,
 ``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is
@@ -28,21 +28,21 @@ from typing import Any
 
 import numpy as np
 
-from bemt import readers as importers
 from bemt.base import tables
 from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
-from bemt.dataset import Dataset
-from bemt.dataset.channels import channel_fault
-from bemt.readers._uiuc_tables import NO_SPEED
-from bemt.readers.cfd_run import KIND as RUN
-from bemt.readers.cfd_run import RunHead, RunToml
-from bemt.recordings import cfd_run
-from bemt.recordings.adapt import adapt, damaged_export, recognised
-from bemt.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
-from bemt.recordings.choice import Choice, averaged
-from bemt.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
-from bemt.recordings.reduce import reduction
+from bemt.data import readers as importers
+from bemt.data.readers._uiuc_tables import NO_SPEED
+from bemt.data.readers.cfd_run import KIND as RUN
+from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.recordings import cfd_run
+from bemt.data.recordings.adapt import adapt, damaged_export, recognised
+from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.choice import Choice, averaged
+from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.data.recordings.reduce import reduction
+from bemt.physics.dataset import Dataset
+from bemt.physics.dataset.channels import channel_fault
 
 __all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "document", "exit_code", "import_file", "text"]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from bemt.base import tables
 from bemt.base.errors import InputError
-from bemt.dataset import Dataset
-from bemt.recordings.check import Finding, check
-from bemt.recordings.reduce import reduce, reduction
+from bemt.data.recordings.check import Finding, check
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.physics.dataset import Dataset
 
 SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
          "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip

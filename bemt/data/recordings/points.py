@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
-from bemt.readers._samples import MISREAD, against_load
-from bemt.recordings import plateaus
-from bemt.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
+from bemt.data.readers._samples import MISREAD, against_load
+from bemt.data.recordings import plateaus
+from bemt.data.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
+from bemt.physics.dataset import Dataset
 
 Rows = NDArray[np.intp]
 SIGNALS = ("thrust_N", "torque_Nm", "rpm", "power_W", "current_A", "electrical_power_W", "CT", "CP")

@@ -19,14 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
-from bemt.air import GAMMA, R_DRY, Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
-from bemt.dataset import Dataset, concat
-from bemt.recordings.channels import (
+from bemt.data.recordings.channels import (
     LOADS,
     DroppedCells,
     dropped,
@@ -38,8 +35,11 @@ from bemt.recordings.channels import (
     shaft_power,
     stated,
 )
-from bemt.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
-from bemt.recordings.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.data.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
+from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
+from bemt.physics import coefficients as co
+from bemt.physics.air import GAMMA, R_DRY, Air
+from bemt.physics.dataset import Dataset, concat
 
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 """Channels of load cells."""

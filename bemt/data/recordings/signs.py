@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.recordings.channels import shaft_power
-from bemt.recordings.findings import MANY, Facts, Finding, check_for
-from bemt.recordings.windmilling import zero_thrust_speed
+from bemt.data.recordings.channels import shaft_power
+from bemt.data.recordings.findings import MANY, Facts, Finding, check_for
+from bemt.data.recordings.windmilling import zero_thrust_speed
+from bemt.physics import coefficients as co
 
 
 def _where(facts: Facts, rows: Array | NDArray[np.intp]) -> str:

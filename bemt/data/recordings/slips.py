@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.readers._samples import MOST_RPM_PER_V
-from bemt.recordings.findings import Facts, Finding, check_for
-from bemt.rotors import k1k2 as empirical
+from bemt.data.readers._samples import MOST_RPM_PER_V
+from bemt.data.recordings.findings import Facts, Finding, check_for
+from bemt.physics import k1k2 as empirical
 
 EXACT = 0.03
 """Relative width of a relation that holds within the file."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import coefficients as co
 from bemt.base.arrays import Array
+from bemt.physics import coefficients as co
 from bemt.rotors.conditioning import Conditioned, condition
 from bemt.rotors.latents import Prior
 from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
@@ -18,8 +18,8 @@ from bemt.rotors.predict import sense
 from bemt.rotors.reference import SESSION, ReferenceRun, noise_of_run, scatter
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.case import Case
+    from bemt.physics.air import Air
+    from bemt.rotors.case import Case
 
 # Advance ratio below which a point is at rest [1].
 _STILL = 0.01
@@ -49,7 +49,7 @@ def as_measured(
     u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
 ) -> AsMeasured:  # fmt: skip
     """Posterior of a rotor's latent numbers from a reference run."""
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     people, prior = population(), case.as_built().prior
     if prior.known_from != "reference":

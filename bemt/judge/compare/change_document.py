@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from bemt.base.tables import or_null
-from bemt.compare.drive_laws import FAMILY, Judgement, law
-from bemt.compare.matched import LOADS
-from bemt.compare.recordings import IN_WIND, RunChange
-from bemt.effects import catalogue
+from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
+from bemt.judge.compare.matched import LOADS
+from bemt.judge.compare.recordings import IN_WIND, RunChange
+from bemt.physics.effects import catalogue
 
 PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
 """What stands in a command for a reading that the user has to fill in."""

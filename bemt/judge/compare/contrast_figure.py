@@ -12,12 +12,12 @@ import numpy as np
 
 from bemt.base import canvas
 from bemt.base.arrays import Array
-from bemt.compare.contrast_text import WORD, headline
-from bemt.compare.matched import POWER_OF_SPEED
+from bemt.judge.compare.contrast_text import WORD, headline
+from bemt.judge.compare.matched import POWER_OF_SPEED
 
 if TYPE_CHECKING:
-    from bemt.compare.matched import MatchedChannel
-    from bemt.compare.recordings import RunChange
+    from bemt.judge.compare.matched import MatchedChannel
+    from bemt.judge.compare.recordings import RunChange
 
 _A, _B, _BAND, _GREY = canvas.BLUE, canvas.RED, canvas.SKY, canvas.GREY
 _LABEL = {

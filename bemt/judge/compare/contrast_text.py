@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text, text_table
-from bemt.compare.drive_laws import FAMILY, law
-from bemt.compare.recordings import ERROR_IN, IN_WIND, NOTHING_SHARED, OTHER_STAND, REVERSED
-from bemt.effects import catalogue
+from bemt.judge.compare.drive_laws import FAMILY, law
+from bemt.judge.compare.recordings import ERROR_IN, IN_WIND, NOTHING_SHARED, OTHER_STAND, REVERSED
+from bemt.physics.effects import catalogue
 
 WORD = {
     "thrust_N": "thrust",

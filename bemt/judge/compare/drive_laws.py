@@ -1,9 +1,9 @@
 """Which change of motor, controller or battery makes the ratios of two recordings at equal command or load.
 
 How speed and electrical power move together is a table, its sources in the rows; each row is a linear Gaussian model on
-top of :func:`bemt.compare.smooth_change.covariance`, so its evidence has a closed form (Rasmussen and Williams 2006,
-eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change of every channel on its own. What
-acts on the rotor is judged by :mod:`bemt.diagnose.by_laws`.
+top of :func:`bemt.judge.compare.smooth_change.covariance`, so its evidence has a closed form (Rasmussen and Williams
+2006, eq. 2.30 and 2.40 to 2.43). Two rivals always compete: nothing, and a smooth change of every channel on its own.
+What acts on the rotor is judged by :mod:`bemt.judge.diagnose.by_laws`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.compare import smooth_change as fits
-from bemt.compare.matched import MatchedChannel
-from bemt.compare.smooth_change import Scatter
-from bemt.gaussian.evidence import LinearTerms, log_sum, shares
-from bemt.gaussian.whitening import log_density, whitener
+from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
+from bemt.base.gaussian.whitening import log_density, whitener
+from bemt.judge.compare import smooth_change as fits
+from bemt.judge.compare.matched import MatchedChannel
+from bemt.judge.compare.smooth_change import Scatter
 
 NONE, UNKNOWN = "none", "unknown"
 _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}

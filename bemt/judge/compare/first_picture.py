@@ -1,7 +1,8 @@
 """The first picture wherever a recording meets a model: the recorded points inside the prediction band of the case.
 
-The band is the 95 % interval of :mod:`bemt.case.propagate` (declared unknowns, the model's own error on real rotors,
-numerics). Every point is judged at its own speed, airspeed and density; the drawn band runs along one line of them.
+The band is the 95 % interval of :mod:`bemt.rotors.case.propagate` (declared unknowns, the model's own error on real
+rotors, numerics). Every point is judged at its own speed, airspeed and density; the drawn band runs along one line of
+them.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.case import Case
-from bemt.case.propagate import propagate
-from bemt.dataset import Dataset
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import Case
+from bemt.rotors.case.propagate import propagate
 
 _LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.compare.stand_run import StandRun
+from bemt.judge.compare.stand_run import StandRun
 
 LOADS = {"thrust": ("thrust_N", "CT"), "torque": ("torque_Nm", "power_W", "CP", "CQ", "electrical_power_W")}
 """Loads of the rotor: first what a cell reads, then what stands for it; electrical power only at like voltage."""
@@ -207,7 +207,7 @@ def log_range(x: Array, margin: float) -> tuple[float, float]:
 def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
     """Logarithm of the density of B over that of A as recorded, and what a thermometer alone leaves open.
 
-    >>> from bemt.dataset import Dataset
+    >>> from bemt.physics.dataset import Dataset
     >>> none = Dataset("bench", "none", {"rpm": []})
     >>> warm, cold = (StandRun(none, "", math.nan, math.nan, T) for T in (300.0, 285.0))
     >>> round(density_change(warm, cold)[0], 3)

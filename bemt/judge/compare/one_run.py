@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
-from bemt.case import Case
-from bemt.case.propagate import propagate
-from bemt.dataset import Dataset
-from bemt.recordings.audit import combined
-from bemt.recordings.cfd_run import is_run
-from bemt.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
-from bemt.recordings.channels import named
+from bemt.data.recordings.audit import combined
+from bemt.data.recordings.cfd_run import is_run
+from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
+from bemt.data.recordings.channels import named
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import Case
+from bemt.rotors.case.propagate import propagate
 
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
@@ -37,7 +37,7 @@ _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "
 
 def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset]:
     """Points of a CFD recording, and the file as it was `read`: a run, or a table of runs such as a campaign's."""
-    from bemt.recordings.load import as_dataset, import_file
+    from bemt.data.recordings.load import as_dataset, import_file
 
     imported = import_file(path) if read is None else read
     if is_run(imported):
@@ -127,7 +127,7 @@ def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> ND
 
 
 def _case(name: str) -> Case:
-    from bemt.case import find_cases, load_case
+    from bemt.rotors.case import find_cases, load_case
 
     files = find_cases([name])
     if len(files) != 1:
@@ -141,7 +141,7 @@ def _with(d: Dataset, channel: str, value: float) -> Dataset:
 
 
 def _pitch(case: Case) -> float:
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     return float(prepare_case(case, oblique=True).pitch_m)
 

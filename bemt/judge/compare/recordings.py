@@ -15,11 +15,11 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.compare import smooth_change as fits
-from bemt.compare.drive_laws import Judgement, judge_drive, weigh
-from bemt.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
-from bemt.compare.smooth_change import Scatter
-from bemt.compare.stand_run import StandRun
+from bemt.judge.compare import smooth_change as fits
+from bemt.judge.compare.drive_laws import Judgement, judge_drive, weigh
+from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
+from bemt.judge.compare.smooth_change import Scatter
+from bemt.judge.compare.stand_run import StandRun
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
@@ -54,7 +54,7 @@ class RunChange:
     b: StandRun
     diameter_m: float  # Of the rotor [m]; NaN: unknown
     channels: Mapping[str, MatchedChannel]  # What both recorded
-    # B over A by channel: of :func:`bemt.compare.smooth_change.ratio_of`, and ``density_ratio``
+    # B over A by channel: of :func:`bemt.judge.compare.smooth_change.ratio_of`, and ``density_ratio``
     ratios: Mapping[str, Mapping[str, Any]]
     rotor: fits.MatchedRuns
     behind: fits.MatchedRuns  # Motor, controller and battery

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
-from bemt.dataset import Dataset
-from bemt.readers._headings import may_be_shaft_speed, surely_shaft_speed
-from bemt.recordings.channels import MEASURED, in_one_step, moves, named
-from bemt.recordings.windmilling import zero_thrust_speed
+from bemt.data.readers._headings import may_be_shaft_speed, surely_shaft_speed
+from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
+from bemt.data.recordings.windmilling import zero_thrust_speed
+from bemt.physics.air import Air
+from bemt.physics.dataset import Dataset
 
 _AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
 _CONDITION = re.compile(r"\s*([^=]+?)\s*=\s*(.+?)\s*")

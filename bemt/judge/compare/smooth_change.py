@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
-from bemt.compare.stand_run import StandRun
-from bemt.gaussian.kernels import alike, smooth
-from bemt.gaussian.whitening import leave_one_out, log_density, whitener
+from bemt.base.gaussian.kernels import alike, smooth
+from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
+from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
+from bemt.judge.compare.stand_run import StandRun
 
 _BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
 _LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35

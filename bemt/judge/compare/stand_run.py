@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
-from bemt.dataset import DIMENSIONLESS, Dataset
-from bemt.recordings.channels import moves, named
-from bemt.recordings.reduce import reduce, reduction
+from bemt.data.recordings.channels import moves, named
+from bemt.data.recordings.reduce import reduce, reduction
+from bemt.judge.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of, one_rotor, speed_in_doubt, wind_of
+from bemt.physics.dataset import DIMENSIONLESS, Dataset
 
 _WANTED = (
     *LOAD_CHANNELS,

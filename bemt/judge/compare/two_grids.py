@@ -9,10 +9,10 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.errors import InputError
-from bemt.compare.selection import selected
-from bemt.dataset import Dataset
-from bemt.recordings.cfd_setup import GRID_FLOOR, GRID_FLOOR_SOURCE, conditions_that_differ, grid_that_differs
-from bemt.recordings.channels import named
+from bemt.data.recordings.cfd_setup import GRID_FLOOR, GRID_FLOOR_SOURCE, conditions_that_differ, grid_that_differs
+from bemt.data.recordings.channels import named
+from bemt.judge.compare.selection import selected
+from bemt.physics.dataset import Dataset
 
 _LIKE = 0.01  # speeds and airspeeds that are one point, share
 
@@ -23,7 +23,7 @@ def compare_grids(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[s
     ``bemt.comparison/1`` with the verdict ``insufficient``: what differs, ratios B over A at equal points. Rows to use
     are named as ``level=5``.
     """
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     try:
         first, second = (selected(import_file(p), list(rows), p) for p, rows in ((a, rows_a), (b, rows_b)))

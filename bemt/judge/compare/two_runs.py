@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from bemt import __version__
 from bemt.base.errors import InputError
 from bemt.base.tables import number_text, text_table
-from bemt.compare.one_run import cfd_points
-from bemt.compare.selection import selected
-from bemt.dataset import Dataset
-from bemt.recordings.cfd_run import is_run
-from bemt.recordings.cfd_setup import conditions_of, conditions_that_differ
+from bemt.data.recordings.cfd_run import is_run
+from bemt.data.recordings.cfd_setup import conditions_of, conditions_that_differ
+from bemt.judge.compare.one_run import cfd_points
+from bemt.judge.compare.selection import selected
+from bemt.physics.dataset import Dataset
 
 __all__ = ["compare_runs", "text"]
 
@@ -31,7 +31,7 @@ def compare_runs(a: str, b: str, rows_a: Sequence[str] = (), rows_b: Sequence[st
     ``bemt.comparison/1`` with the verdict ``insufficient`` and ``points``: at each equal speed and airspeed the loads
     of both with their standard uncertainties, the difference, and both uncertainties together.
     """
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     if Path(a).resolve() == Path(b).resolve() and sorted(rows_a) == sorted(rows_b):
         return None  # refused by the comparison

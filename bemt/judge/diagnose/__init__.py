@@ -5,13 +5,5 @@ The way of the data: ``record`` (points and covariates) -> ``problem`` (baseline
 effect) -> ``gate``, ``verdict`` (with ``confusion``) -> ``fit`` (parameters, held-out blocks), ``locate``, ``suggest``
 -> document (``bemt.diagnosis/1``), text, figures.
 
-``bemt.diagnose(recording, propeller)`` goes all the way: ``help(bemt.library.diagnose)``.
+``bemt.diagnose(recording, propeller)`` goes all the way: ``help(bemt.app.library.diagnose)``.
 """
-
-from __future__ import annotations
-
-import sys
-
-from bemt.base.face import CallableRoom
-
-sys.modules[__name__].__class__ = CallableRoom  # bemt.diagnose(...) is bemt.library.diagnose(...)

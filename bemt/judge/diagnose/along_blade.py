@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem import solver
-from bemt.bem.model import Model, acts_on_points, acts_on_rotor
-from bemt.case.prepare import prepare_case
-from bemt.effects import catalogue, to_text
-from bemt.effects.base import Effect
+from bemt.physics.air import Air
+from bemt.physics.bem import solver
+from bemt.physics.bem.model import Model, acts_on_points, acts_on_rotor
+from bemt.physics.effects import catalogue, to_text
+from bemt.physics.effects.base import Effect
+from bemt.rotors.case.prepare import prepare_case
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 COLUMNS = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
 # Root and tip are left out: hubs are not modelled, and what the last percents of a blade carry no two codes agree on.
@@ -103,7 +103,7 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
 
     Speeds, density and uncertainties of each run come from ``recording.csv`` beside it, where there is one.
     """
-    from bemt.readers import load_text, number
+    from bemt.data.readers import load_text, number
 
     rows = list(csv.DictReader(load_text(path).lines))
     needed = ("run", *COLUMNS)

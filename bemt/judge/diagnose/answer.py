@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import prior, verdict
-from bemt.diagnose.explanation import UNKNOWN, Explanation
-from bemt.diagnose.record import CHANNELS
+from bemt.judge.diagnose import prior, verdict
+from bemt.judge.diagnose.explanation import UNKNOWN, Explanation
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.compare.recordings import RunChange
-    from bemt.diagnose import confusion, evidence
-    from bemt.diagnose import fit as fitting
-    from bemt.diagnose import locate as location
-    from bemt.diagnose import suggest as suggestion
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.signatures import Candidate
+    from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.diagnose import confusion, evidence
+    from bemt.judge.diagnose import fit as fitting
+    from bemt.judge.diagnose import locate as location
+    from bemt.judge.diagnose import suggest as suggestion
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 # Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
 _NEAR_ZERO, _FAR = 0.1, 0.05

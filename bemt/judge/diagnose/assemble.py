@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt import coefficients as co
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem import model as bem
-from bemt.case.as_built import as_built_of
-from bemt.case.prepare import k1k2_case, prepare_case
-from bemt.case.propagate import validity_of
-from bemt.diagnose import repeats
-from bemt.diagnose.blade import PLAIN, CalibratedBlade, prior_of
-from bemt.diagnose.blade_fit import calibrated
-from bemt.diagnose.noise import in_time
-from bemt.diagnose.nuisance import nuisances
-from bemt.diagnose.problem import Part, Problem, SpeedCurve
-from bemt.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
-from bemt.effects.base import Effect
-from bemt.recordings.between import Level, outlier_runs
+from bemt.data.recordings.between import Level, outlier_runs
+from bemt.judge.diagnose import repeats
+from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, prior_of
+from bemt.judge.diagnose.blade_fit import calibrated
+from bemt.judge.diagnose.noise import in_time
+from bemt.judge.diagnose.nuisance import nuisances
+from bemt.judge.diagnose.problem import Part, Problem, SpeedCurve
+from bemt.judge.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
+from bemt.physics import coefficients as co
+from bemt.physics.bem import model as bem
+from bemt.physics.effects.base import Effect
+from bemt.rotors.case.as_built import as_built_of
+from bemt.rotors.case.prepare import k1k2_case, prepare_case
+from bemt.rotors.case.propagate import validity_of
 from bemt.rotors.validity import counted
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 _STATIONS = 16
 _FEWEST = 3

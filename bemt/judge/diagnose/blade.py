@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.case.as_built import as_built_of, known_from
-from bemt.case.prepare import prepare_case
+from bemt.rotors.case.as_built import as_built_of, known_from
+from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.effects.base import Effect, RotorBuild
+    from bemt.physics.effects.base import Effect, RotorBuild
+    from bemt.rotors.case import Case
 
 # Standard deviations without a reference, in the order of NAMES: angle [deg], lift, drag [1], camber [deg].  Working
 # calibrations; a wide blade without a reference would swallow slips of speed and unit.

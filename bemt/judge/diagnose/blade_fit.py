@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose import noise
-from bemt.diagnose.blade import AsLabelled, CalibratedBlade
-from bemt.gaussian.whitening import log_density
+from bemt.base.gaussian.whitening import log_density
+from bemt.judge.diagnose import noise
+from bemt.judge.diagnose.blade import AsLabelled, CalibratedBlade
 from bemt.rotors.conditioning import condition, tangents
 from bemt.rotors.latents import NAMES, UNITS, AsBuilt, Prior
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
+    from bemt.judge.diagnose.problem import Problem
 
 FARTHEST_DEG = 11.0
 """A blade that a reference turns further than this is another rotor, or the recording is wrong [deg]."""

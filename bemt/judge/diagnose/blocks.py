@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.diagnose import noise
-from bemt.diagnose.fit import fit, form_covariance
-from bemt.gaussian.evidence import shares
-from bemt.gaussian.whitening import whitener
+from bemt.base.gaussian.evidence import shares
+from bemt.base.gaussian.whitening import whitener
+from bemt.judge.diagnose import noise
+from bemt.judge.diagnose.fit import fit, form_covariance
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
-    from bemt.diagnose.explanation import Explanation
-    from bemt.diagnose.problem import Problem
+    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.explanation import Explanation
+    from bemt.judge.diagnose.problem import Problem
 
 REFERENCE = -1
 """Block of points that are always given: readings without the cause."""

@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import effects
-from bemt.air import Air
 from bemt.base.arrays import Array
-from bemt.bem.model import acts_on_rotor
-from bemt.compare import recordings
-from bemt.compare.drive_laws import Judgement
-from bemt.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
-from bemt.diagnose import evidence, gate, rules, signatures, verdict
-from bemt.diagnose.assemble import assemble
-from bemt.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
-from bemt.diagnose.record import Record, thinned
+from bemt.judge.compare import recordings
+from bemt.judge.compare.drive_laws import Judgement
+from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
+from bemt.judge.diagnose import evidence, gate, rules, signatures, verdict
+from bemt.judge.diagnose.assemble import assemble
+from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
+from bemt.judge.diagnose.record import Record, thinned
+from bemt.physics import effects
+from bemt.physics.air import Air
+from bemt.physics.bem.model import acts_on_rotor
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
-    from bemt.compare.recordings import RunChange
-    from bemt.compare.smooth_change import Scatter
-    from bemt.compare.stand_run import StandRun
-    from bemt.dataset import Dataset
-    from bemt.diagnose.problem import Part
-    from bemt.diagnose.signatures import Candidate
+    from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.compare.smooth_change import Scatter
+    from bemt.judge.compare.stand_run import StandRun
+    from bemt.judge.diagnose.problem import Part
+    from bemt.judge.diagnose.signatures import Candidate
+    from bemt.physics.dataset import Dataset
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""

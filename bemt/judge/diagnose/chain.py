@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import (
+from bemt.judge.diagnose import (
     blocks,
     by_laws,
     confusion,
@@ -24,19 +23,20 @@ from bemt.diagnose import (
     verdict,
     wrong_rotor_check,
 )
-from bemt.diagnose import fit as fitting
-from bemt.diagnose import locate as location
-from bemt.diagnose import suggest as suggestion
-from bemt.diagnose.answer import Diagnosis
-from bemt.diagnose.assemble import build
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.shared_physics import ask_reference
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import locate as location
+from bemt.judge.diagnose import suggest as suggestion
+from bemt.judge.diagnose.answer import Diagnosis
+from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.shared_physics import ask_reference
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.compare.recordings import RunChange
-    from bemt.diagnose.record import Record
+    from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.diagnose.record import Record
+    from bemt.rotors.case import Case
 
 __all__ = ["Diagnosis", "diagnose"]
 

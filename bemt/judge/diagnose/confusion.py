@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.form import Form, LawError, columns, form_modes
+from bemt.judge.diagnose.form import Form, LawError, columns, form_modes
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
-    from bemt.diagnose.state import State
+    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.state import State
 
 ALIKE = 3.0
 """Distance below which two effects are one class [1]."""

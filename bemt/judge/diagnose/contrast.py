@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
-from bemt.compare.change_document import Invocation, document, next_step
-from bemt.compare.recordings import ERROR_IN, RunChange
-from bemt.compare.selection import conditions_of, selected, with_air
-from bemt.compare.stand_run import stand_run
-from bemt.diagnose.by_laws import changed
+from bemt.judge.compare.change_document import Invocation, document, next_step
+from bemt.judge.compare.recordings import ERROR_IN, RunChange
+from bemt.judge.compare.selection import conditions_of, selected, with_air
+from bemt.judge.compare.stand_run import stand_run
+from bemt.judge.diagnose.by_laws import changed
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.dataset import Dataset
-    from bemt.diagnose.suggest import Given
-    from bemt.recordings.findings import Finding
+    from bemt.data.recordings.findings import Finding
+    from bemt.judge.diagnose.suggest import Given
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case import Case
 
 # Remarks on the files come first in an explanation; `import` shows them.
 _REMARK = "Before any physics"
@@ -64,7 +64,7 @@ class Contrast:
     @property
     def text(self) -> str:
         """The answer on one screen."""
-        from bemt.compare.contrast_text import text
+        from bemt.judge.compare.contrast_text import text
 
         return text(self.document)
 
@@ -105,7 +105,7 @@ def compare(
     Loads are compared as load / (rho n^2) on a smooth curve over ln n and V/(n D), by Gaussian processes (Rasmussen and
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     names = [os.fspath(a), os.fspath(b)]
     asked = Invocation(
@@ -158,7 +158,7 @@ def compare(
 
 def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
     """What cannot be so in a recording, as ``import`` and ``diagnose`` find it."""
-    from bemt.recordings.check import check
+    from bemt.data.recordings.check import check
 
     found = check(imported, diameter_m=diameter_m, ducted=ducted) if imported.kind in ("bench", "table") else ()
     # a propeller that windmills pulls the other way; signs have a note of their own
@@ -186,7 +186,7 @@ def _errors(findings: Sequence[Sequence[Finding]]) -> list[str]:
 
 def _two_choices(name: str) -> str:
     """How to choose two parts of one file, with a column that tells them apart."""
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     how = "Its scatter would count as agreement"
     try:
@@ -204,7 +204,7 @@ def _two_choices(name: str) -> str:
 
 def _case(path: str) -> Case:
     """Read the one case at a path."""
-    from bemt.case import find_cases, load_case
+    from bemt.rotors.case import find_cases, load_case
 
     found = find_cases([path])
     if len(found) != 1:
@@ -216,10 +216,10 @@ def _diagnosed(
     asked: Invocation, read: Sequence[Dataset], case: Case, found: RunChange, progress: Callable[[str], None] | None
 ) -> dict[str, Any]:
     """Verdict of the diagnosis of B with A as reference."""
-    from bemt.diagnose.chain import diagnose
-    from bemt.diagnose.document import document as diagnosis
-    from bemt.diagnose.document import explanation
-    from bemt.diagnose.load import load
+    from bemt.judge.diagnose.chain import diagnose
+    from bemt.judge.diagnose.document import document as diagnosis
+    from bemt.judge.diagnose.document import explanation
+    from bemt.judge.diagnose.load import load
 
     a, b = (load(name, case, imported) for name, imported in zip((asked.a, asked.b), read, strict=True))
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=_given(asked), change=found)
@@ -232,7 +232,7 @@ def _diagnosed(
 
 def _given(asked: Invocation) -> Given:
     """Commands of the diagnosis that carry what was asked; rows and air are taken by a comparison alone."""
-    from bemt.diagnose.suggest import Given
+    from bemt.judge.diagnose.suggest import Given
 
     class _Pair(Given):
         def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:

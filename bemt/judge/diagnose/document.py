@@ -8,25 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import __version__, effects
+from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.compare.change_document import document as change_document
-from bemt.compare.contrast_text import families
-from bemt.compare.contrast_text import headline as change_headline
-from bemt.compare.drive_laws import law
-from bemt.diagnose import fit as fitting
-from bemt.diagnose import wrong_rotor_check
-from bemt.diagnose.confusion import nearest
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.locate import bare
-from bemt.diagnose.record import NO_SPEED
-from bemt.diagnose.suggest import LEVEL
-from bemt.diagnose.verdict import BESIDE_IT, inclusion
+from bemt.judge.compare.change_document import document as change_document
+from bemt.judge.compare.contrast_text import families
+from bemt.judge.compare.contrast_text import headline as change_headline
+from bemt.judge.compare.drive_laws import law
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import wrong_rotor_check
+from bemt.judge.diagnose.confusion import nearest
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.locate import bare
+from bemt.judge.diagnose.record import NO_SPEED
+from bemt.judge.diagnose.suggest import LEVEL
+from bemt.judge.diagnose.verdict import BESIDE_IT, inclusion
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.answer import Diagnosis
-    from bemt.diagnose.locate import Location
-    from bemt.effects import Parameter
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.locate import Location
+    from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
 

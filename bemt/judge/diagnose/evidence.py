@@ -15,21 +15,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import form, noise, prior
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.form import LawError
-from bemt.diagnose.pair_evidence import best_pair, every_pair, price, solve_together
-from bemt.diagnose.state import State
-from bemt.gaussian.evidence import log_sum, shares
-from bemt.gaussian.whitening import conditional
+from bemt.base.gaussian.evidence import log_sum, shares
+from bemt.base.gaussian.whitening import conditional
+from bemt.judge.diagnose import form, noise, prior
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.form import LawError
+from bemt.judge.diagnose.pair_evidence import best_pair, every_pair, price, solve_together
+from bemt.judge.diagnose.state import State
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Hyper, SmoothAlternative
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.signatures import Candidate
-    from bemt.gaussian.whitening import Conditional, Whitener
+    from bemt.base.gaussian.whitening import Conditional, Whitener
+    from bemt.judge.diagnose.noise import Hyper, SmoothAlternative
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 # Settings of the covariance this far (in natural logarithm) below the best are dropped.
 _DROP = 8.0

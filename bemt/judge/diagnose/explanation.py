@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
-from bemt import effects
+from bemt.physics import effects
 
 __all__ = ["NONE", "UNKNOWN", "Explanation"]
 

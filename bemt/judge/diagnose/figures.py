@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
 from bemt.base.tables import write_atomic
-from bemt.diagnose import figures_effects, figures_posterior
-from bemt.diagnose.document import headline
-from bemt.diagnose.figures_recording import FIRST, first_picture
-from bemt.diagnose.record import CHANNELS
+from bemt.judge.diagnose import figures_effects, figures_posterior
+from bemt.judge.diagnose.document import headline
+from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+from bemt.judge.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bemt.case import Case
-    from bemt.compare.first_picture import PredictionView
-    from bemt.diagnose.answer import Diagnosis
+    from bemt.judge.compare.first_picture import PredictionView
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.rotors.case import Case
 
 Index = NDArray[np.intp]
 

@@ -10,20 +10,20 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
-from bemt.bem import model as bem
-from bemt.bem import solver
-from bemt.diagnose import confusion
-from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.fit import fit
-from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.signatures import effect_of
+from bemt.judge.diagnose import confusion
+from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.judge.diagnose.fit import fit
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.signatures import effect_of
+from bemt.physics.bem import model as bem
+from bemt.physics.bem import solver
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bemt.air import Air
-    from bemt.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.physics.air import Air
 
 _MOST_EFFECTS, _MOST_BARS = 10, 8
 # Probability below which an explanation is summed up with others.

@@ -9,16 +9,16 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
-from bemt.diagnose import fit
-from bemt.diagnose.explanation import Explanation
-from bemt.diagnose.signatures import effect_of
+from bemt.judge.diagnose import fit
+from bemt.judge.diagnose.explanation import Explanation
+from bemt.judge.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from bemt.diagnose.answer import Diagnosis
-    from bemt.diagnose.signatures import Candidate
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.signatures import Candidate
 
 _MOST_PANELS, _MOST_BARS = 6, 6
 

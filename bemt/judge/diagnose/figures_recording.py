@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.compare.first_picture import PredictionView, against_band
-from bemt.dataset import Dataset
+from bemt.judge.compare.first_picture import PredictionView, against_band
+from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.diagnose.record import Record
+    from bemt.judge.diagnose.record import Record
+    from bemt.rotors.case import Case
 
 FIRST = "recording"
 """Stem of the file."""

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose import noise
-from bemt.diagnose.evidence import unknown
-from bemt.diagnose.explanation import Explanation
-from bemt.diagnose.form import FORM, form_modes
-from bemt.diagnose.signatures import effect_of
-from bemt.gaussian.evidence import log_sum
-from bemt.gaussian.whitening import whitener
+from bemt.base.gaussian.evidence import log_sum
+from bemt.base.gaussian.whitening import whitener
+from bemt.judge.diagnose import noise
+from bemt.judge.diagnose.evidence import unknown
+from bemt.judge.diagnose.explanation import Explanation
+from bemt.judge.diagnose.form import FORM, form_modes
+from bemt.judge.diagnose.signatures import effect_of
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
-    from bemt.effects import Parameter
+    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.physics.effects import Parameter
 
 _STEPS = 5
 # Values of a discrete parameter that are told with their odds.

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.case import repeated_names
-from bemt.diagnose.document import text
-from bemt.diagnose.improve import beside, improved_case, is_improved
+from bemt.judge.diagnose.document import text
+from bemt.judge.diagnose.improve import beside, improved_case, is_improved
+from bemt.rotors.case import repeated_names
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 
 def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Case], figures: bool = True) -> None:
@@ -26,7 +26,7 @@ def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Ca
     write_atomic(out / "diagnosis.txt", text(answer) + "\n")
     _improved(out, answer, cases)
     if figures:
-        from bemt.diagnose import figures as pictures
+        from bemt.judge.diagnose import figures as pictures
 
         pictures.draw(answer, out, cases)
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import noise
-from bemt.gaussian.evidence import LinearTerms
+from bemt.base.gaussian.evidence import LinearTerms
+from bemt.judge.diagnose import noise
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.signatures import Candidate
-    from bemt.gaussian.whitening import Conditional
+    from bemt.base.gaussian.whitening import Conditional
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 FORM = {0.15: 0.7, 0.45: 0.3}
 """Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect

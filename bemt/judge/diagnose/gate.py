@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose import evidence as ev
-from bemt.diagnose import noise, prior
-from bemt.diagnose.explanation import UNKNOWN, Explanation
-from bemt.gaussian.evidence import log_sum
-from bemt.gaussian.whitening import whitener
+from bemt.base.gaussian.evidence import log_sum
+from bemt.base.gaussian.whitening import whitener
+from bemt.judge.diagnose import evidence as ev
+from bemt.judge.diagnose import noise, prior
+from bemt.judge.diagnose.explanation import UNKNOWN, Explanation
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.evidence import Evidence
 
 NULLS = 400
 """Bootstrapped nulls of one diagnosis [1]."""

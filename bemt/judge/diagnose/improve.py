@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import tomlkit
 
-from bemt import effects
-from bemt.bem import model as bem
-from bemt.diagnose.signatures import effect_of
+from bemt.judge.diagnose.signatures import effect_of
+from bemt.physics import effects
+from bemt.physics.bem import model as bem
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.rotors.case import Case
 
 _HEAD = "with what `bemt diagnose` found: "
 

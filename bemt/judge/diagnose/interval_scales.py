@@ -14,14 +14,14 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from bemt import effects
+from bemt.physics import effects
 
 FILE = "interval_scales.json"
 
 
 @cache
 def _scales() -> dict[str, Any]:
-    text = resources.files("bemt.diagnose").joinpath(FILE).read_text(encoding="utf-8")
+    text = resources.files("bemt.judge.diagnose").joinpath(FILE).read_text(encoding="utf-8")
     found: dict[str, Any] = json.loads(text)
     return found
 

@@ -3,7 +3,7 @@
 Without a case the signatures of effects come from here, everything else of the judge stays: loads are CT(J, n) and
 CQ(J, n) of the reference at V/(n D), V cos(alpha) and rho n^2 of each row. What instruments and the air around a rotor
 do follows from that alone, by the hooks of the effects themselves. What changes the blade is scaled by momentum theory
-and the slopes of the curves; the error of such laws is that of every law (:mod:`bemt.diagnose.form`).
+and the slopes of the curves; the error of such laws is that of every law (:mod:`bemt.judge.diagnose.form`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.problem import Part
-from bemt.diagnose.record import Record
-from bemt.effects.base import Effect, Flow, Loads
+from bemt.judge.diagnose.problem import Part
+from bemt.judge.diagnose.record import Record
+from bemt.physics.effects.base import Effect, Flow, Loads
 
 # Where the reference has no airspeed: advance ratio of no thrust where CP/CT is not known, and the slope of thrust at
 # rest, a + b CP/CT between two ends [1]. Those of the solver for eight propellers by label, 8x3.8 to 18x12, and three
@@ -158,7 +158,7 @@ class LawRotor:
     # Largest electrical power, where it stands for torque [W], and its speed [rev/min]; NaN: torque itself
     full_power: float = math.nan
     full_rpm: float = math.nan
-    duct: Any = None  # as of `bemt.bem.Model`: a recording does not say whether there is one
+    duct: Any = None  # as of `bemt.physics.bem.Model`: a recording does not say whether there is one
 
     @classmethod
     def of(cls, record: Record, diameter_m: float, laws: Laws = LAWS) -> LawRotor:

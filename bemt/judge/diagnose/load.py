@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import effects
-from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.case import find_cases, load_case
-from bemt.case.prepare import prepare_case
-from bemt.compare.selection import one_rotor, speed_in_doubt, wind_of
-from bemt.dataset import Dataset
-from bemt.diagnose import record as records
-from bemt.readers._headings import surely_shaft_speed
-from bemt.recordings.channels import file_name, named, stated
-from bemt.recordings.check import check
+from bemt.data.readers._headings import surely_shaft_speed
+from bemt.data.recordings.channels import file_name, named, stated
+from bemt.data.recordings.check import check
+from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
+from bemt.judge.diagnose import record as records
+from bemt.physics import effects
+from bemt.physics.air import Air
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import find_cases, load_case
+from bemt.rotors.case.prepare import prepare_case
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.diagnose.record import Record
+    from bemt.judge.diagnose.record import Record
+    from bemt.rotors.case import Case
 
 _POINT = ("rpm", "J", "airspeed_m_s", "density_kg_m3", "sideslip_deg", *records.COVARIATES)
 _LOADS = ("CT", "CP", "CQ", "thrust_N", "torque_Nm", "power_W")
@@ -59,10 +59,10 @@ def load(
     airspeed_m_s: float | None = None,
 ) -> Record:  # fmt: skip
     """Read one recording, whatever its format."""
-    from bemt.recordings.cfd_run import is_run, run_at
-    from bemt.recordings.cfd_setup import one_grid
-    from bemt.recordings.load import import_file
-    from bemt.recordings.reduce import reduce, reduction
+    from bemt.data.recordings.cfd_run import is_run, run_at
+    from bemt.data.recordings.cfd_setup import one_grid
+    from bemt.data.recordings.load import import_file
+    from bemt.data.recordings.reduce import reduce, reduction
 
     if imported is None:
         imported = run_at(path, rpm, airspeed_m_s) or import_file(path)
@@ -152,7 +152,7 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
 
 def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
     """Whether a short log of a turning rotor is for its transients, which its steady points leave out."""
-    from bemt.recordings.reduce import reduction
+    from bemt.data.recordings.reduce import reduction
 
     found, rpm = reduction(points), rows.values.get("rpm", np.zeros(1))
     log = found.mode == "samples" and imported.provenance["format"] == "table" and len(imported) <= _SHORT
@@ -161,7 +161,7 @@ def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
 
 def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
     """Rows that state no uncertainty with that which the repeats of the reduction showed."""
-    from bemt.recordings.reduce import reduction
+    from bemt.data.recordings.reduce import reduction
 
     u, floor = {k: np.array(v) for k, v in series.u.items()}, 1e-3
     for name, seen in reduced.u.items():
@@ -316,7 +316,7 @@ def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:
 
 def _one_setup(imported: Dataset, path: str) -> None:
     """Refuse a table of several propellers or motors: their points are no one curve."""
-    from bemt.readers.generic_csv import setups
+    from bemt.data.readers.generic_csv import setups
 
     for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import fit as fitting
-from bemt.diagnose.record import CHANNELS
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
-    from bemt.diagnose.fit import Fit
+    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.fit import Fit
 
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.diagnose.record import CHANNELS
-from bemt.gaussian.kernels import alike, modes, smooth
-from bemt.gaussian.whitening import Conditional, Whitener, conditional, whitener
+from bemt.base.gaussian.kernels import alike, modes, smooth
+from bemt.base.gaussian.whitening import Conditional, Whitener, conditional, whitener
+from bemt.judge.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.effects.base import Effect
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.physics.effects.base import Effect
 
 # Noise over the stated uncertainty, or over the default where none is stated; correlation of neighbours.
 _SCALES = {True: (0.7, 1.0, 1.5, 2.5, 5.0), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}

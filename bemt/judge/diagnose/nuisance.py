@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.diagnose.noise import law_of, smooth_modes
-from bemt.diagnose.record import CHANNELS
-from bemt.effects.base import Effect
-from bemt.effects.duct import DuctEffect
+from bemt.judge.diagnose.noise import law_of, smooth_modes
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.physics.effects.base import Effect
+from bemt.physics.effects.duct import DuctEffect
 from bemt.rotors.latents import NAMES, AsBuilt
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Part, Problem
+    from bemt.judge.diagnose.problem import Part, Problem
 
 PRIORS = {
     "thrust gain": 0.01, "torque gain": 0.01,

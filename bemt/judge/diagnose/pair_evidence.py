@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.diagnose import form
-from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.signatures import effect_of
-from bemt.diagnose.state import State
-from bemt.gaussian.evidence import log_sum
+from bemt.base.gaussian.evidence import log_sum
+from bemt.judge.diagnose import form
+from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.diagnose.state import State
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.signatures import Candidate
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 __all__ = ["DETAIL", "GEOMETRY", "best_pair", "every_pair", "price", "solve_together"]
 

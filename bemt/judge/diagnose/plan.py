@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import effects
 from bemt.base.arrays import Array
+from bemt.base.gaussian.evidence import log_sum
+from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
-from bemt.diagnose import confusion as look
-from bemt.diagnose import evidence, noise, prior, problem, signatures, thresholds
-from bemt.diagnose import suggest as suggestion
-from bemt.diagnose.assemble import assemble, build
-from bemt.diagnose.record import Record
-from bemt.gaussian.evidence import log_sum
-from bemt.gaussian.whitening import whitener
+from bemt.judge.diagnose import confusion as look
+from bemt.judge.diagnose import evidence, noise, prior, problem, signatures, thresholds
+from bemt.judge.diagnose import suggest as suggestion
+from bemt.judge.diagnose.assemble import assemble, build
+from bemt.judge.diagnose.record import Record
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.dataset import Dataset
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case import Case
 
 SCHEMA = "bemt.plan/1"
 
@@ -65,7 +65,7 @@ class Plan:
 
 def points(path: str, case: Case) -> Record:
     """Read the points of a plan: a recording whose loads are not there yet."""
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     return record_of(import_file(path), case)
 
@@ -73,10 +73,10 @@ def points(path: str, case: Case) -> Record:
 def record_of(imported: Dataset, case: Case) -> Record:
     """Points of a plan from a table of them."""
     from bemt.base.errors import Fault, InputError
-    from bemt.dataset import Dataset
-    from bemt.dataset.channels import channel_fault
-    from bemt.diagnose.record import from_series
-    from bemt.recordings.channels import named
+    from bemt.data.recordings.channels import named
+    from bemt.judge.diagnose.record import from_series
+    from bemt.physics.dataset import Dataset
+    from bemt.physics.dataset.channels import channel_fault
 
     path = imported.name
     rows = named(imported)

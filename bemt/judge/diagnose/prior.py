@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt import effects
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.effects.duct import DuctEffect
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.physics import effects
+from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
+    from bemt.judge.diagnose.problem import Problem
 
 __all__ = ["ALWAYS", "BOTH", "EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
 

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
-from bemt.bem import model as bem
-from bemt.diagnose import real_rotors
-from bemt.diagnose.blade import PLAIN, CalibratedBlade
-from bemt.diagnose.record import CHANNELS, Record
-from bemt.effects.base import Effect, Flow, Reading
+from bemt.judge.diagnose import real_rotors
+from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade
+from bemt.judge.diagnose.record import CHANNELS, Record
+from bemt.physics import effects
+from bemt.physics.bem import model as bem
+from bemt.physics.effects.base import Effect, Flow, Reading
 
 if TYPE_CHECKING:
-    from bemt.case.as_built import CaseAsBuilt
+    from bemt.rotors.case.as_built import CaseAsBuilt
 
 # Readings further than this factor from the baseline are in other units.
 _SLIPPED = 3.0
@@ -130,7 +130,7 @@ class Part:
 
     @property
     def by_laws(self) -> bool:
-        """Whether its rotor is known by its reference alone (:mod:`bemt.diagnose.law_rotor`)."""
+        """Whether its rotor is known by its reference alone (:mod:`bemt.judge.diagnose.law_rotor`)."""
         return False
 
     @property
@@ -188,7 +188,7 @@ class Problem:
     offset: Array = field(default_factory=lambda: np.zeros(0))
     # The parts under other laws, each off by about its uncertainty in one number
     variants: tuple[tuple[Part, ...], ...] = ()
-    # Physics that a reference shows as well as the recording (:mod:`bemt.diagnose.shared_physics`)
+    # Physics that a reference shows as well as the recording (:mod:`bemt.judge.diagnose.shared_physics`)
     shared: frozenset[str] = frozenset()
     # Readings that were solved already, by the effects added
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)

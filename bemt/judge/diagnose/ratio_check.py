@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.errors import InputError
-from bemt.compare.change_document import Invocation, next_step
-from bemt.compare.matched import LOADS
-from bemt.compare.recordings import RunChange, changed
-from bemt.compare.stand_run import StandRun, stand_run
-from bemt.dataset import Dataset
-from bemt.diagnose.record import merged
-from bemt.diagnose.suggest import Suggestion
-from bemt.recordings.load import import_file
+from bemt.data.recordings.load import import_file
+from bemt.judge.compare.change_document import Invocation, next_step
+from bemt.judge.compare.matched import LOADS
+from bemt.judge.compare.recordings import RunChange, changed
+from bemt.judge.compare.stand_run import StandRun, stand_run
+from bemt.judge.diagnose.record import merged
+from bemt.judge.diagnose.suggest import Suggestion
+from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
-    from bemt.compare.drive_laws import Judgement
-    from bemt.diagnose.record import Record
+    from bemt.judge.compare.drive_laws import Judgement
+    from bemt.judge.diagnose.record import Record
 
 # Standard deviations from which a load has changed.
 _CLEAR = 3.0

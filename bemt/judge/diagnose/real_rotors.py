@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.record import CHANNELS
+from bemt.judge.diagnose.record import CHANNELS
 from bemt.rotors.model import air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import sense
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Part, Problem
+    from bemt.judge.diagnose.problem import Part, Problem
 
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 # Coefficient at rest of a rotor that has none, so that shares of it are finite.

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.diagnose.repeats import conditions, spread_sizes
-from bemt.effects.base import follows
+from bemt.judge.diagnose.repeats import conditions, spread_sizes
+from bemt.physics.air import Air
+from bemt.physics.effects.base import follows
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.dataset import Dataset
-    from bemt.recordings.findings import Finding
+    from bemt.data.recordings.findings import Finding
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case import Case
 
 CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 """Readings that may be explained; the speed only where a pulse width was recorded."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from bemt.compare.recordings import NOTHING_SHARED, OTHER_STAND, REVERSED
-from bemt.diagnose import ratio_check, wrong_rotor_check
-from bemt.diagnose.explanation import NONE, Explanation
-from bemt.diagnose.rule import Rule, appended
-from bemt.diagnose.thresholds import LIKELY, MOST, RARE, SURE, UNCHANGED
-from bemt.diagnose.verdict import BESIDE_IT, CLAIMS, Decision, VerdictQuery
+from bemt.judge.compare.recordings import NOTHING_SHARED, OTHER_STAND, REVERSED
+from bemt.judge.diagnose import ratio_check, wrong_rotor_check
+from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.judge.diagnose.rule import Rule, appended
+from bemt.judge.diagnose.thresholds import LIKELY, MOST, RARE, SURE, UNCHANGED
+from bemt.judge.diagnose.verdict import BESIDE_IT, CLAIMS, Decision, VerdictQuery
 
 REVISIONS: list[Rule] = []
 """In the order in which they are asked."""

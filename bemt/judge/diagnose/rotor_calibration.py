@@ -1,4 +1,4 @@
-"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.compare.as_measured`."""
+"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.judge.compare.as_measured`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ import numpy as np
 import tomlkit
 
 from bemt import __version__
-from bemt.air import Air
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.case import Case
-from bemt.case.as_built import MOVED, posterior_document
-from bemt.case.prepare import prepare_case
-from bemt.compare.as_measured import AsMeasured, as_measured
-from bemt.diagnose.improve import beside, elsewhere
-from bemt.diagnose.load import cases_of, load
-from bemt.diagnose.wrong_rotor_check import FACTOR
-from bemt.rotors.k1k2 import ZERO_THRUST_MEASURED
+from bemt.judge.compare.as_measured import AsMeasured, as_measured
+from bemt.judge.diagnose.improve import beside, elsewhere
+from bemt.judge.diagnose.load import cases_of, load
+from bemt.judge.diagnose.wrong_rotor_check import FACTOR
+from bemt.physics.air import Air
+from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
+from bemt.rotors.case import Case
+from bemt.rotors.case.as_built import MOVED, posterior_document
+from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.reference import SESSION

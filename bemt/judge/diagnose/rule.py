@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from bemt.diagnose.verdict import Decision
+from bemt.judge.diagnose.verdict import Decision
 
 
 @dataclass(frozen=True)

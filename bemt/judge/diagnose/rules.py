@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
-from bemt.diagnose import blocks, ratio_check, wrong_rotor_check
-from bemt.diagnose import fit as fitting
-from bemt.diagnose import rule as ruling
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.form import FORM
-from bemt.diagnose.revisions import REVISIONS
-from bemt.diagnose.rule import Rule, appended
-from bemt.diagnose.suggest import LEVEL
-from bemt.diagnose.thresholds import (
+from bemt.judge.diagnose import blocks, ratio_check, wrong_rotor_check
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import rule as ruling
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.form import FORM
+from bemt.judge.diagnose.revisions import REVISIONS
+from bemt.judge.diagnose.rule import Rule, appended
+from bemt.judge.diagnose.suggest import LEVEL
+from bemt.judge.diagnose.thresholds import (
     BESIDE,
     END,
     ENOUGH,
@@ -41,7 +40,7 @@ from bemt.diagnose.thresholds import (
     SURE,
     VAGUE,
 )
-from bemt.diagnose.verdict import (
+from bemt.judge.diagnose.verdict import (
     BESIDE_IT,
     Decision,
     VerdictQuery,
@@ -52,6 +51,7 @@ from bemt.diagnose.verdict import (
     twins,
     unsettled,
 )
+from bemt.physics import effects
 
 MOTOR = "motor"
 """Another motor, controller or setting, as the scaling laws name it: no effect of the catalogue describes it."""

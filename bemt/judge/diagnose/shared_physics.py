@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.diagnose import evidence
-from bemt.diagnose.prior import ALWAYS
+from bemt.judge.diagnose import evidence
+from bemt.judge.diagnose.prior import ALWAYS
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.signatures import Candidate
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 
 def ask_reference(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:

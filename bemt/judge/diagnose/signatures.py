@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt import effects
 from bemt.base.arrays import Array
+from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.effects import Effect, Parameter
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.physics.effects import Effect, Parameter
 
 # Setting, its signature, whether it was solved, its prior weight.
 _Column = tuple[dict[str, Any], Array, bool, float]

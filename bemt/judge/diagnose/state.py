@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.explanation import Explanation
-from bemt.diagnose.form import Form
+from bemt.judge.diagnose.explanation import Explanation
+from bemt.judge.diagnose.form import Form
 
 if TYPE_CHECKING:
-    from bemt.diagnose.noise import Hyper
-    from bemt.gaussian.whitening import Conditional, Whitener
+    from bemt.base.gaussian.whitening import Conditional, Whitener
+    from bemt.judge.diagnose.noise import Hyper
 
 
 @dataclass(eq=False)

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import effects
-from bemt.air import R_DRY
 from bemt.base.arrays import Array
+from bemt.base.gaussian.whitening import whitener
 from bemt.base.units import ZERO_CELSIUS
-from bemt.bem import model as bem
-from bemt.compare.change_document import AIR_OF_BOTH, DAYS
-from bemt.diagnose import noise
-from bemt.diagnose.assemble import assemble
-from bemt.diagnose.confusion import ALIKE
-from bemt.diagnose.nuisance import PRIORS
-from bemt.diagnose.problem import Part, Problem
-from bemt.diagnose.record import Record
-from bemt.diagnose.signatures import effect_of
-from bemt.gaussian.whitening import whitener
+from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
+from bemt.judge.diagnose import noise
+from bemt.judge.diagnose.assemble import assemble
+from bemt.judge.diagnose.confusion import ALIKE
+from bemt.judge.diagnose.nuisance import PRIORS
+from bemt.judge.diagnose.problem import Part, Problem
+from bemt.judge.diagnose.record import Record
+from bemt.judge.diagnose.signatures import effect_of
+from bemt.physics import effects
+from bemt.physics.air import R_DRY
+from bemt.physics.bem import model as bem
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
-    from bemt.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.evidence import Evidence
 
 REFERENCE = (
     "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "

@@ -1,7 +1,7 @@
 """The decision: none, a named effect, a class of look-alikes, the stand, something unknown, or not enough data.
 
-The rules (:mod:`bemt.diagnose.rules`) are asked in the order of caution; the first that holds answers.  Is there a
-mismatch that nulls do not show?  Does an unknown smooth effect explain it better, or is something smooth left after
+The rules (:mod:`bemt.judge.diagnose.rules`) are asked in the order of caution; the first that holds answers.  Is there
+a mismatch that nulls do not show?  Does an unknown smooth effect explain it better, or is something smooth left after
 the best listed effect?  Which effects are in nearly all of the probability?  Are there look-alikes of these in this
 plan, or a second effect that may be there, too?  Only then is a name given; with a few explanations left, these.
 """
@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import effects
-from bemt.diagnose import confusion as look
-from bemt.diagnose import fit as fitting
-from bemt.diagnose import prior
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.form import FORM
-from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.thresholds import (
+from bemt.judge.diagnose import confusion as look
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import prior
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.form import FORM
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.thresholds import (
     ANOTHER,
     BOTH,
     EARNED,
@@ -45,11 +44,12 @@ from bemt.diagnose.thresholds import (
     SMALL,
     SURE,
 )
-from bemt.effects.base import Effect
+from bemt.physics import effects
+from bemt.physics.effects.base import Effect
 
 if TYPE_CHECKING:
-    from bemt.compare.recordings import RunChange
-    from bemt.diagnose.evidence import Evidence
+    from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.diagnose.evidence import Evidence
 
 BESIDE_IT = "one is sure, another may be there"
 """Rule after which the second cause may as well be absent."""

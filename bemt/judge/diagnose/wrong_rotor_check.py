@@ -16,15 +16,15 @@ import numpy as np
 from bemt.base import unit_errors
 from bemt.base.tables import number_text
 from bemt.base.units import INCH
-from bemt.diagnose.blade import AsLabelled
-from bemt.diagnose.record import CHANNELS
-from bemt.diagnose.thresholds import ANOTHER
-from bemt.effects.base import Effect, RotorBuild
+from bemt.judge.diagnose.blade import AsLabelled
+from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.thresholds import ANOTHER
+from bemt.physics.effects.base import Effect, RotorBuild
 
 if TYPE_CHECKING:
-    from bemt.diagnose.problem import Problem
-    from bemt.diagnose.verdict import Decision
-    from bemt.recordings.findings import Finding
+    from bemt.data.recordings.findings import Finding
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.verdict import Decision
 
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""

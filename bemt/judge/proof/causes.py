@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from bemt.base import unit_errors
-from bemt.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
-from bemt.proof.stand import Stand
-from bemt.proof.truth_world import Conditions, World
+from bemt.judge.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
+from bemt.judge.proof.stand import Stand
+from bemt.judge.proof.truth_world import Conditions, World
 
 _FLIGHT = ("grid_shuffled", "grid_ordered", "two_air", "single_line")
 _SETTLED = tuple(p for p in (*OPEN_PLANS, *DUCTED_PLANS, *UNDERPOWERED) if p not in ("transient", "wall", "gap"))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt.proof import rigs
-from bemt.proof.causes import CAUSES, LISTED, UNLISTED
-from bemt.proof.items import Bench, Item, make_item
+from bemt.judge.proof import rigs
+from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED
+from bemt.judge.proof.items import Bench, Item, make_item
 
 SETS = ("single", "pair", "null", "mismatch", "unlisted", "sensor", "underpowered")
 """Kinds of items; a null is noise only, a mismatch the difference of truth and solver only."""

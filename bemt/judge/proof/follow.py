@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from bemt.base.tables import json_text, text_table, write_atomic
-from bemt.proof import prove, score, seal
-from bemt.proof.items import recording_text
-from bemt.proof.pairs import followed, pair_files
-from bemt.proof.real import DENSITY, POUND, WRONG_DENSITY
+from bemt.judge.proof import prove, score, seal
+from bemt.judge.proof.items import recording_text
+from bemt.judge.proof.pairs import followed, pair_files
+from bemt.judge.proof.real import DENSITY, POUND, WRONG_DENSITY
 
 SCHEMA = "bemt.followed/1"
 _SILENT = ("none", "unknown", "insufficient")

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from bemt import __version__, effects
-from bemt.diagnose.interval_scales import scale_of
-from bemt.proof import seal
-from bemt.proof.score import VISIBLE, judge
+from bemt import __version__
+from bemt.judge.diagnose.interval_scales import scale_of
+from bemt.judge.proof import seal
+from bemt.judge.proof.score import VISIBLE, judge
+from bemt.physics import effects
 
 SCHEMA = "bemt.interval_scales/1"
 SHARE = 0.9

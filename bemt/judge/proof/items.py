@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.proof.causes import CAUSES, LISTED, Cause, Change, applied
-from bemt.proof.rigs import Rig, conditions, extended
-from bemt.proof.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.proof.stand import Stand, full_scales, record
-from bemt.proof.truth import TrueAnswer
-from bemt.proof.truth_ccblade import EXPRESSIBLE
-from bemt.proof.truth_section import SectionPhysics
-from bemt.proof.truth_world import Conditions, TrueLoads, World, loads
+from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, applied
+from bemt.judge.proof.rigs import Rig, conditions, extended
+from bemt.judge.proof.separation import FREEDOM, Yardstick, freedom, yardstick
+from bemt.judge.proof.stand import Stand, full_scales, record
+from bemt.judge.proof.truth import TrueAnswer
+from bemt.judge.proof.truth_ccblade import EXPRESSIBLE
+from bemt.judge.proof.truth_section import SectionPhysics
+from bemt.judge.proof.truth_world import Conditions, TrueLoads, World, loads
 
 _DIGITS = 6
 # Share of the items that state the uncertainty of their readings, and that come with a run without the cause.

@@ -28,13 +28,13 @@ from typing import Any
 
 import numpy as np
 
-from bemt import effects
 from bemt.base.tables import json_text, text_table, write_atomic
-from bemt.diagnose.suggest import minutes
-from bemt.proof import draw, prove, score, seal
-from bemt.proof.causes import CAUSES
-from bemt.proof.items import Bench, further_run, recorded_again
-from bemt.proof.rigs import Rig
+from bemt.judge.diagnose.suggest import minutes
+from bemt.judge.proof import draw, prove, score, seal
+from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof.items import Bench, further_run, recorded_again
+from bemt.judge.proof.rigs import Rig
+from bemt.physics import effects
 
 SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")

@@ -18,7 +18,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.folders import data_roots
-from bemt.proof.items import Item, recording_text
+from bemt.judge.proof.items import Item, recording_text
 
 _KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
          "second_rotor_rad_s", "run")  # fmt: skip
@@ -127,7 +127,7 @@ def _plain(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
 
 def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
     """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
 
     v = import_file(path).values
     flying = (v["rpm"] > 0.5 * np.median(v["rpm"])) & (v["height_m"] > 0.3)
@@ -144,9 +144,9 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
 
 def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
-    from bemt.compare.selection import selected
-    from bemt.compare.stand_run import stand_run
-    from bemt.recordings.load import import_file
+    from bemt.data.recordings.load import import_file
+    from bemt.judge.compare.selection import selected
+    from bemt.judge.compare.stand_run import stand_run
 
     if "mass_kg" in how:
         columns = _flight(path, float(how["mass_kg"]))

@@ -76,5 +76,5 @@ def html(document: Mapping[str, Any]) -> str:
         f"{document['commit'] or 'unknown'}."
     )
     title = "Proof on concealed causes"
-    return render("bemt.proof", "proof.html", ["page.js"], title=title, lead=lead, key=document["key_sha256"],
+    return render("bemt.judge.proof", "proof.html", ["page.js"], title=title, lead=lead, key=document["key_sha256"],
                   tables=tables)  # fmt: skip

@@ -22,7 +22,7 @@ from bemt import __version__
 from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.proof import draw, items, proof_text, real, resolve, score, seal
+from bemt.judge.proof import draw, items, proof_text, real, resolve, score, seal
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -46,7 +46,7 @@ def conceal(
     out: Path, size: str, seed: int, say: Callable[[str], None] | None = None, jobs: int = 1
 ) -> str:  # fmt: skip
     """Draw and write all items, and the sealed key."""
-    from bemt import effects
+    from bemt.physics import effects
 
     if (out / "items").exists() or (out / seal.KEY).exists():
         raise InputError(Fault(out.as_posix(), "", "a proof", "a folder without one", "Choose another --out"))
@@ -102,7 +102,7 @@ def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, st
     command = [sys.executable, "-m", "bemt", *words, "--json"]
     # the numerical libraries' own threads would fight over the cores that --jobs shares out
     one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
-    found = str(Path(__file__).resolve().parents[2])
+    found = str(Path(__file__).resolve().parents[3])
     path = os.pathsep.join(p for p in (found, os.environ.get("PYTHONPATH", "")) if p)
     try:
         ran = subprocess.run(command, cwd=folder, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
@@ -199,7 +199,7 @@ def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
 
 def _commit() -> str:
     """Commit of the checkout, with a plus sign when files differ; empty outside of one."""
-    here = Path(__file__).resolve().parents[2]
+    here = Path(__file__).resolve().parents[3]
     if not (here / ".git").exists():  # installed: a checkout further up is somebody else's
         return ""
     command = ["git", "-c", "core.fsmonitor=", "-c", "core.hooksPath=/dev/null", "status", "--porcelain"]

@@ -18,14 +18,14 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
-from bemt.case.unknowns import section_of
-from bemt.proof.items import Item, recording_text
-from bemt.proof.pairs import draw_pairs
-from bemt.readers._uiuc_names import class_of
-from bemt.sections import rule as section_rule
+from bemt.data.readers._uiuc_names import class_of
+from bemt.judge.proof.items import Item, recording_text
+from bemt.judge.proof.pairs import draw_pairs
+from bemt.physics.sections import rule as section_rule
+from bemt.rotors.case.unknowns import section_of
 
 if TYPE_CHECKING:
-    from bemt.readers.uiuc import UiucPropeller
+    from bemt.data.readers.uiuc import UiucPropeller
 
 CLEAR, ABSENT = 0.10, 0.02
 """Change of CT or CP over the speeds that counts as clear, and below which there is none. [1]"""
@@ -130,7 +130,7 @@ def _dimensional(p: UiucPropeller) -> dict[str, Array]:
 
 
 def _uiuc(rng: np.random.Generator) -> Iterator[Item]:
-    from bemt.readers import uiuc
+    from bemt.data.readers import uiuc
 
     root = find_data("uiuc")
     folders = [] if root is None else [f for f in (root / "volume-1", root / "volume-2") if f.is_dir()] or [root]
@@ -249,8 +249,8 @@ density_kg_m3 = 1.2
 
 
 def _fan() -> Iterator[Item]:
-    from bemt.recordings.load import import_file
-    from bemt.recordings.reduce import reduce
+    from bemt.data.recordings.load import import_file
+    from bemt.data.recordings.reduce import reduce
 
     root = find_data("jmajew")
     found = {}

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bemt.proof.causes import CAUSES
-from bemt.proof.items import Bench
-from bemt.proof.rigs import extended
-from bemt.proof.separation import yardstick
-from bemt.proof.stand import Stand
+from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof.items import Bench
+from bemt.judge.proof.rigs import extended
+from bemt.judge.proof.separation import yardstick
+from bemt.judge.proof.stand import Stand
 
 _ENOUGH = 3.0
 

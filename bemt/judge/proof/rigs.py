@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.proof.stand import StandMotor
-from bemt.proof.truth import TruthRotor
-from bemt.proof.truth_duct import TruthDuct
-from bemt.proof.truth_section import TrueSection
-from bemt.proof.truth_world import Conditions
+from bemt.judge.proof.stand import StandMotor
+from bemt.judge.proof.truth import TruthRotor
+from bemt.judge.proof.truth_duct import TruthDuct
+from bemt.judge.proof.truth_section import TrueSection
+from bemt.judge.proof.truth_world import Conditions
 
 OPEN_PLANS = ("static_sweep", "grid_shuffled", "grid_ordered", "two_air", "wall", "endurance", "transient")
 DUCTED_PLANS = ("static_sweep", "grid_shuffled", "two_air", "gap", "endurance")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.proof.causes import CAUSES
+from bemt.judge.proof.causes import CAUSES
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.gaussian.whitening import Whitener, whitener
-from bemt.proof.stand import Stand, covariance, full_scales
-from bemt.proof.truth_world import TrueLoads, World
+from bemt.base.gaussian.whitening import Whitener, whitener
+from bemt.judge.proof.stand import Stand, covariance, full_scales
+from bemt.judge.proof.truth_world import TrueLoads, World
 
 # One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2): pitch [deg], drag level, lift
 # slope, gains, zeros over full scale, tachometer, density, constants of motor and controller (no case states them).

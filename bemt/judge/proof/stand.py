@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.proof.truth_world import Conditions, TrueLoads
+from bemt.judge.proof.truth_world import Conditions, TrueLoads
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """Truth of the proof: a vortex rotor, lifting lines with helical wakes and their own Kutta-Joukowski balance.
 
 Each blade is a lifting line of horseshoe vortices; the trailing ones are the helices of
-`bemt.proof.truth_wake`, whose advance and contraction follow the speed that the rotor itself induces.  On every panel
-the circulation equals that of the section's lift in the local flow.  No momentum theory, no tip-loss factor: finite
-blade number, swirl and hub come out of Biot-Savart.  All operating points of a recording are solved at once.
+`bemt.judge.proof.truth_wake`, whose advance and contraction follow the speed that the rotor itself induces.  On every
+panel the circulation equals that of the section's lift in the local flow.  No momentum theory, no tip-loss factor:
+finite blade number, swirl and hub come out of Biot-Savart.  All operating points of a recording are solved at once.
 
 References
 ----------
 .. [1] J. E. Kerwin, C.-S. Lee, J. SNAME Transactions 86, 1978 (moderately loaded lifting line and lattice).
-.. [2] A. J. Landgrebe, J. AHS 17(4), 1972 (contraction, see `bemt.proof.truth_wake`).
+.. [2] A. J. Landgrebe, J. AHS 17(4), 1972 (contraction, see `bemt.judge.proof.truth_wake`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.proof import truth_section as ts
-from bemt.proof import truth_wake as tw
+from bemt.judge.proof import truth_section as ts
+from bemt.judge.proof import truth_wake as tw
 
 # rounds and largest Newton step, each for the points that the one before left; stalled panels need small steps
 _STAGES = ((12, 1.0), (12, 1.0), (40, 0.5), (60, 0.25), (300, 0.1))
@@ -43,7 +43,7 @@ class TruthRotor:
     section: ts.TrueSection = field(default_factory=ts.TrueSection)  # One section for the whole blade
     panels: int = 14  # Lifting-line panels. [-]
     wall: float = float("nan")  # Inner radius of a duct over R, NaN without one. [-]
-    code: str = "vortex"  # Which code solves it: ``vortex`` (this module) or ``ccblade`` (`bemt.proof.truth_ccblade`)
+    code: str = "vortex"  # Which code solves it: ``vortex`` (this module) or ``ccblade``
 
     @property
     def hub(self) -> float:

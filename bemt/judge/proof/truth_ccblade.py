@@ -1,7 +1,7 @@
 """Second truth of the proof: CCBlade of WISDEM (extra ``wisdem``), somebody else's blade-element momentum code.
 
 It shares no line with this project's solver.  It gives no loads at rest and knows uniform axial flow only; what an item
-may conceal with it is in `EXPRESSIBLE`.  Sections are those of `bemt.proof.truth_section`.
+may conceal with it is in `EXPRESSIBLE`.  Sections are those of `bemt.judge.proof.truth_section`.
 
 References
 ----------
@@ -19,8 +19,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.proof import truth
-from bemt.proof import truth_section as ts
+from bemt.judge.proof import truth
+from bemt.judge.proof import truth_section as ts
 
 EXPRESSIBLE = frozenset({
     "reynolds", "compressibility", "drag_divergence", "stall_delay", "section", "pitch_offset", "untwist",

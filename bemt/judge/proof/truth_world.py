@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.proof import truth, truth_ccblade, truth_duct
-from bemt.proof.truth_section import SectionPhysics
+from bemt.judge.proof import truth, truth_ccblade, truth_duct
+from bemt.judge.proof.truth_section import SectionPhysics
 
 
 @dataclass(frozen=True)

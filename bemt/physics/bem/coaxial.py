@@ -4,12 +4,12 @@ The annuli of each rotor are balanced by the axial kernel, unchanged; the other 
 every annulus.  ``w = V + (from the other) + v`` is the axial velocity in a disk, v the mean that its own annulus
 induces (Prandtl's factor times that at the blade).  The wake of either rotor is a bundle of vortex cylinders, one per
 edge of its annuli, of strength ``v_j - v_(j+1)``; A(r, z) is what they induce a distance z ahead of their disk
-(:func:`bemt.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
+(:func:`bemt.physics.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
 of vortex cylinders", not checked).
 
 Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
 
-Lower rotor: inside the wake of the upper one it meets the streamtubes of :mod:`bemt.wake`.
+Lower rotor: inside the wake of the upper one it meets the streamtubes of :mod:`bemt.physics.wake`.
 
 Outside of the wake the lower rotor feels the upwash of the cylinders, -A.  The swirl of the upper wake, twice that in
 its disk, keeps its angular momentum; it adds to the speed of blades that turn against it and takes from that of blades
@@ -31,20 +31,20 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import coefficients as co
-from bemt.air import Air
 from bemt.base.arrays import Array
-from bemt.bem import kernel as K
-from bemt.bem import solver
-from bemt.bem.model import Model
-from bemt.dataset import Dataset
-from bemt.effects import to_text
-from bemt.vortex_cylinder import ahead
-from bemt.wake import WAKE_RADIUS, contracted, hover_gain, streamtubes
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import solver
+from bemt.physics.bem.model import Model
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects import to_text
+from bemt.physics.vortex_cylinder import ahead
+from bemt.physics.wake import WAKE_RADIUS, contracted, hover_gain, streamtubes
 
 if TYPE_CHECKING:
-    from bemt.bem.solver import Prepared, Solution
-    from bemt.effects import Effect
+    from bemt.physics.bem.solver import Prepared, Solution
+    from bemt.physics.effects import Effect
 
 _TOL, _MOST = 1e-8, 200  # of the tip speed; steps
 _MEMORY, _WILD = 5, 20.0  # steps that a next one is made of; their greatest weight

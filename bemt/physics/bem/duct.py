@@ -10,7 +10,7 @@ A_exit / A_disk`` and the jet far behind, at the pressure of the stream, at ``V_
 
 The mean speed q through the exit is ``c_0 V_j`` at rest and ``c_V V`` where the rotor adds nothing to the stream: the
 jet's area there is that share of the exit's.  Both are 1 for a long straight pipe; else they and what lies between
-follow from the walls (:mod:`bemt.bem.duct_stream`).  At rest T_rotor / T_total
+follow from the walls (:mod:`bemt.physics.bem.duct_stream`).  At rest T_rotor / T_total
 = 1 / (2 sigma_w c_0); 1/2 gives back the open rotor.  Losses enter Bernoulli as ``1/2 rho (K_wall w^2 + K_lip (w -
 V)^2)``.  A stator turns the swirl ``2 v_t`` behind the rotor back into pressure, ``dT_stator = eta_s 1/2 rho (2 v_t)^2
 dA``.  The annuli are independent of each other, as in the open rotor.
@@ -46,7 +46,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.bem.duct_stream import jet_area
+from bemt.physics.bem.duct_stream import jet_area
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -117,7 +117,7 @@ class DuctFlow:
     # Area of the jet over the exit's, at rest (c_0) and where the rotor adds nothing to the stream (c_V) [1]
     contraction: float = 1.0
     capture: float = 1.0
-    # Departure of the jet's speed from a straight line between the two, see :mod:`bemt.bem.duct_stream` [1]
+    # Departure of the jet's speed from a straight line between the two, see :mod:`bemt.physics.bem.duct_stream` [1]
     bend: float = 0.0
     area: float = float("nan")  # Swept annulus, pi (R^2 - Rhub^2) [m2]
     # Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m]

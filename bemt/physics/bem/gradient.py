@@ -17,14 +17,14 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem import kernel as K
-from bemt.bem import solver
-from bemt.bem.model import Model, acts_on_points, acts_on_rotor
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import solver
+from bemt.physics.bem.model import Model, acts_on_points, acts_on_rotor
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.solver import Prepared
-    from bemt.effects import Effect
+    from bemt.physics.air import Air
+    from bemt.physics.bem.solver import Prepared
+    from bemt.physics.effects import Effect
     from geometry.blade import Stations
 
 STEP = 1e-6
@@ -72,8 +72,8 @@ def gradient(
 
     Examples
     --------
-    >>> from bemt.air import Air
-    >>> from bemt.sections.polars import linear_polar
+    >>> from bemt.physics.air import Air
+    >>> from bemt.physics.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> model = Model(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
@@ -146,7 +146,8 @@ def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
 def elements(
     prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air, names: Sequence[str] = ("dT", "dQ")
 ) -> Array:
-    """Columns of :data:`bemt.bem.solver.RADIAL` at points, (K, P, N); thrust and torque are those of all blades.
+    """Columns of :data:`bemt.physics.bem.solver.RADIAL` at points, (K, P, N); thrust and torque are those of all
+    blades.
 
     rpm [rev/min], V [m/s], rho [kg/m3]. InputError where a point does not converge.
     """

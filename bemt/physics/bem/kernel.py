@@ -1,7 +1,7 @@
 """Compiled blade-element-momentum kernel: find the inflow angle of every station, integrate over the blade.
 
 Nothing here knows files, units or effects: every effect has already been baked into plain arrays and a few numbers by
-:mod:`bemt.bem.solver`; the physics is in :mod:`bemt.bem.residual`.
+:mod:`bemt.physics.bem.solver`; the physics is in :mod:`bemt.physics.bem.residual`.
 
 The stations of one point are solved side by side (SIMD lanes) by Newton steps inside a bracket that always holds a
 root, starting from the unstalled side.  A station that needs more than a few steps is finished alone, by the same
@@ -24,9 +24,9 @@ from numba import carray, types
 from numba.core import cgutils
 
 from bemt.base.cache import always_compile
-from bemt.bem import residual
-from bemt.bem import vecmath as vecmath
-from bemt.bem.residual import (
+from bemt.physics.bem import residual
+from bemt.physics.bem import vecmath as vecmath
+from bemt.physics.bem.residual import (
     N_BRIDGE,
     N_DUCTED,
     N_LEAK,
@@ -46,9 +46,9 @@ from bemt.bem.residual import (
     mean_share,
     open_rotor,
 )
-from bemt.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
+from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
 
-# Point and station status, in the order of severity; bemt.bem.solver turns them into words.
+# Point and station status, in the order of severity; bemt.physics.bem.solver turns them into words.
 OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
 
 # Columns of ``st``, of the packed points, of ``out`` and of ``radial``.

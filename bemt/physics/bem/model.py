@@ -1,7 +1,8 @@
-"""A rotor with its section tables, duct and effects: solved at operating points into a :class:`bemt.dataset.Dataset`.
+"""A rotor with its section tables, duct and effects: solved at operating points into a
+:class:`bemt.physics.dataset.Dataset`.
 
-:mod:`bemt.bem.solver` knows effects that change a rotor; effects that change single points (a wall behind it, a lagging
-inflow, wrong density) act here, around it.
+:mod:`bemt.physics.bem.solver` knows effects that change a rotor; effects that change single points (a wall behind it, a
+lagging inflow, wrong density) act here, around it.
 """
 
 from __future__ import annotations
@@ -16,18 +17,18 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import coefficients as co
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.cache import Kept, content_key
-from bemt.bem import packing as arrays
-from bemt.bem import solver
-from bemt.bem.duct import DuctFlow, duct_flow
-from bemt.dataset import Dataset
-from bemt.effects import standard, to_text
-from bemt.effects.base import RE_FAST, Effect, Flow, Loads
-from bemt.sections.neuralfoil import neuralfoil_polar
-from bemt.sections.polars import RE_FIXED, Polar
+from bemt.physics import coefficients as co
+from bemt.physics.air import Air
+from bemt.physics.bem import packing as arrays
+from bemt.physics.bem import solver
+from bemt.physics.bem.duct import DuctFlow, duct_flow
+from bemt.physics.dataset import Dataset
+from bemt.physics.effects import standard, to_text
+from bemt.physics.effects.base import RE_FAST, Effect, Flow, Loads
+from bemt.physics.sections.neuralfoil import neuralfoil_polar
+from bemt.physics.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
     from geometry.blade import Stations
@@ -42,7 +43,7 @@ _SLOWEST, _FASTEST = 0.4, 1.5
 _MANY = 64
 
 HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
-"""Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.bem.solver.Solution.hub`."""
+"""Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.physics.bem.solver.Solution.hub`."""
 
 
 PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made.tab.nbytes)
@@ -235,7 +236,7 @@ def solve(
 
     Examples
     --------
-    >>> from bemt.sections.polars import linear_polar
+    >>> from bemt.physics.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> rotor = Rotor(helix(8 * 0.0254, 5 * 0.0254), B=2)

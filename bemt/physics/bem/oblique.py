@@ -1,21 +1,22 @@
 """Blade elements in oblique flow, compiled: annuli balanced with the loads averaged over the azimuth.
 
-SI, radians.  The axial kernel (:mod:`bemt.bem.kernel`) is not touched: points without in-plane wind go there.  ``UT``
-and ``UP`` are the mean tangential and axial onset speeds of an annulus, ``V_y`` the in-plane wind, ``psi`` the azimuth
-of a blade, 0 downstream and 90 deg on the advancing side.  Per azimuth::
+SI, radians.  The axial kernel (:mod:`bemt.physics.bem.kernel`) is not touched: points without in-plane wind go there.
+``UT`` and ``UP`` are the mean tangential and axial onset speeds of an annulus, ``V_y`` the in-plane wind, ``psi`` the
+azimuth of a blade, 0 downstream and 90 deg on the advancing side.  Per azimuth::
 
     u_t = W cos(phi) + V_y sin(psi)          w_psi = UP + v (1 + K r/R cos(psi)),   v = W sin(phi) - UP
 
-``phi`` and ``W`` belong to the mean flow of the annulus, as in :mod:`bemt.bem.residual`; with the averages over psi
-``a = sigma/4 <W_psi^2 cn> / W^2`` and ``b = sigma/4 <W_psi^2 ct> / W^2`` its residual keeps its form::
+``phi`` and ``W`` belong to the mean flow of the annulus, as in :mod:`bemt.physics.bem.residual`; with the averages over
+psi ``a = sigma/4 <W_psi^2 cn> / W^2`` and ``b = sigma/4 <W_psi^2 ct> / W^2`` its residual keeps its form::
 
     g(phi) = F M (UT sin(phi) - UP cos(phi)) - (a UT + b UP)
     W      = (UT cos(phi) + UP sin(phi)) / (1 + sigma cd / (4 F M)),   cd at the mean flow
 
 Mass flow: M W = sqrt(m^2 + V_y^2) (Glauert 1926, ARC R&M 1111, the same v for a wing and a rotor; Johnson 1980,
 Helicopter Theory, sec. 4-1.1), with m the axial mass flow: abs(w), or in the turbulent windmill and vortex-ring states
-the curve of :func:`bemt.bem.residual.mass_flow`.  Without in-plane wind that is the axial annulus.  The curve of
-descent fades to abs(w) as (1 - (V_y / 0.95 v_h)^2)^2: the end is Johnson's (2005, NASA/TP-2005-213477), the shape own.
+the curve of :func:`bemt.physics.bem.residual.mass_flow`.  Without in-plane wind that is the axial annulus.  The curve
+of descent fades to abs(w) as (1 - (V_y / 0.95 v_h)^2)^2: the end is Johnson's (2005, NASA/TP-2005-213477), the shape
+own.
 
 Prandtl's factor is that of the mean flow.  The speed of the far wake counts along that at the disk, over the latter:
 ((2 w - UP) w + V_y^2) / (w^2 + V_y^2).  Where a blade meets more wind from the side than from its own rotation there
@@ -39,9 +40,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.bem import kernel as K
-from bemt.bem import residual, vecmath
-from bemt.bem.kernel import (
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import residual, vecmath
+from bemt.physics.bem.kernel import (
     JUMP,
     NOT_CONVERGED,
     NOT_FINITE,
@@ -68,8 +69,8 @@ from bemt.bem.kernel import (
     S_TANG_FACTOR,
     S_TIP,
 )
-from bemt.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, Y_BRAKE, Y_RING, loss, mass_flow
-from bemt.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
+from bemt.physics.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, Y_BRAKE, Y_RING, loss, mass_flow
+from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
 
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE, P_CONE, P_BACK, P_TOWARD = range(9)
 N_POINT = 9

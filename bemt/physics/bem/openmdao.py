@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.bem.gradient import gradient, loads
+from bemt.physics.bem.gradient import gradient, loads
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.model import Model
-    from bemt.effects import Effect
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
+    from bemt.physics.effects import Effect
     from geometry.blade import Stations
 
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.bem import kernel as K
-from bemt.bem import residual as res
-from bemt.effects.base import RotorBuild
-from bemt.sections.polars import (
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import residual as res
+from bemt.physics.effects.base import RotorBuild
+from bemt.physics.sections.polars import (
     ALPHA_COARSE_STEP,
     ALPHA_FINE_HI,
     ALPHA_FINE_LO,
@@ -25,7 +25,7 @@ from bemt.sections.polars import (
 )
 
 if TYPE_CHECKING:
-    from bemt.sections.polars import Polar
+    from bemt.physics.sections.polars import Polar
 
 # Squared Mach number grid: uniform, so that the kernel needs neither root nor search.
 M2_STEP = 0.1

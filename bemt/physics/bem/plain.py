@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.bem.residual import Y_BRAKE
+from bemt.physics.bem.residual import Y_BRAKE
 
 Section = Callable[[Array, Array, Array], tuple[Array, Array]]
 

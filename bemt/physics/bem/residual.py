@@ -1,8 +1,8 @@
 """Residuals of one blade element, compiled: what must vanish at the right inflow angle, and its slope.
 
-Everything here is branch-free and inlined: the lanes of :mod:`bemt.bem.kernel` are the stations of a blade and run as
-SIMD code.  SI, radians.  ``UT`` is the tangential and ``UP`` the axial onset speed at the element, ``phi`` the inflow
-angle, ``alpha = beta - phi``, ``cn`` along the thrust, ``ct`` along the torque, ``sigma = B c / (2 pi r)``,
+Everything here is branch-free and inlined: the lanes of :mod:`bemt.physics.bem.kernel` are the stations of a blade and
+run as SIMD code.  SI, radians.  ``UT`` is the tangential and ``UP`` the axial onset speed at the element, ``phi`` the
+inflow angle, ``alpha = beta - phi``, ``cn`` along the thrust, ``ct`` along the torque, ``sigma = B c / (2 pi r)``,
 ``w = W sin(phi)`` the axial speed through the disk, ``v_t`` half of the swirl behind it.
 
 Open rotor.  With ``m`` the mass flow per area over density, thrust and torque balances of one annulus are::
@@ -25,10 +25,10 @@ Re, Mach number and the mass flow of the bridge take ``W0 = U cos(psi)``, which 
 
 Without swirl v_t = 0, W = UT / cos(phi), and the terms of ``ct`` drop; the bracket is -90 to 90 deg of phi.
 
-Ducted rotor (:mod:`bemt.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque balance
-reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w = G s +
-(1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t`` with the bend of
-:mod:`bemt.bem.duct_stream`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
+Ducted rotor (:mod:`bemt.physics.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque
+balance reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w
+= G s + (1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t`` with the bend of
+:mod:`bemt.physics.bem.duct_stream`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
 
     g = j |j| + K_wall w |w| + K_lip max(w - lam t, 0)^2 - lam |lam| t^2 - 4 eta (F max(x, 0) s / w)^2
         - sigma cn (1 - leak)
@@ -54,7 +54,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.bem.vecmath import inlined, log, sincos
+from bemt.physics.bem.vecmath import inlined, log, sincos
 
 # Indices of the numbers that effects and duct may set (array ``num``).
 N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM = range(13)
@@ -170,7 +170,7 @@ def lookup_plain(alpha, lre0, W2, base, tab, g):
     """cl, cd, their slopes in alpha and (none here) in ln W, from tables without Reynolds and Mach axes.
 
     ``lre0`` is ln(rho chord / mu), ``base`` where the station's tables start in the flat array ``tab``, ``g`` the grid
-    numbers packed by :mod:`bemt.bem.kernel`.
+    numbers packed by :mod:`bemt.physics.bem.kernel`.
     """
     i, wa, inv = _alpha_cell(alpha, g)
     p = np.uint64(base + 2 * i)

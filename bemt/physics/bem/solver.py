@@ -1,7 +1,7 @@
 """Blade-element-momentum solver: prepare a rotor once, solve any number of operating points.
 
 :func:`prepare` bakes geometry, section tables and effects into arrays; :func:`solve` hands them to the compiled
-kernel (:mod:`bemt.bem.kernel`), in batch, and gives back a :class:`Solution`.
+kernel (:mod:`bemt.physics.bem.kernel`), in batch, and gives back a :class:`Solution`.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt.air import Air
 from bemt.base.arrays import Array
-from bemt.bem import kernel as K
-from bemt.bem import packing as arrays
-from bemt.bem import residual as res
-from bemt.bem.packing import M2_STEP
-from bemt.effects import Effect, standard
-from bemt.effects.base import RotorBuild
-from bemt.sections.polars import ALPHA_GRID
+from bemt.physics.air import Air
+from bemt.physics.bem import kernel as K
+from bemt.physics.bem import packing as arrays
+from bemt.physics.bem import residual as res
+from bemt.physics.bem.packing import M2_STEP
+from bemt.physics.effects import Effect, standard
+from bemt.physics.effects.base import RotorBuild
+from bemt.physics.sections.polars import ALPHA_GRID
 
 if TYPE_CHECKING:
-    from bemt.bem.duct import DuctFlow
-    from bemt.sections.polars import Polar
+    from bemt.physics.bem.duct import DuctFlow
+    from bemt.physics.sections.polars import Polar
     from geometry.blade import Stations
     from geometry.rotor import Rotor
 
@@ -61,13 +61,13 @@ class Prepared:
     stations: Stations
     effects: tuple[Effect, ...]  # Physics that is on
     duct: DuctFlow | None  # Momentum numbers of the duct
-    st: Array  # (N, 14) Columns ``S_*`` of :mod:`bemt.bem.kernel`, in SI units
-    # (N, rows, Na, 2) Section tables as the kernel reads them, see :func:`bemt.bem.kernel.entry`; written out in
-    # ``tables`` [1]
+    st: Array  # (N, 14) Columns ``S_*`` of :mod:`bemt.physics.bem.kernel`, in SI units
+    # (N, rows, Na, 2) Section tables as the kernel reads them, see :func:`bemt.physics.bem.kernel.entry`; written out
+    # in ``tables`` [1]
     tab: Array
     axes: tuple[int, int]  # Mach and Reynolds numbers of the tables
-    # (13,), (17,) Numbers of the effects and of the table axes, see :mod:`bemt.bem.residual` and :mod:`bemt.bem.kernel`
-    # [SI units]
+    # (13,), (17,) Numbers of the effects and of the table axes, see :mod:`bemt.physics.bem.residual` and
+    # :mod:`bemt.physics.bem.kernel` [SI units]
     num: Array
     grid: Array
     cone: float | None = None  # Coning angle of blades on flapping hinges; None: stiff blades [rad]
@@ -161,10 +161,10 @@ def prepare(
     A blade without sections counts as 12 % thick (wave drag). Section tables at r/R blend linearly between them and are
     constant beyond the ends; beyond `mach_max` the last table is held and the point flagged. `stations` are used as
     they are instead of `n_stations` cosine-spaced ones. `level`: share at which effects act whose size differs between
-    points, see :meth:`bemt.effects.Effect.share`. `re_range`: Reynolds numbers that will occur; other tables are left
-    out, which makes many preparations cheap. ValueError if polars are missing or a station is not usable.
+    points, see :meth:`bemt.physics.effects.Effect.share`. `re_range`: Reynolds numbers that will occur; other tables
+    are left out, which makes many preparations cheap. ValueError if polars are missing or a station is not usable.
 
-    >>> from bemt.sections.polars import linear_polar
+    >>> from bemt.physics.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
@@ -231,13 +231,13 @@ def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> Duc
     """Duct with the numbers that an effect sets; an open rotor gets a duct of its own."""
     if numbers is None:
         return duct
-    from bemt.bem.duct import DuctFlow
+    from bemt.physics.bem.duct import DuctFlow
 
     return replace(duct or DuctFlow(1.0), **numbers)
 
 
 def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
-    """Numbers of effects and duct in the order of :mod:`bemt.bem.residual`."""
+    """Numbers of effects and duct in the order of :mod:`bemt.physics.bem.residual`."""
     n = bake.num
     num = np.zeros(res.N_NUM)
     num[res.N_TIP] = n.tip
@@ -295,7 +295,8 @@ def solve(
     threads : int
         The batch is cut into so many threads; the answer does not depend on it [1].
     side : array_like
-        In-plane onset speed [m/s]; points that have some are solved by :mod:`bemt.bem.oblique`, open rotors only.
+        In-plane onset speed [m/s]; points that have some are solved by :mod:`bemt.physics.bem.oblique`, open rotors
+        only.
 
     Returns
     -------
@@ -309,7 +310,7 @@ def solve(
 
     Examples
     --------
-    >>> from bemt.sections.polars import linear_polar
+    >>> from bemt.physics.sections.polars import linear_polar
     >>> from geometry.laws import helix
     >>> from geometry.rotor import Rotor
     >>> ready = prepare(Rotor(helix(0.254, 0.127), 2), [(0.75, linear_polar(cd=0.01))])
@@ -355,7 +356,7 @@ def _check(points: Array) -> None:
 
 def _solve_oblique(prep: Prepared, rpm: ArrayLike, V: ArrayLike, air: Air, side: ArrayLike, radial: bool) -> Solution:
     """Points of which some have in-plane wind: the others go through the axial kernel."""
-    from bemt.bem import oblique
+    from bemt.physics.bem import oblique
 
     if prep.duct is not None:
         raise ValueError("side: got in-plane wind on a ducted rotor; expected an open rotor")

@@ -1,7 +1,7 @@
-"""Dataset: the one currency in which BEMT, K1/K2, CFD, bench and vendor numbers meet (:mod:`bemt.dataset.points`)."""
+"""Dataset: the one currency in which BEMT, K1/K2, CFD, bench and vendor numbers meet (`dataset.points`)."""
 
-from bemt.dataset.channels import DIMENSIONLESS, KINDS, ORIGINS
-from bemt.dataset.make import concat, from_pandas
-from bemt.dataset.points import Dataset
+from bemt.physics.dataset.channels import DIMENSIONLESS, KINDS, ORIGINS
+from bemt.physics.dataset.make import concat, from_pandas
+from bemt.physics.dataset.points import Dataset
 
 __all__ = ["DIMENSIONLESS", "KINDS", "ORIGINS", "Dataset", "concat", "from_pandas"]

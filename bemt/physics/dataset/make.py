@@ -11,8 +11,8 @@ import numpy as np
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.dataset.channels import DIMENSIONLESS, ORIGINS, channel_fault
-from bemt.dataset.points import Dataset
+from bemt.physics.dataset.channels import DIMENSIONLESS, ORIGINS, channel_fault
+from bemt.physics.dataset.points import Dataset
 
 if TYPE_CHECKING:
     import pandas as pd

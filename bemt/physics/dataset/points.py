@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bemt import coefficients as co
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.dataset import tables
-from bemt.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
+from bemt.physics import coefficients as co
+from bemt.physics.dataset import tables
+from bemt.physics.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import coefficients as co
 from bemt.base import units
 from bemt.base.canvas import CYCLE
 from bemt.base.errors import Fault, InputError, needs
+from bemt.physics import coefficients as co
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from bemt.dataset.points import Dataset
+    from bemt.physics.dataset.points import Dataset
 
 __all__ = ["plot", "to_html", "to_pandas", "to_xarray"]
 

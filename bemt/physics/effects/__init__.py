@@ -1,6 +1,6 @@
-"""Physical effects, one file each; see :mod:`bemt.effects.base` for what an effect is.
+"""Physical effects, one file each; see :mod:`bemt.physics.effects.base` for what an effect is.
 
->>> from bemt.effects import catalogue, standard
+>>> from bemt.physics.effects import catalogue, standard
 >>> "tip_loss" in catalogue()
 True
 >>> [e.id for e in standard()][:2]
@@ -18,7 +18,7 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-from bemt.effects.base import Effect, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 __all__ = [
     "RotorBuild",

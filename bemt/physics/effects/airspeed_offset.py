@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Parameter
+from bemt.physics.effects.base import Effect, Flow, Parameter
 
 # Air that may blow back at a rotor at rest [m/s].
 _DRAUGHT = 0.3

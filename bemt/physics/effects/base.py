@@ -2,10 +2,10 @@
 
 An effect is a frozen dataclass with an ``id`` and hooks that are called in a fixed order. The solver calls, once per
 rotor: ``blade`` (adds to beta) -> ``inflow`` (scales and adds to Vx, Vy) -> ``section`` (changes cl, cd tables) ->
-``momentum`` (sets numbers of the compiled kernel). The model of a recording (:mod:`bemt.bem.model`) calls, once per set
-of points: ``flow`` (conditions at the rotor) before the solver, ``loads`` (thrust and torque) and ``reading``
+``momentum`` (sets numbers of the compiled kernel). The model of a recording (:mod:`bemt.physics.bem.model`) calls, once
+per set of points: ``flow`` (conditions at the rotor) before the solver, ``loads`` (thrust and torque) and ``reading``
 (instrument readings) after it. Hooks that an effect does not define are not called. Each file in this folder that
-defines a subclass of :class:`Effect` is found by :func:`bemt.effects.catalogue`.
+defines a subclass of :class:`Effect` is found by :func:`bemt.physics.effects.catalogue`.
 """
 
 from __future__ import annotations
@@ -480,7 +480,7 @@ class Effect:
         """Set kernel numbers; does nothing by default."""
 
     def duct(self, R: float, stated: bool) -> Mapping[str, float] | None:
-        """Numbers of :class:`bemt.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
+        """Numbers of :class:`bemt.physics.bem.duct.DuctFlow` that the effect sets to duct an open rotor; None: no duct.
 
         Parameters
         ----------

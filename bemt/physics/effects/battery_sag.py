@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading
 
 # Readings for each number of the circuit, and the largest scatter about it that is a meter's noise, a share [1].
 _ROWS, _METER = 4, 0.003

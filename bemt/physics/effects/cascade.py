@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, RotorBuild, choice
-from bemt.sections.row import row_shift, weinig_factor
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild, choice
+from bemt.physics.sections.row import row_shift, weinig_factor
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
@@ -34,9 +34,9 @@ class Cascade(Effect):
     -----
     A row turns the flow at most to its own exit angle. Isolated sections do not know that: at solidity 1 they turn it
     50 % too far. ``form = "potential"``: slope and zero-lift angle of the row of the blade's own sections, thick and
-    cambered (:func:`bemt.sections.row.row_shift`), over those of the isolated section. The table is read at the angle
-    where the isolated section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift). Drag and stall
-    move with the lift. A blade without section shapes uses one with the zero-lift angle of the table. ``form =
+    cambered (:func:`bemt.physics.sections.row.row_shift`), over those of the isolated section. The table is read at the
+    angle where the isolated section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift). Drag and
+    stall move with the lift. A blade without section shapes uses one with the zero-lift angle of the table. ``form =
     "carter"``: Weinig's slope of flat plates; the zero-lift angle makes a circular arc at zero incidence leave with
     Carter's deviation, m theta sqrt(s/c) with m = 0.23 + 0.1 beta_2 / 50 deg (Carter 1950, ARC R&M 2804; as quoted in
     Cohen, Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked), in rows of solidity above 0.6, faded
@@ -49,8 +49,8 @@ class Cascade(Effect):
     (Howell 1945, Proc. IMechE 153:441; as quoted in Cohen, Rogers and Saravanamuttoo; not checked against the paper).
     Howell's annulus loss, 0.020 s/h with spacing s and blade height h, is friction of both walls expressed as drag of
     the blades. It is left out: the outer wall stands still and brakes the stream, not the shaft, and the friction of
-    both is in the duct's balance of pressure already (:mod:`bemt.bem.duct`). Counted again, at half of its size, it
-    raises the torque of four wide blades in nozzle 19A by 7 to 40 %.
+    both is in the duct's balance of pressure already (:mod:`bemt.physics.bem.duct`). Counted again, at half of its
+    size, it raises the torque of four wide blades in nozzle 19A by 7 to 40 %.
     """
 
     zero_lift: float = 1.0

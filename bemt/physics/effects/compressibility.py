@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("prandtl_glauert", "karman_tsien")
 # Lift grows a little beyond drag divergence, then the shock stalls the section within this span of Mach number.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
 
 FORMS = ("torque_in_thrust", "thrust_in_torque")
 _SIZES = tuple(k / 100.0 for k in range(-20, 21) if k)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Flow, Loads, Parameter
+from bemt.physics.effects.base import Effect, Flow, Loads, Parameter
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("lock", "cubic")
 

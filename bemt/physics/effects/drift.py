@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading, choice
 
 TARED = ("run", "once")
 

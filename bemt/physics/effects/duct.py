@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Parameter
+from bemt.physics.effects.base import Effect, Parameter
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,9 @@ class DuctEffect(Effect):
     Notes
     -----
     T / T_rotor = 2 sigma_w at rest, sigma_w exit over disk area; fades with speed (McCormick 1967, Aerodynamics of
-    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.bem.duct`). A case
-    with a duct takes it from its geometry, not from this effect; ``effects_off = ["duct"]`` removes it. The duct of a
-    case keeps its lip, walls and gap. An unstated duct may have any lip and wall: an inlet from well rounded to
+    V/STOL Flight, ch. 9; Pereira 2008, PhD thesis Univ. of Maryland, eq. 2.20-2.40; see :mod:`bemt.physics.bem.duct`).
+    A case with a duct takes it from its geometry, not from this effect; ``effects_off = ["duct"]`` removes it. The duct
+    of a case keeps its lip, walls and gap. An unstated duct may have any lip and wall: an inlet from well rounded to
     sharp-edged loses 0.04 to 0.5 of 1/2 rho w^2 (Crane TP-410, p. A-29, not checked), which takes the duct's share from
     a half of the thrust to a quarter; the outer wall has friction drag only, or up to the drag of a blunt ring with a
     thickness of a tenth of the radius (Hoerner 1965, Fluid-Dynamic Drag, ch. 3, not checked).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -14,11 +14,11 @@ class Flapping(Effect):
 
     Notes
     -----
-    Only in oblique flow, where :func:`bemt.bem.oblique.flap` finds the tilt of the path of the tips at which the hub
-    takes no roll and pitch moment: first harmonic, hinges at the shaft, so that inertia and centrifugal moments cancel
-    (Wheatley 1934, NACA Report 487; Leishman 2006, Principles of Helicopter Aerodynamics, sec. 4.5 to 4.7; equation
-    numbers not checked). The coning angle follows from the mass of the blades and is declared: 0 if teetering without
-    precone, some 4 to 8 deg on helicopters and autogiros.
+    Only in oblique flow, where :func:`bemt.physics.bem.oblique.flap` finds the tilt of the path of the tips at which
+    the hub takes no roll and pitch moment: first harmonic, hinges at the shaft, so that inertia and centrifugal moments
+    cancel (Wheatley 1934, NACA Report 487; Leishman 2006, Principles of Helicopter Aerodynamics, sec. 4.5 to 4.7;
+    equation numbers not checked). The coning angle follows from the mass of the blades and is declared: 0 if teetering
+    without precone, some 4 to 8 deg on helicopters and autogiros.
     """
 
     coning_deg: float = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, RotorBuild
+from bemt.physics.effects.base import Effect, RotorBuild
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,8 @@ class HighInduction(Effect):
     -----
     From the vortex-ring state to the windmill state of a rotor in descent the disk follows the induced velocity
     measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, sec. 2.14.3 (book not
-    checked; :func:`bemt.bem.residual.mass_flow`), and so does its mirror image, a propeller that brakes in wind from
-    the front. Never acts in normal propeller operation.
+    checked; :func:`bemt.physics.bem.residual.mass_flow`), and so does its mirror image, a propeller that brakes in wind
+    from the front. Never acts in normal propeller operation.
     """
 
     id = "high_induction"

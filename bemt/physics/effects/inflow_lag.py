@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Loads, Parameter, follows
+from bemt.physics.effects.base import Array, Effect, Flow, Loads, Parameter, follows
 
 
 @dataclass(frozen=True)

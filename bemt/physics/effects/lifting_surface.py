@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.effects.base import Array, Effect, Parameter, RotorBuild
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild
 
 # Rate of the closed form: least squares on the lattice of tests/test_lifting_surface.py, c/R 0.15 to 0.2 [1].
 RATE = 1.36

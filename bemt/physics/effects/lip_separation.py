@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.effects.base import Array, Effect, Flow, Loads, Parameter, choice
+from bemt.physics.effects.base import Array, Effect, Flow, Loads, Parameter, choice
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading
 
 COPPER, MAGNET = 0.0039, 0.001  # per kelvin
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Loads, Parameter, RotorBuild
+from bemt.physics.effects.base import Effect, Flow, Loads, Parameter, RotorBuild
 
 
 @dataclass(frozen=True)

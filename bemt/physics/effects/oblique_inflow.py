@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Parameter
+from bemt.physics.effects.base import Effect, Flow, Parameter
 
 
 @dataclass(frozen=True)
@@ -15,9 +15,9 @@ class ObliqueInflow(Effect):
 
     Notes
     -----
-    The rotor is solved in oblique flow (:mod:`bemt.bem.oblique`): skewed mass flow (Glauert 1926, ARC R&M 1111), linear
-    inflow gradient (Pitt and Peters 1981, Vertica 5:21), blade loads round the azimuth. A recorded ``sideslip_rad``
-    replaces ``angle_deg``. Open rotors only.
+    The rotor is solved in oblique flow (:mod:`bemt.physics.bem.oblique`): skewed mass flow (Glauert 1926, ARC R&M
+    1111), linear inflow gradient (Pitt and Peters 1981, Vertica 5:21), blade loads round the azimuth. A recorded
+    ``sideslip_rad`` replaces ``angle_deg``. Open rotors only.
     """
 
     angle_deg: float = 20.0

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
-from bemt.sections.polars import first_stall
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.sections.polars import first_stall
 
 FORMS = ("viterna", "plate")
 # Stall is looked for up to here; the plate takes over within the span behind it [rad].
 _STALL_LAST, _PLATE_SPAN = np.radians(25.0), np.radians(10.0)
-# Lift of the reversed section over that of the same angle in normal flow (as in bemt.sections.extrapolation).
+# Lift of the reversed section over that of the same angle in normal flow (as in bemt.physics.sections.extrapolation).
 _REVERSED = 0.7
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from bemt.effects.base import Effect, Parameter, RotorBuild, choice
-from bemt.sections.polars import RE_FIXED
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild, choice
+from bemt.physics.sections.polars import RE_FIXED
 
 
 @dataclass(frozen=True)

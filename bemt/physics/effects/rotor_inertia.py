@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, Reading, follows
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading, follows
 
 # Blade of chord 0.75 R all along, section area of a 10 % thick aerofoil (0.68 t c), fibre-filled nylon.
 _SECTION, _DENSITY = 0.068, 1300.0

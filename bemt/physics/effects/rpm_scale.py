@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from bemt.base import unit_errors
-from bemt.effects.base import Effect, Flow, Parameter
+from bemt.physics.effects.base import Effect, Flow, Parameter
 
 _EPS = tuple(e / 400.0 for e in range(-16, 17) if e)
 # Rarer ones are left to the scaling laws; nearer ones (11 : 12) are within what the level of a model may be off.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Array, Effect, Parameter, RotorBuild, choice
 
 FORMS = ("chaviaropoulos", "snel", "du_selig")
 # Du and Selig's weight turns back at wider roots than wind turbines have, and below zero at chord = r.

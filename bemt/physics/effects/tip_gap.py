@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Array, Effect, Flow, Parameter, RotorBuild
+from bemt.physics.effects.base import Array, Effect, Flow, Parameter, RotorBuild
 
 GAP_LOSS = 1.0, 2.0
 """Points of pressure rise lost per point of gap over span, as measured on compressor rotors [1]."""

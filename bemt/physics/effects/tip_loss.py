@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemt.effects.base import Effect, Parameter, RotorBuild, choice
+from bemt.physics.effects.base import Effect, Parameter, RotorBuild, choice
 
 
 @dataclass(frozen=True)

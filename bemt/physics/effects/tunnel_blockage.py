@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.effects.base import Effect, Flow, Parameter
+from bemt.physics.effects.base import Effect, Flow, Parameter
 
 # Advance ratio up to which the air is at rest.
 _STILL = 0.03

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from bemt.base import unit_errors
-from bemt.effects.base import Effect, Flow, Parameter, Reading, choice
+from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
 
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 _KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",

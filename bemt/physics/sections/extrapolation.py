@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.sections.polars import ALPHA_GRID, Polar, first_stall
+from bemt.physics.sections.polars import ALPHA_GRID, Polar, first_stall
 
 METHODS = ("viterna", "normal")
 """Names of the post-stall models of `extend`."""

@@ -75,7 +75,7 @@ def unpack(packed: NDArray[np.uint8]) -> NDArray[np.float32]:
 @cache
 def table() -> ShippedTable:
     """The shipped table, read once."""
-    found = shipped_arrays("bemt.sections", FILE)
+    found = shipped_arrays("bemt.physics.sections", FILE)
     axes = tuple(found[name] for name in AXES)
     return ShippedTable(axes, found["alpha_deg"], found["Re"], unpack(found["packed"]), str(found["made_with"]))
 

@@ -1,9 +1,9 @@
 """Section tables from NeuralFoil: kept within what it knows, continued to +-180 degrees, cached by content.
 
-Sections of the rule come from the shipped table of its answers (:mod:`bemt.sections.four_digit`); any other needs
-NeuralFoil itself, the extra ``[neuralfoil]``.
+Sections of the rule come from the shipped table of its answers (:mod:`bemt.physics.sections.four_digit`); any other
+needs NeuralFoil itself, the extra ``[neuralfoil]``.
 
-:func:`neuralfoil_polar` is what the section of a propeller gets (the rule of :mod:`bemt.sections.rule`),
+:func:`neuralfoil_polar` is what the section of a propeller gets (the rule of :mod:`bemt.physics.sections.rule`),
 :func:`tunnel_polar` a smooth section in an ordinary wind tunnel.
 """
 
@@ -19,10 +19,10 @@ from bemt.base import cache
 from bemt.base.arrays import Array
 from bemt.base.cache import Kept
 from bemt.base.errors import needs
-from bemt.sections import four_digit, rule
-from bemt.sections.extrapolation import METHODS, extend, viterna_cd_max
-from bemt.sections.four_digit import RawPolar
-from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
+from bemt.physics.sections import four_digit, rule
+from bemt.physics.sections.extrapolation import METHODS, extend, viterna_cd_max
+from bemt.physics.sections.four_digit import RawPolar
+from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil
@@ -58,7 +58,7 @@ def _confident_range(alpha: Array, cl: Array, confidence: Array, past_stall: flo
 
 
 def neuralfoil_polar(airfoil: Airfoil, n_crit: float = rule.N_CRIT, drag_level: float = rule.DRAG_LEVEL) -> Polar:
-    """Section table of a propeller blade by the general rule (:mod:`bemt.sections.rule`); one object for equal ones."""
+    """Section table of a propeller blade by the general rule (:mod:`bemt.physics.sections.rule`), kept."""
     key = airfoil.key(), airfoil.name, airfoil.four_digit, float(n_crit), float(drag_level)
     if cache.watched():  # whoever collects the tables that are used is to see them
         return _by_rule(airfoil, n_crit, drag_level)

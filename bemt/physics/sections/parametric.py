@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.sections.polars import Polar, first_stall
+from bemt.physics.sections.polars import Polar, first_stall
 
 LOW, HIGH = np.radians(-16.0), np.radians(22.0)
 """Angles of attack that a fit of lift looks at [rad]."""

@@ -1,35 +1,32 @@
 """The validation report as one self-contained HTML file and a summary.
 
-What the pages show is gathered as plain values (:mod:`bemt.report.gather`), then written; no value of a file reaches a
-page unescaped, no file outside of DIR is written, and the HTML lets no script run but its own.
+What the pages show is gathered as plain values (:mod:`bemt.results.report.gather`), then written; no value of a file
+reaches a page unescaped, no file outside of DIR is written, and the HTML lets no script run but its own.
 """
 
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.face import CallableRoom
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
 HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
-sys.modules[__name__].__class__ = CallableRoom  # bemt.report(...) is bemt.library.report(...)
 
 
 def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
-    from bemt.report.case_page import case_sections, reproduction_table
-    from bemt.report.cfd import CFD_WORDS, FIDELITY_WORDS, cfd_sections, fidelity_sections
-    from bemt.report.diagnosis_block import diagnosis_parts, page_verdict
-    from bemt.report.front import answers, front_parts
-    from bemt.report.trends import trend_sections
-    from bemt.report.values import sections
-    from bemt.report.verdicts import headline
+    from bemt.results.report.case_page import case_sections, reproduction_table
+    from bemt.results.report.cfd import CFD_WORDS, FIDELITY_WORDS, cfd_sections, fidelity_sections
+    from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
+    from bemt.results.report.front import answers, front_parts
+    from bemt.results.report.trends import trend_sections
+    from bemt.results.report.values import sections
+    from bemt.results.report.verdicts import headline
 
     names = [str(page["result"]["name"]) for page in book["cases"]]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
@@ -66,7 +63,7 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 def book_html(book: Mapping[str, Any]) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
-    from bemt.report.verdicts import headline
+    from bemt.results.report.verdicts import headline
 
     about, only = book.get("about", {}), book["cases"]
     made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
@@ -80,7 +77,7 @@ def book_html(book: Mapping[str, Any]) -> str:
     )
     title = about.get("title") or (headline(only[0]["result"]) if len(only) == 1 else "Validation report")
     return render(
-        "bemt.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
+        "bemt.results.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
         title=title, lead=f"{made}. {lead}" if made else lead,
     )  # fmt: skip
 
@@ -98,12 +95,12 @@ def write(
     ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
     """
     from bemt.base.tables import write_atomic
-    from bemt.report.front import summary
-    from bemt.report.gather import gather
+    from bemt.results.report.front import summary
+    from bemt.results.report.gather import gather
 
     folder = Path(out)
     if recordings:
-        from bemt.report.gather import diagnose_into
+        from bemt.results.report.gather import diagnose_into
 
         diagnose_into(paths, recordings, folder, progress)
     book = {**gather(paths, folder, progress), "about": dict(about or {})}

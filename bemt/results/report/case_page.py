@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from bemt import coefficients as co
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.cfd import audit_parts
-from bemt.report.diagnosis_block import diagnosis_parts, first_pictures
-from bemt.report.plot import COLOURS, Plot, Trace, figure, points
-from bemt.report.rotor_view import viewer
-from bemt.report.values import Section, sections, uri
-from bemt.report.verdicts import headline, stand
-from bemt.sweep.comparison import Comparison
+from bemt.physics import coefficients as co
+from bemt.results.report.cfd import audit_parts
+from bemt.results.report.diagnosis_block import diagnosis_parts, first_pictures
+from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points
+from bemt.results.report.rotor_view import viewer
+from bemt.results.report.values import Section, sections, uri
+from bemt.results.report.verdicts import headline, stand
+from bemt.results.sweep.comparison import Comparison
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip

@@ -14,18 +14,18 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.page import Cell, num, table
-from bemt.readers import number
-from bemt.recordings.audit import CfdFacts, audit, audit_document
-from bemt.report.found_files import read_json, safe_files
-from bemt.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
-from bemt.report.values import Part, Section, picture, sections
+from bemt.data.readers import number
+from bemt.data.recordings.audit import CfdFacts, audit, audit_document
+from bemt.results.report.found_files import read_json, safe_files
+from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
+from bemt.results.report.values import Part, Section, picture, sections
+from bemt.results.sweep.comparison import Comparison
 from bemt.rotors.validity import serious
-from bemt.sweep.comparison import Comparison
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
 DOMAIN_OVER_D = {"free": 5.0, "pipe": 1.0}
-"""Width of the domains of :mod:`bemt.exports.openfoam` over the rotor's diameter. [1]"""
+"""Width of the domains of :mod:`bemt.tools.cfd.openfoam` over the rotor's diameter. [1]"""
 TURBULENCE = {"kOmegaSST": "k-omega SST", "realizableKE": "realizable k-epsilon"}
 NUMBERS = ("rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "density_kg_m3",
            "wall_distance_m", "tip_gap_mm", "sideslip_deg", "pitch_offset_deg", "level", "cells", "iterations",

@@ -1,6 +1,6 @@
 """What a case page plots: geometry, performance over J and rpm with bands, radial loading, refinement of the stations.
 
-The bands are those of `bemt.case.propagate`, as everywhere.
+The bands are those of `bemt.rotors.case.propagate`, as everywhere.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import InputError
-from bemt.case import Case
-from bemt.drive.drive_result import full_throttle
+from bemt.rotors.case import Case
 
 N_J, N_RPM = 29, 21
 REFINED = (10, 20, 40, 80)
@@ -37,13 +36,12 @@ def geometry_curves(case: Case) -> dict[str, Any]:
     }
 
 
-def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
+def _grids(case: Case, pitch_over_D: float, full_rpm: float | None) -> tuple[Array, Array, int]:
     """Points of the curves: a line of J at the case's rpm, then a line of rpm at its airspeed, to full throttle."""
     J = np.linspace(0.0, 1.45 * pitch_over_D, N_J)
     rpm = np.linspace(0.2, 1.1, N_RPM) * case.rpm
-    if case.file.drive is not None:
-        full = full_throttle(case, bands=False)["rpm"].value
-        rpm = np.linspace(0.2, 1.0, N_RPM) * np.fmax(full, case.rpm)
+    if full_rpm is not None:
+        rpm = np.linspace(0.2, 1.0, N_RPM) * np.fmax(full_rpm, case.rpm)
     speeds = J * case.rpm / 60.0 * case.diameter_m
     return (
         np.concatenate([np.full(N_J, case.rpm), rpm]),
@@ -52,14 +50,14 @@ def _grids(case: Case, pitch_over_D: float) -> tuple[Array, Array, int]:
     )
 
 
-def case_curves(case: Case) -> dict[str, Any]:
-    """Performance over J and over rpm, BEMT with bands and K1/K2."""
-    from bemt.case.prepare import k1k2_case
-    from bemt.case.propagate import propagate
+def case_curves(case: Case, full_rpm: float | None = None) -> dict[str, Any]:
+    """Performance over J and over rpm up to full throttle [rev/min], BEMT with bands and K1/K2."""
+    from bemt.rotors.case.prepare import k1k2_case
+    from bemt.rotors.case.propagate import propagate
     from bemt.rotors.validity import counted
 
     rotor = case.rotor()
-    rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D)
+    rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D, full_rpm)
     found = propagate(case, rpm, V).points
     simple = k1k2_case(case, None, rpm, V, case.air())
     whole: dict[str, Array] = {
@@ -88,8 +86,8 @@ def _until_windmill(CT: Array) -> int:
 
 def radial_curves(case: Case) -> dict[str, Any]:
     """Loading along the blade at the case's own operating point."""
-    from bemt.bem import solver
-    from bemt.case.prepare import prepare_case
+    from bemt.physics.bem import solver
+    from bemt.rotors.case.prepare import prepare_case
 
     prep = prepare_case(case).prep
     answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
@@ -109,8 +107,8 @@ def radial_curves(case: Case) -> dict[str, Any]:
 
 def refinement(case: Case) -> dict[str, Any]:
     """Thrust and torque against the number of blade elements."""
-    from bemt.case.prepare import prepare_case
-    from bemt.recordings.grid_study import grid_study
+    from bemt.data.recordings.grid_study import grid_study
+    from bemt.rotors.case.prepare import prepare_case
 
     air = case.air()
     points = [prepare_case(case, None, n).solve(case.rpm, case.airspeed_m_s, air) for n in REFINED]

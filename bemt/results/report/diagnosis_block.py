@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from bemt.base.page import num, table
-from bemt.diagnose.figures_recording import FIRST
-from bemt.report.values import Part, picture
-from bemt.report.verdicts import NOTHING_RECORDED, verdict
+from bemt.judge.diagnose.figures_recording import FIRST
+from bemt.results.report.values import Part, picture
+from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip

@@ -9,10 +9,10 @@ from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.report.diagnosis_block import diagnosis_verdict, page_verdict
-from bemt.report.plot import Mark, Plot, figure, points
-from bemt.report.values import Part, uri
-from bemt.report.verdicts import answer, headline, verdict
+from bemt.results.report.diagnosis_block import diagnosis_verdict, page_verdict
+from bemt.results.report.plot import Mark, Plot, figure, points
+from bemt.results.report.values import Part, uri
+from bemt.results.report.verdicts import answer, headline, verdict
 
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28),

@@ -10,11 +10,11 @@ from typing import Any
 import bemt
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_of, write_atomic
-from bemt.case import Case, find_cases, load_case
-from bemt.report import curves, trends
-from bemt.report.cfd import attach, cfd_runs, fidelities
-from bemt.report.found_files import read_json, safe_files
-from bemt.report.rotor_view import still
+from bemt.results.report import curves, trends
+from bemt.results.report.cfd import attach, cfd_runs, fidelities
+from bemt.results.report.found_files import read_json, safe_files
+from bemt.results.report.rotor_view import still
+from bemt.rotors.case import Case, find_cases, load_case
 from geometry.common import GeometryError
 from geometry.surface import surfaces
 
@@ -28,7 +28,7 @@ ALL_BYTES = 4_000_000
 
 def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
     """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots."""
-    from bemt.sweep import sweep
+    from bemt.results.sweep import sweep
 
     tell = progress or (lambda line: None)
     document = sweep(paths, out, progress=tell)
@@ -76,7 +76,7 @@ def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case |
             {"name": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()} for file in case.files()
         ]
         page["geometry"] = curves.geometry_curves(case)
-        page["curves"] = curves.case_curves(case)
+        page["curves"] = curves.case_curves(case, (result.get("drive") or {}).get("rpm", {}).get("value"))
         page["radial"] = curves.radial_curves(case)
         page["refinement"] = curves.refinement(case)
     except (InputError, GeometryError, ValueError) as error:
@@ -141,12 +141,12 @@ def diagnose_into(
 
     They are analysed together; too few readings are shown beside the model.
     """
-    from bemt.compare.one_run import compare_run
-    from bemt.diagnose import folder
-    from bemt.diagnose.chain import diagnose
-    from bemt.diagnose.document import document
-    from bemt.diagnose.figures_recording import FIRST, first_picture
-    from bemt.diagnose.load import load_all
+    from bemt.judge.compare.one_run import compare_run
+    from bemt.judge.diagnose import folder
+    from bemt.judge.diagnose.chain import diagnose
+    from bemt.judge.diagnose.document import document
+    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.load import load_all
 
     cases = find_cases(paths)
     if len(cases) != 1:

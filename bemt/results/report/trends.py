@@ -17,10 +17,10 @@ from bemt.base.arrays import Array
 from bemt.base.errors import InputError
 from bemt.base.page import num, table
 from bemt.base.units import G0, INCH, KGF
-from bemt.case import Case
-from bemt.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure, points
-from bemt.report.values import Section, sections
-from bemt.rotors.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
+from bemt.physics.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
+from bemt.results.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure, points
+from bemt.results.report.values import Section, sections
+from bemt.rotors.case import Case
 from geometry.common import GeometryError
 
 ORIGIN = "Cahill 2025"
@@ -33,7 +33,7 @@ N, COARSE = 15, 20
 
 def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
     """Solve one point for each value of a key of the case."""
-    from bemt.case.prepare import k1k2_case, prepare_case
+    from bemt.rotors.case.prepare import k1k2_case, prepare_case
 
     out: dict[str, list[float]] = {name: [] for name in ("thrust_N", "k1k2_thrust_N", "M_tip", "power_W")}
     for value in values:
@@ -54,7 +54,7 @@ def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
 
 def families(case: Case) -> dict[str, Any]:
     """Vary diameter, pitch and rpm of one propeller."""
-    from bemt.case.prepare import k1k2_case, prepare_case
+    from bemt.rotors.case.prepare import k1k2_case, prepare_case
 
     ready = prepare_case(case)
     D_in, p_in = case.diameter_m / INCH, ready.pitch_m / INCH

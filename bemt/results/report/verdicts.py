@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
-from bemt.sweep.comparison import Comparison, State
+from bemt.results.sweep.comparison import Comparison, State
 
 NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight", "openfoam": "own CFD"}
 """Sources in the order in which they are spoken of."""

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from bemt.sweep.batch import SCHEMA, fingerprint, sweep
+from bemt.results.sweep.batch import SCHEMA, fingerprint, sweep
 
 __all__ = ["SCHEMA", "fingerprint", "sweep"]

@@ -23,12 +23,12 @@ import bemt
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
-from bemt.case import Case, check_name, find_cases, load_case, repeated_names
-from bemt.sweep import store
-from bemt.sweep.case import solve_case
-from bemt.sweep.grid.formats import FORMATS, require_extra
-from bemt.sweep.grid.run import Engine, run_grid
-from bemt.sweep.store import SCHEMA, fingerprint
+from bemt.results.sweep import store
+from bemt.results.sweep.case import solve_case
+from bemt.results.sweep.grid.formats import FORMATS, require_extra
+from bemt.results.sweep.grid.run import Engine, run_grid
+from bemt.results.sweep.store import SCHEMA, fingerprint
+from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -215,7 +215,7 @@ def sweep(
             stack.enter_context(store.locked(folder))
         on: Engine | None = None
         if engine == "dask":
-            from bemt.sweep.grid.dask_engine import Cluster
+            from bemt.results.sweep.grid.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:

@@ -1,7 +1,7 @@
 """One case of a sweep: BEMT and K1/K2 beside the recorded values, with uncertainties, as a plain document.
 
 Uncertainty after ASME V&V 20: E = S - D, u_val^2 = u_num^2 + u_input^2 + u_model^2 + u_D^2; the model's three parts are
-those of `bemt.case.propagate`.
+those of `bemt.rotors.case.propagate`.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt import __version__, effects
-from bemt.base import units
+from bemt import __version__
+from bemt.base import plugins, units
 from bemt.base.arrays import Array
-from bemt.bem.coaxial import LOADS, RATIOS, PairModel
-from bemt.case import Case
-from bemt.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
-from bemt.dataset import Dataset
-from bemt.drive.drive_result import full_document
-from bemt.readers import references as reference_file
-from bemt.recordings import audit_remarks
-from bemt.recordings.cfd_setup import references_of
-from bemt.recordings.load import import_file
+from bemt.data.readers import references as reference_file
+from bemt.data.recordings import audit_remarks
+from bemt.data.recordings.cfd_setup import references_of
+from bemt.data.recordings.load import import_file
+from bemt.physics import effects
+from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
+from bemt.physics.dataset import Dataset
+from bemt.results.sweep.comparison import Comparison
+from bemt.rotors.case import Case
+from bemt.rotors.case.propagate import BANDED, Moved, Points, prepared, propagate, vary
 from bemt.rotors.validity import serious
-from bemt.sweep.comparison import Comparison
 
 if TYPE_CHECKING:
-    from bemt.bem.model import Model
+    from bemt.physics.bem.model import Model
 
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
 COMPARED = {
@@ -85,7 +85,7 @@ def _compare(
 
 def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
     """K1/K2 at the points, and its thrust with the band over the declared unknowns."""
-    from bemt.case.prepare import k1k2_case
+    from bemt.rotors.case.prepare import k1k2_case
 
     def area(changed: Case, _: str = "") -> dict[str, Array]:
         found = k1k2_case(changed, None, *at.conditions(changed), at.angles(changed))
@@ -164,7 +164,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "assumptions": [_assumption(moved) for moved in found.moved],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
-        "drive": full_document(case),
+        "drive": plugins.part("drive", case),
         "fan": None if isinstance(ready, PairModel) or not case.ducted else _fan(case, ready, nominal),
         "pair": _pair(case, nominal) if case.paired else None,
         "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],

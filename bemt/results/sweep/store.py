@@ -17,8 +17,8 @@ from typing import Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
-from bemt.sweep.grid.formats import FORMATS, program_hash
-from bemt.sweep.text import case_text, overview_text, rows_csv
+from bemt.results.sweep.grid.formats import FORMATS, program_hash
+from bemt.results.sweep.text import case_text, overview_text, rows_csv
 
 SCHEMA = "bemt.sweep/1"
 OVERVIEW = ("sweep.csv", "sweep.txt", "sweep.json")

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bemt.base.tables import number_text, text_table
+from bemt.results.sweep.case import ROW_SOURCES
+from bemt.results.sweep.comparison import Comparison, State
+from bemt.results.sweep.text import with_nan
 from bemt.rotors.validity import kind, serious
-from bemt.sweep.case import ROW_SOURCES
-from bemt.sweep.comparison import Comparison, State
-from bemt.sweep.text import with_nan
 
 WIDTH, ROWS, SCREEN = 80, 20, 45
 """Columns of the screen, rows of the table and lines of the screen: the rest is counted."""

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bemt.base.tables import csv_text, number_of, number_text, text_table
-from bemt.sweep.case import ROW_SOURCES
-from bemt.sweep.comparison import Comparison
+from bemt.results.sweep.case import ROW_SOURCES
+from bemt.results.sweep.comparison import Comparison
 
 WIDTH = 118
 CSV_COLUMNS = (

@@ -12,16 +12,16 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.readers._uiuc_names import class_of
+from bemt.data.readers._uiuc_names import class_of
+from bemt.physics.sections import rule as section_rule
 from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
 from bemt.rotors.population import label_angle_deg, population
 from bemt.rotors.reference import ReferenceRun
-from bemt.sections import rule as section_rule
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bemt.case.schema import AsBuiltTable, BladeTable, CaseFile
+    from bemt.rotors.case.schema import AsBuiltTable, BladeTable, CaseFile
     from geometry.rotor import Rotor
 
 # Assumptions that move a latent number of their own accord.

@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from bemt.air import Air, isa_pressure
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.case.schema import AirTable, CaseFile
+from bemt.physics.air import Air, isa_pressure
+from bemt.rotors.case.schema import AirTable, CaseFile
 from geometry.airfoil import Airfoil, naca, naca4, parse_dat
 from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError
@@ -66,7 +66,7 @@ def _anchors(case: CaseFile, path: Path) -> list[tuple[float, Airfoil]]:
 
 
 def _dat(path: Path) -> Airfoil:
-    from bemt.readers import load_text
+    from bemt.data.readers import load_text
 
     text = load_text(path).text
     return _as_input(path.as_posix(), "", lambda: parse_dat(text, path.stem))
@@ -111,15 +111,15 @@ def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.nd
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
     blade = case.blade
     if blade.stations is not None:
-        from bemt.readers._stations import read_stations
+        from bemt.data.readers._stations import read_stations
 
         return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
     if blade.uiuc is not None:
-        from bemt.readers._uiuc_tables import read_geometry
+        from bemt.data.readers._uiuc_tables import read_geometry
 
         table = read_geometry(path.parent / blade.uiuc)
         return table.r_R, table.c_R, np.radians(table.beta_deg)
-    from bemt.readers.apc import read_pe0
+    from bemt.data.readers.apc import read_pe0
 
     assert blade.apc is not None  # a rule of the file
     apc = read_pe0(path.parent / blade.apc)

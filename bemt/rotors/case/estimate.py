@@ -11,12 +11,12 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.base.units import INCH
-from bemt.case import Case, case_of, fresh
-from bemt.case.load import with_changes
-from bemt.case.prepare import k1k2_case
-from bemt.case.propagate import propagate
-from bemt.case.schema import AIRSPEED, ANGLE, RPM
-from bemt.readers._uiuc_names import find_family
+from bemt.data.readers._uiuc_names import find_family
+from bemt.rotors.case import Case, case_of, fresh
+from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.prepare import k1k2_case
+from bemt.rotors.case.propagate import propagate
+from bemt.rotors.case.schema import AIRSPEED, ANGLE, RPM
 from bemt.rotors.validity import counted
 from geometry.designation import Designation
 

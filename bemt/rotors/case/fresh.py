@@ -11,9 +11,9 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
-from bemt.readers._uiuc_names import class_of, family_of
+from bemt.data.readers._uiuc_names import class_of, family_of
+from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
+from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -288,12 +288,12 @@ recovery = 0.8
 
 def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     """Hub ratio and key of a file of stations: our own CSV, a geometry file of UIUC, or an APC PE0 file."""
-    from bemt.readers import load_text
+    from bemt.data.readers import load_text
 
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.readers._stations import read_stations
+        from bemt.data.readers._stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table, write_atomic
-from bemt.case.unknowns import AIR, SURFACE
+from bemt.rotors.case.unknowns import AIR, SURFACE
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
 from geometry.slicing import FoundRotor, find_rotor

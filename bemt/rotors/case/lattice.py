@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.case.propagate import propagate
+from bemt.rotors.case.propagate import propagate
 
 if TYPE_CHECKING:
-    from bemt.case.load import Case
-    from bemt.dataset import Dataset
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case.load import Case
 
+SPEEDS = np.linspace(0.04, 1.0, 33)
+"""Speeds of the table of a rotor over the greatest [1]."""
 FEW = 300
 """Up to so many points each has its band solved for itself."""
 ANGLE_STEP, SPEED_STEP = 0.01, 0.1

@@ -1,7 +1,7 @@
 """Case files: a TOML document with units in its key names becomes a rotor, a duct, air and operating points.
 
-The models are in :mod:`bemt.case.schema`; objects are built in :mod:`bemt.case.build`, each once. A case knows which
-of its values are *assumptions* (not given by the source) and the range of each.
+The models are in :mod:`bemt.rotors.case.schema`; objects are built in :mod:`bemt.rotors.case.build`, each once. A case
+knows which of its values are *assumptions* (not given by the source) and the range of each.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.case.as_built import CaseAsBuilt, as_built_of, stated_effects
-from bemt.case.build import build_air, build_duct, build_rotor
-from bemt.case.rules import check_case, check_shape, value_at
-from bemt.case.schema import AXES, GROUPS, CaseFile
-from bemt.case.unknowns import completed
+from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of, stated_effects
+from bemt.rotors.case.build import build_air, build_duct, build_rotor
+from bemt.rotors.case.rules import check_case, check_shape, value_at
+from bemt.rotors.case.schema import AXES, GROUPS, CaseFile
+from bemt.rotors.case.unknowns import completed
 
 if TYPE_CHECKING:
-    from bemt.air import Air
+    from bemt.physics.air import Air
     from bemt.rotors.latents import AsBuilt
     from geometry.duct import Duct
     from geometry.rotor import Rotor
@@ -155,7 +155,7 @@ class Case:
                 if second.case is not None:
                     found = load_case(self.folder / second.case)
                 else:
-                    from bemt.case import fresh
+                    from bemt.rotors.case import fresh
 
                     found = case_of(fresh.label_text(str(second.label)), self.folder)
             except InputError as error:
@@ -328,7 +328,7 @@ def _less(written: Mapping[str, Any]) -> dict[str, Any]:
 
 def _exports(run: Path) -> list[Path]:
     """Files of a CFD run; none where its run.toml cannot be read, which the sweep says."""
-    from bemt.readers.cfd_run import read
+    from bemt.data.readers.cfd_run import read
 
     try:
         return [run.parent / name for name in read(run).run.files]

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.bem.coaxial import RATIOS, PairModel
+from bemt.physics.bem.coaxial import RATIOS, PairModel
 from bemt.rotors.latents import AsBuilt, as_built
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.model import Model
-    from bemt.case.load import Case
-    from bemt.dataset import Dataset
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case.load import Case
     from bemt.rotors.latents import Prior
 
 Loads = dict[str, Array]
@@ -42,7 +42,7 @@ class PairError:
     @staticmethod
     def of(case: Case, model: PairModel, found: Dataset, air: Air) -> PairError:
         """Both rotors of a solved pair."""
-        from bemt.case.propagate import validity_of
+        from bemt.rotors.case.propagate import validity_of
 
         lower = case.second()
         alone, factors, words = [], [], []
@@ -65,7 +65,7 @@ class PairError:
 
     def widths(self) -> tuple[Loads, Loads]:
         """Half widths of the 68 and 95 % intervals of all channels."""
-        from bemt.case.propagate import loads_of, model_error
+        from bemt.rotors.case.propagate import loads_of, model_error
 
         narrow: list[Loads] = []
         wide: list[Loads] = []

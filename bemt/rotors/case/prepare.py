@@ -10,25 +10,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt import effects
 from bemt.base import cache
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem.coaxial import PairModel
-from bemt.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
-from bemt.bem.model import Model, acts_on_points
-from bemt.case.load import Assumption
-from bemt.effects.tip_gap import GAP_LOSS, TipGap
-from bemt.rotors import k1k2
+from bemt.physics import effects, k1k2
+from bemt.physics.bem.coaxial import PairModel
+from bemt.physics.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
+from bemt.physics.bem.model import Model, acts_on_points
+from bemt.physics.effects.tip_gap import GAP_LOSS, TipGap
+from bemt.physics.sections import polars
+from bemt.physics.sections.neuralfoil import neuralfoil_polar
+from bemt.rotors.case.load import Assumption
 from bemt.rotors.model import with_run
-from bemt.sections import polars
-from bemt.sections.neuralfoil import neuralfoil_polar
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.case import Case
-    from bemt.case.schema import PolarTable
-    from bemt.dataset import Dataset
+    from bemt.physics.air import Air
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case import Case
+    from bemt.rotors.case.schema import PolarTable
     from geometry.rotor import Rotor
 
 
@@ -73,8 +72,8 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
 
 def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:
     """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
-    from bemt import readers as importers
-    from bemt.readers import polar_xfoil
+    from bemt.data import readers as importers
+    from bemt.data.readers import polar_xfoil
 
     groups: dict[float, list[PolarTable]] = {}
     for item in given:

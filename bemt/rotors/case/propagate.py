@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt import coefficients as co
-from bemt.air import air_arrays
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem.coaxial import LOADS, RATIOS, PairModel
-from bemt.bem.model import HUB_LOADS
-from bemt.case.pair_error import PairError
+from bemt.physics import coefficients as co
+from bemt.physics.air import air_arrays
+from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
+from bemt.physics.bem.model import HUB_LOADS
+from bemt.rotors.case.pair_error import PairError
 from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
@@ -31,10 +31,10 @@ from bemt.rotors.predict import zero_thrust
 from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.model import Model
-    from bemt.case.load import Assumption, Case
-    from bemt.dataset import Dataset
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case.load import Assumption, Case
 
 Answers = Mapping[str, Array]
 Progress = Callable[[int, int, str], None]
@@ -203,7 +203,7 @@ def vary(
 
 def prepared(case: Case, stations: int | None = None, second: Case | None = None) -> Model | PairModel:
     """Model of a case: of its rotor, or of both of a coaxial pair; ``second`` replaces the case of the second one."""
-    from bemt.case.prepare import prepare_case, prepare_pair
+    from bemt.rotors.case.prepare import prepare_case, prepare_pair
 
     return prepare_pair(case, stations, second) if case.paired else prepare_case(case, None, stations, oblique=True)
 
@@ -231,7 +231,7 @@ def propagate(
     Whatever a point shares with the case - speed, airspeed, angle, air - follows an unknown that is that quantity.
     ``bands`` False leaves the uncertainties unknown; the flags stay.
     """
-    from bemt.case.prepare import duct_unknowns
+    from bemt.rotors.case.prepare import duct_unknowns
 
     points = Points.of(case, rpm, airspeed_m_s, density_kg_m3, angle_deg)
     if case.paired and np.any(points.angle_deg != 0.0):
@@ -328,7 +328,7 @@ def _zero_thrust_J(case: Case) -> float:
     """Advance ratio at which thrust vanishes at the case's own speed and air, found once."""
 
     def find() -> float:
-        from bemt.case.prepare import prepare_case
+        from bemt.rotors.case.prepare import prepare_case
 
         return zero_thrust(
             coefficients(prepare_case(case, oblique=True, alone=True), case.air()), case.as_built().drawn, case.rpm

@@ -11,7 +11,7 @@ from typing import Any
 from bemt.base.folders import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
-from bemt.case.schema import GROUPS, INCH, CaseFile, SectionTable
+from bemt.rotors.case.schema import GROUPS, INCH, CaseFile, SectionTable
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0

@@ -13,12 +13,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.air import LIQUID
 from bemt.base.toml import Axis, FieldLimits, Table, axis_values, entry, expected, shown
-from bemt.case.drive_schema import DriveTable
+from bemt.physics.air import LIQUID
+from bemt.physics.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.physics.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
+from bemt.rotors.case.drive_schema import DriveTable
 from bemt.rotors.latents import KNOWN_FROM
-from bemt.sections.rule import DRAG_LEVEL, N_CRIT
-from bemt.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from geometry.laws import CHORD_LAWS as GEOMETRY_CHORD_LAWS
 
 CHORD_LAWS = tuple(GEOMETRY_CHORD_LAWS)

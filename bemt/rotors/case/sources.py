@@ -6,9 +6,9 @@ import textwrap
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from bemt.case import Case
-from bemt.effects import source_of
-from bemt.readers import references as reference_file
+from bemt.data.readers import references as reference_file
+from bemt.physics.effects import source_of
+from bemt.rotors.case import Case
 
 SCHEMA = "bemt.sources/1"
 BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, compared with recordings, version {}; "
@@ -26,8 +26,8 @@ K1K2 = (
     "electricrcaircraftguy.com"
 )
 RULE = (
-    "section rule of this project (bemt/sections/rule.py), calibrated on UIUC volume 1: NACA four-digit section, "
-    "n_crit {}, drag times {}"
+    "section rule of this project (bemt/physics/sections/rule.py), calibrated on UIUC volume 1: "
+    "NACA four-digit section, n_crit {}, drag times {}"
 )
 
 
@@ -56,7 +56,7 @@ def sources(case: Case) -> tuple[Source, ...]:
     Effects are those that are switched on; one that is inert for this rotor (a tip gap without a duct) is left out.
     """
     from bemt import __version__
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     effects = [e for e in prepare_case(case).effects if case.ducted or e.id not in ("duct", "tip_gap")]
     return (

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from bemt.base.units import INCH
+from bemt.physics.sections.rule import DRAG_LEVEL, N_CRIT
+from bemt.physics.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 from bemt.rotors.population import chord_sd, population
-from bemt.sections.rule import DRAG_LEVEL, N_CRIT
-from bemt.wake import MOUNT_DRAG, SWIRL, WAKE_RADIUS
 
 CHORD, CHORD_EXPONENT = 0.2, -0.2
 """Largest chord over tip radius of the usual 10 in propeller and its exponent over the diameter, calibrated: of twelve

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.readers._uiuc_names import class_of
+from bemt.data.readers._uiuc_names import class_of
+from bemt.physics.sections import rule as section_rule
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside
 from bemt.rotors.population import Population, label_angle_deg
 from bemt.rotors.predict import predict, sense
 from bemt.rotors.reference import ReferenceRun
-from bemt.sections import rule as section_rule
-from bemt.validate.points import KINDS, Rows, Solver, Stations, counted, errors, rows, statistics
+from bemt.rotors.validate.points import KINDS, Rows, Solver, Stations, counted, errors, rows, statistics
 
 if TYPE_CHECKING:
-    from bemt.effects import Effect
-    from bemt.readers.uiuc import UiucPropeller
+    from bemt.data.readers.uiuc import UiucPropeller
+    from bemt.physics.effects import Effect
 
 
 @dataclass(frozen=True, eq=False)

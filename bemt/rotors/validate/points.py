@@ -15,8 +15,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 
 if TYPE_CHECKING:
-    from bemt.effects import Effect
-    from bemt.readers.uiuc import UiucPropeller
+    from bemt.data.readers.uiuc import UiucPropeller
+    from bemt.physics.effects import Effect
     from geometry.rotor import Rotor
 
 Stations = tuple[Array, Array, Array]
@@ -65,7 +65,7 @@ def zero_thrust_J(lines: Iterable[tuple[Array, Array]]) -> float:
 
 def build(propeller: UiucPropeller, stations: Stations | None = None) -> Rotor:
     """Rotor of a measured propeller with the rule's sections."""
-    from bemt.sections.rule import airfoil, sections
+    from bemt.physics.sections.rule import airfoil, sections
     from geometry.blade import from_stations
     from geometry.rotor import Rotor
 
@@ -101,9 +101,9 @@ class Solver:
     def __init__(
         self, propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None, stations: Stations | None
     ) -> None:
-        from bemt.air import Air
-        from bemt.sections import polars
-        from bemt.sections.neuralfoil import neuralfoil_polar
+        from bemt.physics.air import Air
+        from bemt.physics.sections import polars
+        from bemt.physics.sections.neuralfoil import neuralfoil_polar
 
         self.rotor = build(propeller, stations)
         self.air = Air.from_density()
@@ -115,7 +115,7 @@ class Solver:
 
     def __call__(self, z: Array, rpm: Array, J: Array, which: Any = None) -> Array:
         """(2, P) CT and CP, NaN where not converged."""
-        from bemt.bem import solver
+        from bemt.physics.bem import solver
         from bemt.rotors.latents import as_built
 
         key = z.tobytes()
@@ -208,7 +208,7 @@ def read_folders(folders: Sequence[Path]) -> Folder:
 
 def read_folder(folder: Path) -> Folder:
     """Read a folder in UIUC layout; APC PE0 files in it supply stations for propellers without their own."""
-    from bemt.readers import uiuc
+    from bemt.data.readers import uiuc
 
     if not folder.is_dir():
         got = "a file" if folder.exists() else "no such folder"
@@ -238,7 +238,7 @@ def _own(p: UiucPropeller) -> Stations | None:
 
 
 def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], Stations], list[str]]:
-    from bemt.readers import apc
+    from bemt.data.readers import apc
 
     found: dict[tuple[str, float, float], Stations] = {}
     notes: list[str] = []

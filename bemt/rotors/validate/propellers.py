@@ -1,7 +1,7 @@
 """BEMT against a folder of measured propellers, statistics per propeller and over all.
 
 The folder is in the layout of the UIUC database (geometry, static and advance-ratio files).  Nothing is fitted:
-sections and transition come from the declared rule of :mod:`bemt.sections.rule`.
+sections and transition come from the declared rule of :mod:`bemt.physics.sections.rule`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
 from bemt.base.tables import json_text, or_null, write_atomic
 from bemt.rotors.population import population
-from bemt.validate.built import Pool, expect, observe
-from bemt.validate.points import J_SHARE, Rows, Stations, compare, read_folders, statistics
+from bemt.rotors.validate.built import Pool, expect, observe
+from bemt.rotors.validate.points import J_SHARE, Rows, Stations, compare, read_folders, statistics
 
 if TYPE_CHECKING:
-    from bemt.effects import Effect
-    from bemt.readers.uiuc import UiucPropeller
+    from bemt.data.readers.uiuc import UiucPropeller
+    from bemt.physics.effects import Effect
 
 # A blade angle that is further off than this is no error of setting or section any more.
 REACH_DEG = 6.0
@@ -153,8 +153,8 @@ def validate(
     as_drawn: bool = False,
 ) -> dict[str, Any]:
     """Compare a folder."""
-    from bemt import effects as registry
-    from bemt.sections import rule as section_rule
+    from bemt.physics import effects as registry
+    from bemt.physics.sections import rule as section_rule
 
     folders = [folder] if isinstance(folder, Path) else list(folder)
     found = read_folders(folders)
@@ -198,7 +198,7 @@ def validate(
     doc["unconverged"] = unconverged
     doc["effects"] = [e.describe() for e in eff]
     doc["polar"] = {
-        "rule": "bemt.sections.rule",
+        "rule": "bemt.physics.sections.rule",
         "n_crit": section_rule.N_CRIT,
         "drag_level": section_rule.DRAG_LEVEL,
         "fixed_re": fixed_re,
@@ -212,7 +212,7 @@ def validate(
 
 def effects_without(off: Sequence[str]) -> tuple[Effect, ...]:
     """Standard effects but those named, singly or with commas; unknown names are refused."""
-    from bemt import effects as registry
+    from bemt.physics import effects as registry
 
     names = [name for item in off for name in str(item).split(",") if name]
     unknown = [name for name in names if name not in registry.catalogue()]

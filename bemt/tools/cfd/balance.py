@@ -30,8 +30,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.exports.openfoam import Settings
-from bemt.exports.openfoam.run import OPEN, SIDES, through
+from bemt.tools.cfd.openfoam import Settings
+from bemt.tools.cfd.openfoam.run import OPEN, SIDES, through
 
 BALANCE_LIMIT = 0.01
 """Residual, relative, above which a run counts as not converged."""

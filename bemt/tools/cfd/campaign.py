@@ -19,16 +19,16 @@ from filelock import FileLock, Timeout
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, remove_stale, text_table
-from bemt.case.prepare import prepare_case
-from bemt.cfd.record import CampaignRecord
-from bemt.cfd.schema import Campaign, load_campaign
-from bemt.cfd.worker import Worker, point_key
-from bemt.dataset import Dataset
-from bemt.dataset.channels import channel_fault
-from bemt.recordings.cfd_setup import audit_of, faults_first, floor_note
+from bemt.data.recordings.cfd_setup import audit_of, faults_first, floor_note
+from bemt.physics.dataset import Dataset
+from bemt.physics.dataset.channels import channel_fault
+from bemt.rotors.case.prepare import prepare_case
+from bemt.tools.cfd.record import CampaignRecord
+from bemt.tools.cfd.schema import Campaign, load_campaign
+from bemt.tools.cfd.worker import Worker, point_key
 
 if TYPE_CHECKING:
-    from bemt.exports.openfoam import Settings
+    from bemt.tools.cfd.openfoam import Settings
 
 
 def run_campaign(

@@ -15,12 +15,12 @@ import numpy as np
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, plain, write_atomic
-from bemt.cfd.balance import BALANCE_LIMIT
-from bemt.cfd.schema import Campaign
-from bemt.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
-from bemt.readers import number
-from bemt.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
-from bemt.recordings.grid_study import grid_study, ratios
+from bemt.data.readers import number
+from bemt.data.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
+from bemt.data.recordings.grid_study import grid_study, ratios
+from bemt.tools.cfd.balance import BALANCE_LIMIT
+from bemt.tools.cfd.schema import Campaign
+from bemt.tools.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
 
 COLUMNS = (
     "run", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "u_thrust_N", "u_torque_Nm", "thrust_rotor_N",

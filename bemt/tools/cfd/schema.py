@@ -15,9 +15,9 @@ from pydantic.fields import FieldInfo
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, limits_of, shown, validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.case import Case, check_name, load_case
-from bemt.exports.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
-from bemt.exports.openfoam.write import Run, RunRanges
+from bemt.rotors.case import Case, check_name, load_case
+from bemt.tools.cfd.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
+from bemt.tools.cfd.openfoam.write import Run, RunRanges
 
 __all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
-from bemt.bem import solver
-from bemt.bem.model import Model
-from bemt.case import Case
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import parted
-from bemt.cfd.record import csv_rows
-from bemt.cfd.schema import Campaign, load_campaign
+from bemt.physics.bem import solver
+from bemt.physics.bem.model import Model
+from bemt.rotors.case import Case
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import parted
+from bemt.tools.cfd.record import csv_rows
+from bemt.tools.cfd.schema import Campaign, load_campaign
 
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
 """Edges of the bands. [R]"""

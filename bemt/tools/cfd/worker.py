@@ -22,19 +22,19 @@ from bemt.base.arrays import Array
 from bemt.base.averaging import steady_average
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
-from bemt.cfd.balance import balance_of
-from bemt.cfd.schema import CampaignPoint
-from bemt.cfd.start import StartField, splice
-from bemt.exports.openfoam import Settings, case_files
-from bemt.exports.openfoam.run import BINS, control
-from bemt.exports.openfoam.write import settings_of, write_openfoam
+from bemt.tools.cfd.balance import balance_of
+from bemt.tools.cfd.openfoam import Settings, case_files
+from bemt.tools.cfd.openfoam.run import BINS, control
+from bemt.tools.cfd.openfoam.write import settings_of, write_openfoam
+from bemt.tools.cfd.schema import CampaignPoint
+from bemt.tools.cfd.start import StartField, splice
 
 DRIFT_LIMIT = 0.03
 """Change over the averaged iterations, of the mean, above which a run counts as not converged."""
 SCATTER_LIMIT = 0.05
 """Standard deviation over the averaged iterations, of the mean, above which it counts as not converged."""
 RESIDUALS = ("balance_mass", "balance_momentum", "balance_angular_momentum", "swirl_out")
-"""Columns of what :class:`bemt.cfd.balance.Balance` holds."""
+"""Columns of what :class:`bemt.tools.cfd.balance.Balance` holds."""
 TEMPORARY = "temporary"
 """File in a folder of grid or run that may go when its campaign has ended."""
 NOTE_LENGTH = 800
@@ -75,7 +75,7 @@ class Outcome:
 
 def history_of(folder: Path, settings: Settings) -> Array:
     """Read the loads of a run: rotor, and all that stands on the same mount, (N, 4)."""
-    from bemt.readers.openfoam_forces import read
+    from bemt.data.readers.openfoam_forces import read
 
     def column(name: str, file: str, channel: str) -> Array:
         return np.asarray(read(folder / "postProcessing" / name / "0" / file)[channel])

@@ -1,15 +1,10 @@
 """Which propeller, which motor constant, and a better blade: labels and motors against a target, blades for a thrust.
 
-``bemt.design(6.0, 10, airspeed_m_s=15.0, rpm=7000)`` designs one: ``help(bemt.library.design)``.
+``bemt.design(6.0, 10, airspeed_m_s=15.0, rpm=7000)`` designs one: ``help(bemt.app.library.design)``.
 """
 
 from __future__ import annotations
 
-import sys
-
-from bemt.base.face import CallableRoom
-from bemt.design.search import Target, choose
+from bemt.tools.design.search import Target, choose
 
 __all__ = ["Target", "choose"]
-
-sys.modules[__name__].__class__ = CallableRoom  # bemt.design(...) is bemt.library.design(...)

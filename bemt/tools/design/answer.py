@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from bemt.base import canvas
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
-from bemt.design.rotor_loads import size_in
-from bemt.design.search import Target
+from bemt.tools.design.rotor_loads import size_in
+from bemt.tools.design.search import Target
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,12 +10,12 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import INCH
-from bemt.case import Case
-from bemt.case.load import with_changes
-from bemt.design import rotor_loads
-from bemt.design.requirement import Requirement
-from bemt.design.rotor_loads import RotorLoads
-from bemt.design.search import DIAMETERS, RATIOS
+from bemt.rotors.case import Case
+from bemt.rotors.case.load import with_changes
+from bemt.tools.design import rotor_loads
+from bemt.tools.design.requirement import Requirement
+from bemt.tools.design.rotor_loads import RotorLoads
+from bemt.tools.design.search import DIAMETERS, RATIOS
 
 FLYING = (0.85, 1.0, 1.2)
 """More pitches over the diameter where the target flies [1]."""

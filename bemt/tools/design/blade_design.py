@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.case import Case, case_of, new_folder
-from bemt.case.load import with_changes
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate
-from bemt.case.unknowns import AIR, SECTION, SURFACE
-from bemt.design import optimise as search
-from bemt.design.best_label import Label, best_labels
-from bemt.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
-from bemt.design.problem import BladeProblem, Values
-from bemt.design.requirement import DesignPoint, Requirement, required
+from bemt.physics.air import Air
+from bemt.rotors.case import Case, case_of, new_folder
+from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import propagate
+from bemt.rotors.case.unknowns import AIR, SECTION, SURFACE
+from bemt.tools.design import optimise as search
+from bemt.tools.design.best_label import Label, best_labels
+from bemt.tools.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
+from bemt.tools.design.problem import BladeProblem, Values
+from bemt.tools.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
-    from bemt.bem.model import Model
+    from bemt.physics.bem.model import Model
 
 Progress = Callable[[str], None]
 
@@ -131,7 +131,7 @@ class Design:
         return Path(folder)
 
     def __repr__(self) -> str:
-        from bemt.design.design_answer import text
+        from bemt.tools.design.design_answer import text
 
         return text(self)
 
@@ -150,7 +150,7 @@ def design_blade(
     section: str | None = None, hub_ratio: float | None = None, density_kg_m3: float | None = None,
     duct: Case | None = None, robust: bool = False, progress: Progress | None = None, **limits: Any,
 ) -> Design:  # fmt: skip
-    """Design a blade; parameters as `bemt.library.design`."""
+    """Design a blade; parameters as `bemt.app.library.design`."""
     faults: list[Fault] = []
     base: Case | None = None
     try:

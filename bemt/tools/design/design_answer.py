@@ -10,8 +10,8 @@ import numpy as np
 
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.base.units import G0, INCH
-from bemt.design.blade_design import BandedLoads, Design
-from bemt.design.minimum_loss import actuator_disk
+from bemt.tools.design.blade_design import BandedLoads, Design
+from bemt.tools.design.minimum_loss import actuator_disk
 
 SCHEMA = "bemt.design/1"
 RESULTS = ("design.json", "design.png")
@@ -168,7 +168,7 @@ def document(d: Design) -> dict[str, Any]:
 
 def write(d: Design, folder: str | Path) -> Path:
     """Write case, document and picture into a new folder; the document last."""
-    from bemt.design.design_picture import picture
+    from bemt.tools.design.design_picture import picture
 
     drawn = picture(d)
     out = d.write(folder)

@@ -9,7 +9,7 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREY, ORANGE
-from bemt.design.blade_design import Design
+from bemt.tools.design.blade_design import Design
 
 BEFORE: dict[str, Any] = {"color": ORANGE, "ls": "--", "lw": 1.4}
 AFTER: dict[str, Any] = {"color": BLUE, "ls": "-", "lw": 1.8}

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.bem.duct import DuctFlow
+from bemt.physics.bem.duct import DuctFlow
 
 Section = Callable[[Array], tuple[Array, Array, Array]]
 """Reynolds numbers of the elements, (N,), to lift coefficient, angle of attack [rad] and drag over lift there."""
@@ -127,7 +127,7 @@ def actuator_disk(thrust_N: float, airspeed_m_s: float, R: float, Rhub: float, r
 def ducted_disk(thrust_N: float, airspeed_m_s: float, flow: DuctFlow, rho: float = 1.225) -> float:
     """Power of an ideal disk in a duct of the same exit, without losses and swirl: energy of the jet. [W]
 
-    Continuity and momentum as in :mod:`bemt.bem.duct`.
+    Continuity and momentum as in :mod:`bemt.physics.bem.duct`.
     """
     from scipy.optimize import brentq
 

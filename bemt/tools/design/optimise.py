@@ -11,16 +11,16 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.design.minimum_loss import MinimumLoss, minimum_loss
-from bemt.design.problem import BladeProblem, Values, top_lift
-from bemt.design.requirement import Requirement
-from bemt.design.shape import CONTROLS, Shape
-from bemt.effects import Effect
+from bemt.physics.effects import Effect
 from bemt.rotors.latents import NAMES, Prior, as_built
+from bemt.tools.design.minimum_loss import MinimumLoss, minimum_loss
+from bemt.tools.design.problem import BladeProblem, Values, top_lift
+from bemt.tools.design.requirement import Requirement
+from bemt.tools.design.shape import CONTROLS, Shape
 from geometry.blade import Blade, from_stations
 
 if TYPE_CHECKING:
-    from bemt.bem.model import Model
+    from bemt.physics.bem.model import Model
 
 Progress = Callable[[int, str], None]
 

@@ -11,7 +11,7 @@ The angle of attack is limited, not the lift coefficient, since a stalled sectio
 to where the table with which the solver works (rotation, neighbouring blades) first has the lift that is left of the
 isolated section's largest, at the element's Reynolds number, less by Prandtl and Glauert's factor at its Mach number.
 The annuli of a rotor do not know of each other, so that five rotors give the gradient of everything by all chords and
-angles (:mod:`bemt.bem.gradient`); the control points follow by the chain rule. Over rotors as built,
+angles (:mod:`bemt.physics.bem.gradient`); the control points follow by the chain rule. Over rotors as built,
 power, thrust and margins are means of the rotors.
 """
 
@@ -28,20 +28,20 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import InputError
-from bemt.bem import gradient as around
-from bemt.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WHIRL
-from bemt.bem.packing import blend_weights
-from bemt.design import materials
-from bemt.design.requirement import WIDEST, Requirement
-from bemt.design.shape import CONTROLS, Shape
-from bemt.effects import Effect
-from bemt.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
+from bemt.physics.bem import gradient as around
+from bemt.physics.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WHIRL
+from bemt.physics.bem.packing import blend_weights
+from bemt.physics.effects import Effect
+from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
+from bemt.tools.design import materials
+from bemt.tools.design.requirement import WIDEST, Requirement
+from bemt.tools.design.shape import CONTROLS, Shape
 
 if TYPE_CHECKING:
-    from bemt.bem.duct import DuctFlow
-    from bemt.bem.model import Model
-    from bemt.bem.solver import Prepared
-    from bemt.sections.polars import Polar
+    from bemt.physics.bem.duct import DuctFlow
+    from bemt.physics.bem.model import Model
+    from bemt.physics.bem.solver import Prepared
+    from bemt.physics.sections.polars import Polar
     from geometry.blade import Stations
 
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bemt.base.errors import Fault, InputError
-from bemt.design.materials import MATERIALS, SAFETY, Material
+from bemt.tools.design.materials import MATERIALS, SAFETY, Material
 
 if TYPE_CHECKING:
-    from bemt.air import Air
+    from bemt.physics.air import Air
 
 STALL_MARGIN = 0.15
 """Share of the section's largest lift coefficient that is kept in hand: declared [1]."""

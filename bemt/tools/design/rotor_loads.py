@@ -8,13 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from bemt.air import Air
 from bemt.base.arrays import Array
 from bemt.base.units import INCH
-from bemt.case import Case, case_of, fresh
-from bemt.case.prepare import prepare_case
-from bemt.case.propagate import propagate
-from bemt.drive.rotor_table import SPEEDS
+from bemt.physics.air import Air
+from bemt.rotors.case import Case, case_of, fresh
+from bemt.rotors.case.lattice import SPEEDS
+from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.propagate import propagate
 from geometry.common import pchip
 
 FINE = 481
@@ -94,7 +94,7 @@ def loads_of_case(
 
 
 def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
-    """Bands of a label near a speed, by `bemt.case.propagate`: declared unknowns, model and numerics.
+    """Bands of a label near a speed, by `bemt.rotors.case.propagate`: declared unknowns, model and numerics.
 
     Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.
     """

@@ -1,19 +1,21 @@
 r"""Which propeller on which motor: labels against a target, with the probability that it is met.
 
-At a thrust, the rotor's speed and torque Q are known, and the drive (`bemt.drive.drive_model`) inverts in closed form:
+At a thrust, the rotor's speed and torque Q are known, and the drive (`bemt.tools.drive.drive_model`) inverts in closed
+form:
 
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
 with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor of which only K_v
 is known is as large as the rotor needs: winding, idle current and battery take the shares at full throttle that
-`bemt.case.unknowns` declares for `drive` (3582 points of 1088 recorded motors), so that
+`bemt.rotors.case.unknowns` declares for `drive` (3582 points of 1088 recorded motors), so that
 
     Omega_full = (1 - drop) (1 - sag) V_oc / k,   I_full = Q_full / (k (1 - idle)),   R = drop (1 - sag) V_oc / I_full.
 
 Rotor, motor and battery vary together: thrust and torque of the rotor with the bands and the correlation of
-`bemt.case.propagate`, log-normal; each share uniform on either side of its value, which is its median (the ranges reach
-further up: drawn evenly, the losses would be larger than typical). The same 256 draws serve every pair, so that the
-ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol's points without the import of `scipy.stats`.
+`bemt.rotors.case.propagate`, log-normal; each share uniform on either side of its value, which is its median (the
+ranges reach further up: drawn evenly, the losses would be larger than typical). The same 256 draws serve every pair, so
+that the ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol's points without the import of
+`scipy.stats`.
 """
 
 from __future__ import annotations
@@ -31,11 +33,11 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
-from bemt.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.case.unknowns import DRIVE, ESC_DROP
-from bemt.design import rotor_loads
-from bemt.design.motors_file import KnownMotor, read_motors
-from bemt.design.rotor_loads import LoadScatter, RotorLoads
+from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
+from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
+from bemt.tools.design import rotor_loads
+from bemt.tools.design.motors_file import KnownMotor, read_motors
+from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
 
 if TYPE_CHECKING:
     import pandas as pd

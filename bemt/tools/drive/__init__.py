@@ -1,12 +1,4 @@
 """The drive behind the rotor: bench map, motor constant, battery-ESC-motor-rotor model, thrusters on a body.
 
-``bemt.drive("10x5", kv=1000, cells=3)`` estimates one from a label: ``help(bemt.library.drive)``.
+``bemt.drive("10x5", kv=1000, cells=3)`` estimates one from a label: ``help(bemt.app.library.drive)``.
 """
-
-from __future__ import annotations
-
-import sys
-
-from bemt.base.face import CallableRoom
-
-sys.modules[__name__].__class__ = CallableRoom  # bemt.drive(...) is bemt.library.drive(...)

@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.dataset import Dataset
-from bemt.drive.map_points import CHANNELS
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive.map_points import CHANNELS
 
 NODES = 49
 SMOOTHNESS = 10.0 ** np.arange(-10.0, 0.1, 2.0)

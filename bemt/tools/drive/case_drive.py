@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from bemt.case import Case
-from bemt.case.drive_schema import DriveTable
-from bemt.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.drive.rotor_table import RotorMap
+from bemt.rotors.case import Case
+from bemt.rotors.case.drive_schema import DriveTable
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
+from bemt.tools.drive.rotor_table import RotorMap
 
 ROTOR_DENSITY = 0.06
 """Mass of a plastic two-blade propeller over its diameter squared: declared. [kg/m2]"""

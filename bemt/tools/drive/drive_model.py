@@ -5,9 +5,9 @@ The motor is a direct-current machine at the duty d of the ESC, k = 60/(2 pi K_v
     I = (d V_b - k Omega) / (R + X^2/R),   V_b = V_oc(SoC) - R_b (d I + I_e),   k (I - I_0) = Q(Omega)
 
 R = R_m + R_e, with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature
-(coefficients of `bemt.effects.motor_heating`, so that model and diagnosis agree). X = p L Omega is the reactance of the
-winding, which turns the current away from the EMF: at d = 0 this is the brake of a motor with shorted terminals,
-strongest at X = R and softer above. Firmware sets for which share of the time it shorts them at no throttle
+(coefficients of `bemt.physics.effects.motor_heating`, so that model and diagnosis agree). X = p L Omega is the
+reactance of the winding, which turns the current away from the EMF: at d = 0 this is the brake of a motor with shorted
+terminals, strongest at X = R and softer above. Firmware sets for which share of the time it shorts them at no throttle
 (`brake_on_stop`); at any throttle above it brakes fully. Above the current limit the ESC lowers d.
 
 An ESC with diodes in place of complementary switching carries no current against the motor. Where the ripple of the
@@ -39,9 +39,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.drive.rotor_table import RotorMap
-from bemt.effects.motor_heating import COPPER, MAGNET
+from bemt.physics.effects.motor_heating import COPPER, MAGNET
+from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
+from bemt.tools.drive.rotor_table import RotorMap
 
 EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
 """Effects of the drive that can be switched off; ids of the diagnosis."""

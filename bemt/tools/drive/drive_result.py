@@ -1,7 +1,7 @@
 """What motor and battery make of a rotor: thrust over pulse width, hover, flight time, response, with bands.
 
-One road for a label and for a case: the rotor by `bemt.case.propagate`, the motor by the case's table [drive]. Declared
-unknowns of rotor, motor and battery and the model's own error are carried through to every answer.
+One road for a label and for a case: the rotor by `bemt.rotors.case.propagate`, the motor by the case's table [drive].
+Declared unknowns of rotor, motor and battery and the model's own error are carried through to every answer.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
-from bemt.case import Case, case_of, find_cases, fresh, load_case
-from bemt.case.load import with_changes
-from bemt.case.propagate import propagate, vary
-from bemt.case.schema import AIRSPEED
-from bemt.drive import case_drive, mission, outputs, picture, rotor_table
-from bemt.drive.drive_model import EFFECTS, Drive, Steady
-from bemt.drive.rotor_table import RotorMap
+from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
+from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.propagate import propagate, vary
+from bemt.rotors.case.schema import AIRSPEED
+from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
+from bemt.tools.drive.drive_model import EFFECTS, Drive, Steady
+from bemt.tools.drive.rotor_table import RotorMap
 
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
@@ -68,11 +68,11 @@ class DriveResult:
     full, hover : mapping of str to DriveBand
         ``rpm``, ``thrust_N``, ``battery_A``, ``power_W``, ``g_per_W`` and, in hover, ``throttle`` [-] and
         ``minutes`` (of the capacity, or per A h where none is given).
-    steady : bemt.drive.drive_model.Steady
+    steady : bemt.tools.drive.drive_model.Steady
         Thrust, current and power at pulse widths, (21,).
     u : mapping of str to (21,) float
         Standard uncertainty of rpm, thrust_N, battery_A and power_W of `steady`.
-    drive : bemt.drive.drive_model.Drive
+    drive : bemt.tools.drive.drive_model.Drive
         Battery, ESC, motor and rotor as solved.
     notes : tuple of str
         What does not fit, or lies outside of what was measured.

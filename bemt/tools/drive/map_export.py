@@ -9,7 +9,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.tables import csv_text
-from bemt.drive.bench_map import BenchMap
+from bemt.tools.drive.bench_map import BenchMap
 
 COLUMNS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "power_W"}
 

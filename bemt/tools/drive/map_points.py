@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.dataset import Dataset, concat
-from bemt.readers._recording import FULL_THROTTLE
-from bemt.recordings import plateaus
-from bemt.recordings.channels import THROTTLE_IS_PULSE, pulse_of
+from bemt.data.readers._recording import FULL_THROTTLE
+from bemt.data.recordings import plateaus
+from bemt.data.recordings.channels import THROTTLE_IS_PULSE, pulse_of
+from bemt.physics.dataset import Dataset, concat
 
 CHANNELS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "electrical_power_W"}
 """What a map gives beside the pulse width, and the channel it is fitted to."""

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from bemt import readers as importers
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
-from bemt.dataset import Dataset
-from bemt.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
+from bemt.data import readers as importers
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
 
 SCHEMA = "bemt.map/1"
 UNFIT = 0.05

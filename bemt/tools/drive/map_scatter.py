@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.dataset import Dataset
+from bemt.physics.dataset import Dataset
 
 LEAST_THRUST = 0.05
 """Share of the greatest thrust below which a level does not speak for T/rpm^2: there it is mostly zero point."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.drive import transient
-from bemt.drive.drive_model import Drive
+from bemt.tools.drive import transient
+from bemt.tools.drive.drive_model import Drive
 
 
 @dataclass(frozen=True)

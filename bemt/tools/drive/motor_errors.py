@@ -26,7 +26,7 @@ import numpy as np
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.drive.motor_constant import Line
+from bemt.tools.drive.motor_constant import Line
 
 METHODS = ("data_sheet", "back_emf", "torque")
 ALPHA = 0.001

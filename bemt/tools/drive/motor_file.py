@@ -11,14 +11,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from bemt import readers as importers
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import inside
 from bemt.base.toml import FieldLimits, Table, entry, read_model
-from bemt.dataset import Dataset
-from bemt.drive import motor_constant as mc
-from bemt.drive.motor_errors import Measured
+from bemt.data import readers as importers
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import motor_constant as mc
+from bemt.tools.drive.motor_errors import Measured
 
 Volt = Literal["peak", "rms", "peak_to_peak"]
 Ampere = Literal["q_power_invariant", "q_amplitude_invariant", "peak", "rms"]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.drive import motor_constant as mc
-from bemt.drive.motor_errors import FACTORS
+from bemt.tools.drive import motor_constant as mc
+from bemt.tools.drive.motor_errors import FACTORS
 
 PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
 """Errors that can be planted: offsets in V and N m, R_true/R_assumed, a factor on the method's result."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
-from bemt.drive import motor_errors, motor_file, motor_generate, outputs, picture
-from bemt.drive.motor_constant import Line
+from bemt.tools.drive import motor_errors, motor_file, motor_generate, outputs, picture
+from bemt.tools.drive.motor_constant import Line
 
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}

@@ -10,10 +10,10 @@ import numpy as np
 
 from bemt.base import canvas
 from bemt.base.arrays import Array
-from bemt.drive.map_points import CHANNELS
+from bemt.tools.drive.map_points import CHANNELS
 
 if TYPE_CHECKING:
-    from bemt.drive.bench_map import BenchMap
+    from bemt.tools.drive.bench_map import BenchMap
 
 
 def _figure(columns: int = 1, width: float = 6.0, height: float = 4.0) -> tuple[Any, list[Any]]:

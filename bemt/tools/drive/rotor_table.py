@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.case import Case
+from bemt.rotors.case import Case
+from bemt.rotors.case.lattice import SPEEDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +70,6 @@ def quadratic(
     return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
 
 
-SPEEDS = np.linspace(0.04, 1.0, 33)
-"""Speeds of the table of a rotor over the greatest."""
-
-
 def points(diameter_m: float, rpm_max: float, airspeed_m_s: float) -> tuple[Array, Array]:
     """Speeds [rev/min] and airspeeds [m/s] of which `from_loads` makes a table: each speed twice, the second faster."""
     rpm = SPEEDS * rpm_max
@@ -112,7 +109,7 @@ def from_loads(
     if case.ducted or np.count_nonzero(both) < 4:
         why = "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
         return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
-    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.effects.inflow_lag)
+    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.physics.effects.inflow_lag)
     w = rpm[:half][both] * math.pi / 30.0
     dT_dV = (thrust_N[half:][both] - T[both]) / step
     v = table.induced(T[both])

@@ -11,8 +11,8 @@ from typing import Any, Literal
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import Axis, Span, Table, axis_values, entry, read_model
-from bemt.drive import outputs, picture
-from bemt.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
+from bemt.tools.drive import outputs, picture
+from bemt.tools.drive.thrusters import Allocation, Thruster, allocate, attainable, moment_at
 
 KGF = 9.80665
 RESULTS = ("thrusters.json", "mounting.csv", "thrusters.png")

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.drive.drive_model import Drive
+from bemt.tools.drive.drive_model import Drive
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,8 @@
 """Exports of a case, one file per target, found by scanning this folder: the file ``rotor_disk.py`` is ``rotor-disk``
 and ``_3mf.py`` is ``3mf``.
 
-An export is a class of :class:`bemt.exports.base.Export` whose ``id`` is the name of its file with ``-`` for ``_``.
+An export is a class of :class:`bemt.tools.exports.base.Export` whose ``id`` is the name of its file with ``-`` for
+``_``.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from bemt.exports.base import Export
+    from bemt.tools.exports.base import Export
 
 __all__ = ["exports", "target_ids"]
 
@@ -35,7 +36,7 @@ def target_ids() -> list[str]:
 @cache
 def exports() -> Mapping[str, Export]:
     """Targets of this folder by id, sorted; TypeError when a file holds no export of its own name."""
-    from bemt.exports.base import Export
+    from bemt.tools.exports.base import Export
 
     found = {}
     for word in target_ids():

@@ -8,9 +8,9 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name
-from bemt.exports.px4 import thrust_factor
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.parts import header, plain_name
+from bemt.tools.exports.px4 import thrust_factor
 
 ROTORS = 4
 HOVER = 0.5

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from bemt.base import plugins
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
-from bemt.exports.hub import CHECK_ANGLES, HubTable, hub_of
-from bemt.exports.performance import (
+from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
+from bemt.tools.exports.performance import (
     Loading,
     Performance,
     StatedBand,
@@ -29,7 +30,7 @@ from bemt.exports.performance import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 __all__ = [
     "FEATURES",
@@ -104,9 +105,8 @@ class Job:
     @cached_property
     def full_throttle(self) -> dict[str, Any] | None:
         """Speed and thrust at full throttle with their u, where the case has a motor."""
-        from bemt.drive.drive_result import full_document
-
-        return full_document(self.case)
+        found: dict[str, Any] | None = plugins.part("drive", self.case)
+        return found
 
     @cached_property
     def performance(self) -> Performance:
@@ -155,13 +155,13 @@ class Job:
 class Export(ABC):
     """A target: a simulator, a disk of a flow solver, a design tool, a solid.
 
-    A subclass in a module of ``bemt/exports/`` is found by scanning; its ``id`` is the value of ``--format``.
+    A subclass in a module of ``bemt/tools/exports/`` is found by scanning; its ``id`` is the value of ``--format``.
 
     A class defines ``id`` (name on the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
     torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
     formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
     written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``:
-    fields of `bemt.exports.openfoam.write.Run` that it reads.
+    fields of `bemt.tools.cfd.openfoam.write.Run` that it reads.
     """
 
     id: ClassVar[str]
@@ -394,7 +394,7 @@ class DiskExport(Export):
 
 
 class SolidExport(Export):
-    """A solid; several in one folder share a manifest, which `bemt.exports.folder` sees to."""
+    """A solid; several in one folder share a manifest, which `bemt.tools.exports.folder` sees to."""
 
     kind = "solid"
     holds = "shape"
@@ -445,12 +445,12 @@ class BladeExport(Export):
         import importlib
 
         from bemt.base.tables import write_atomic
-        from bemt.case import load_case
-        from bemt.readers._blade import case_text
+        from bemt.data.readers._blade import case_text
+        from bemt.rotors.case import load_case
 
         name, data = next(iter(files.items()))
         write_atomic(folder / name, data)
-        blade = importlib.import_module(f"bemt.readers.{self.id.replace('-', '_')}").read(folder / name)
+        blade = importlib.import_module(f"bemt.data.readers.{self.id.replace('-', '_')}").read(folder / name)
         for path, text in case_text(blade, "read_back", name).items():
             write_atomic(folder / path, text)
         return load_case(folder / "case.toml")
@@ -465,7 +465,7 @@ class BladeExport(Export):
 
     def checked(self, job: Job, files: Files) -> dict[str, Any]:
         """Loads of the case at the operating point, and how far fitted sections are off its tables."""
-        from bemt.exports.blades import section_errors
+        from bemt.tools.exports.blades import section_errors
 
         p, fitted = job.loading, self.sections(job)
         errors = None if fitted is None else section_errors(job, fitted)

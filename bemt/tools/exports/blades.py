@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.sections.polars import Polar
+from bemt.physics.sections.polars import Polar
 
 if TYPE_CHECKING:
-    from bemt.exports.base import Job
+    from bemt.tools.exports.base import Job
 
 MOST_STATIONS = 60
 """Stations that QPROP (81) and XROTOR (60 to 100, by compilation) take."""
@@ -30,7 +30,7 @@ def stations(job: Job, most: int = MOST_STATIONS) -> tuple[Array, Array, Array, 
 
 def anchors_of(job: Job) -> list[tuple[float, Polar, float]]:
     """Section tables of the case: r/R, table, Reynolds number there at the operating point."""
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     point = job.loading
     found = prepare_case(job.case).polars
@@ -89,9 +89,9 @@ class Frozen:
 
 def baked(job: Job, count: int = 20) -> Frozen:
     """Section tables as the solver uses them, all effects on sections included, at some of its stations."""
-    from bemt.bem.packing import M2_STEP
-    from bemt.case.prepare import prepare_case
-    from bemt.sections.polars import ALPHA_GRID
+    from bemt.physics.bem.packing import M2_STEP
+    from bemt.physics.sections.polars import ALPHA_GRID
+    from bemt.rotors.case.prepare import prepare_case
 
     point = job.loading
     prep = prepare_case(job.case).prep
@@ -124,6 +124,6 @@ def baked(job: Job, count: int = 20) -> Frozen:
 
 
 def _re_axis(grid: Array, count: int) -> Array:
-    """Reynolds numbers of the solver's tables (see `bemt.bem.packing.pack_grid`): uniform in the logarithm."""
+    """Reynolds numbers of the solver's tables (see `bemt.physics.bem.packing.pack_grid`): uniform in the logarithm."""
     first, inverse = float(grid[7]), float(grid[8])
     return np.asarray(np.exp(first + np.arange(count) / (inverse or 1.0)))

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import Frozen, baked
-from bemt.exports.parts import plain_name
+from bemt.tools.exports.base import BladeExport, Files, Job
+from bemt.tools.exports.blades import Frozen, baked
+from bemt.tools.exports.parts import plain_name
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 WIDTH, PER_LINE = 7, 9
 NEAR = np.radians(10.0)
@@ -97,7 +97,7 @@ stations = {model.stations}
     def read_back(self, job: Job, files: Files, folder: Path) -> Case:
         """The written case."""
         from bemt.base.tables import write_atomic
-        from bemt.case import load_case
+        from bemt.rotors.case import load_case
 
         for name, data in files.items():
             write_atomic(folder / name, data)

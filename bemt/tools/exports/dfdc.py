@@ -9,13 +9,13 @@ import numpy as np
 from bemt import __version__
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
-from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import section_errors, stations
-from bemt.exports.parts import plain_name
-from bemt.exports.xrotor import section_lines, section_notes, sections_of
+from bemt.tools.exports.base import BladeExport, Files, Job
+from bemt.tools.exports.blades import section_errors, stations
+from bemt.tools.exports.parts import plain_name
+from bemt.tools.exports.xrotor import section_lines, section_notes, sections_of
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 MOST_STATIONS = 30
 """IRX of DFDC.INC; a file with more is read and gives NaN."""

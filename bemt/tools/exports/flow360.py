@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import DiskExport, Files, Job
-from bemt.exports.blades import baked
+from bemt.tools.exports.base import DiskExport, Files, Job
+from bemt.tools.exports.blades import baked
 
 
 class Flow360Export(DiskExport):
@@ -86,8 +86,8 @@ def _tables(job: Job) -> tuple[Any, Array, list[Array], list[Array]]:
     """Sections, Reynolds numbers, and per section cl and cd as (Nm, Nr, Na)."""
     from dataclasses import replace
 
-    from bemt.case.prepare import prepare_case
-    from bemt.exports.blades import _re_axis
+    from bemt.rotors.case.prepare import prepare_case
+    from bemt.tools.exports.blades import _re_axis
 
     f = baked(job, count=10)
     p = job.loading

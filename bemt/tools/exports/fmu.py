@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import plain_name, run_hub, run_module, table_document, table_module
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.parts import plain_name, run_hub, run_module, table_document, table_module
 
 _SLAVE = '''
 

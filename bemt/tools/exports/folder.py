@@ -11,12 +11,12 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, number_text, plain, text_table, write_atomic
 from bemt.base.toml import shown
-from bemt.case import Case, find_cases, load_case, repeated_names
-from bemt.exports import exports
-from bemt.exports.base import FEATURES, Job
-from bemt.exports.manifest import entry
-from bemt.exports.openfoam.write import Run, check_run, settings_of, write_openfoam
-from bemt.exports.printing import Print, faults_of, printable
+from bemt.rotors.case import Case, find_cases, load_case, repeated_names
+from bemt.tools.cfd.openfoam.write import Run, check_run, settings_of, write_openfoam
+from bemt.tools.exports import exports
+from bemt.tools.exports.base import FEATURES, Job
+from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.printing import Print, faults_of, printable
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options

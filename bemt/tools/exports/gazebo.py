@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import edgewise, header, inertia_estimate, plain_name, slope, static_fit
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.parts import edgewise, header, inertia_estimate, plain_name, slope, static_fit
 
 
 class GazeboExport(LoadsExport):

@@ -2,8 +2,9 @@
 
 Coefficients refer to diameter and speed like CT: forces over rho n^2 D^4, moments over rho n^2 D^5.  Thrust and power
 are changes against axial flow at the same axial advance ratio, so that the finer axial table of
-`bemt.exports.performance` stays what it is.  With u the direction in which the rotor moves through the air in the plane
-of its disk, z along the thrust, s = +1 for a right-handed rotor and a = s u x z the side on which blades advance::
+`bemt.tools.exports.performance` stays what it is.  With u the direction in which the rotor moves through the air in the
+plane of its disk, z along the thrust, s = +1 for a right-handed rotor and a = s u x z the side on which blades
+advance::
 
     force  = (T + dT) z - H u + Y a
     moment = -s (Q + dQ) z + roll a x z + pitch u x z
@@ -18,12 +19,12 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem.model import HUB_LOADS
-from bemt.case.prepare import prepare_case
-from bemt.exports.performance import Performance
+from bemt.physics.bem.model import HUB_LOADS
+from bemt.rotors.case.prepare import prepare_case
+from bemt.tools.exports.performance import Performance
 
 if TYPE_CHECKING:
-    from bemt.case import Case
+    from bemt.rotors.case import Case
 
 COEFFICIENTS = ("dCT", "dCP", "CH", "CY", "CMroll", "CMpitch")
 """Values of the table, in this order."""
@@ -144,4 +145,4 @@ def wrench(rpm, velocity_m_s, density_kg_m3=DENSITY, sense=SENSE):
     moment = -roll * sense * x + pitch * y, -roll * sense * y - pitch * x, -sense * Q
     return force, moment
 '''
-"""Python that looks the table up, behind `bemt.exports.parts.TABLE_CODE`: standard library only."""
+"""Python that looks the table up, behind `bemt.tools.exports.parts.TABLE_CODE`: standard library only."""

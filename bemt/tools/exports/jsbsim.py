@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.hub import COEFFICIENTS, hub_loads
-from bemt.exports.parts import header, inertia_estimate, plain_name, still_hub
-from bemt.exports.performance import table_loads
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.hub import COEFFICIENTS, hub_loads
+from bemt.tools.exports.parts import header, inertia_estimate, plain_name, still_hub
+from bemt.tools.exports.performance import table_loads
 
 SMALLEST_INERTIA = 1.4e-6
 """JSBSim raises what is smaller. [kg m2]"""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from bemt.exports.base import Export, Files, Job
-from bemt.exports.performance import THINNER
+from bemt.tools.exports.base import Export, Files, Job
+from bemt.tools.exports.performance import THINNER
 
 HUB_NOTE = (
     "steady, stiff blades; moments come out too large, because the inflow that they cause themselves is left out; "

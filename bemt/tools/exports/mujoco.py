@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import header, plain_name, run_hub, run_module, table_module
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.parts import header, plain_name, run_hub, run_module, table_module
 
 _CALLBACK = '''
 

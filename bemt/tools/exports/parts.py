@@ -9,11 +9,11 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.arrays import Array
-from bemt.exports.hub import WRENCH_CODE, HubTable, hub_document, hub_loads
-from bemt.exports.performance import Performance, table_loads
+from bemt.tools.exports.hub import WRENCH_CODE, HubTable, hub_document, hub_loads
+from bemt.tools.exports.performance import Performance, table_loads
 
 if TYPE_CHECKING:
-    from bemt.exports.base import Job
+    from bemt.tools.exports.base import Job
 
 BLADE_DENSITY = 1400.0
 """Of moulded blades, glass-filled nylon; for the estimate of inertia alone [kg/m3]."""

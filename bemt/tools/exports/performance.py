@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.bem.model import HUB_LOADS
+from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.validity import kind
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.bem.model import Model
-    from bemt.case import Case
-    from bemt.dataset import Dataset
+    from bemt.physics.air import Air
+    from bemt.physics.bem.model import Model
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.case import Case
 
 LOWEST = 0.25
 """Lowest speed of a table over its greatest."""
@@ -35,7 +35,7 @@ SLOW_DESCENT = 8
 
 
 def _prepared(case: Case) -> Model:
-    from bemt.case.prepare import prepare_case
+    from bemt.rotors.case.prepare import prepare_case
 
     return prepare_case(case)
 
@@ -300,8 +300,8 @@ class StatedBand:
 
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
-    """Loads at a speed and two airspeeds with the band of `bemt.case.propagate`."""
-    from bemt.case.propagate import propagate
+    """Loads at a speed and two airspeeds with the band of `bemt.rotors.case.propagate`."""
+    from bemt.rotors.case.propagate import propagate
 
     made = propagate(case, rpm, airspeed_m_s)
     found = made.points
@@ -377,8 +377,8 @@ class Loading:
 
 def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     """Solve one point with its radial distributions."""
-    from bemt.bem import kernel as K
-    from bemt.bem import solver
+    from bemt.physics.bem import kernel as K
+    from bemt.physics.bem import solver
 
     ready, air = _prepared(case), case.air()
     prep = ready.prep

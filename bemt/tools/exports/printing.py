@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from bemt.base.errors import Fault
-from bemt.case import Case
+from bemt.rotors.case import Case
 from geometry.common import GeometryError
 from geometry.mesh import Options
 from geometry.printed import ADAPTERS, Printed

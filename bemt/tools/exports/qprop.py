@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import anchors_of, section_errors, stations
-from bemt.exports.parts import plain_name
-from bemt.exports.xrotor import section_notes
-from bemt.sections.parametric import QpropSection, fit_qprop
+from bemt.physics.sections.parametric import QpropSection, fit_qprop
+from bemt.tools.exports.base import BladeExport, Files, Job
+from bemt.tools.exports.blades import anchors_of, section_errors, stations
+from bemt.tools.exports.parts import plain_name
+from bemt.tools.exports.xrotor import section_notes
 
 Anchors = list[tuple[float, QpropSection]]
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import DiskExport, Files, Job
-from bemt.exports.openfoam.text import dictionary, vector
-from bemt.exports.performance import Loading
+from bemt.tools.cfd.openfoam.text import dictionary, vector
+from bemt.tools.exports.base import DiskExport, Files, Job
+from bemt.tools.exports.performance import Loading
 
 FAR = 8.0
 """Radius of the domain [R]."""

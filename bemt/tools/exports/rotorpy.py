@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.parts import edgewise, header, plain_name, slope
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.parts import edgewise, header, plain_name, slope
 
 
 class RotorpyExport(LoadsExport):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.exports.base import Files, Job, LoadsExport
-from bemt.exports.hub import hub_document, hub_loads
-from bemt.exports.parts import plain_name, still_hub, table_document, table_of_document
+from bemt.tools.exports.base import Files, Job, LoadsExport
+from bemt.tools.exports.hub import hub_document, hub_loads
+from bemt.tools.exports.parts import plain_name, still_hub, table_document, table_of_document
 
 
 class SimulinkExport(LoadsExport):

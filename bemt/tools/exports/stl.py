@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bemt.exports.base import SolidExport
+from bemt.tools.exports.base import SolidExport
 
 
 class StlExport(SolidExport):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.exports.base import DiskExport, Files, Job
-from bemt.exports.blades import baked
+from bemt.tools.exports.base import DiskExport, Files, Job
+from bemt.tools.exports.blades import baked
 
 LOW, HIGH = -30.0, 90.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.exports.base import DiskExport, Files, Job
+from bemt.tools.exports.base import DiskExport, Files, Job
 
 
 class Su2DiskExport(DiskExport):
@@ -66,7 +66,7 @@ ACTDISK_FILENAME= ActuatorDisk.dat
 
 
 def _rows(job: Job) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    from bemt.exports.rotor_disk import tables
+    from bemt.tools.exports.rotor_disk import tables
 
     p = job.loading
     r, thrust, torque = tables(p)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.exports.base import BladeExport, Files, Job
-from bemt.exports.blades import MOST_STATIONS, anchors_of, section_errors, stations
-from bemt.exports.parts import plain_name
-from bemt.sections.parametric import XrotorSection, fit_xrotor
+from bemt.physics.sections.parametric import XrotorSection, fit_xrotor
+from bemt.tools.exports.base import BladeExport, Files, Job
+from bemt.tools.exports.blades import MOST_STATIONS, anchors_of, section_errors, stations
+from bemt.tools.exports.parts import plain_name
 
 
 class XrotorExport(BladeExport):

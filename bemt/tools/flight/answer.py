@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.diagnose.explanation import NONE
-from bemt.diagnose.suggest import Suggestion
-from bemt.diagnose.verdict import Decision
-from bemt.flight.balance import axes_of, features
-from bemt.flight.change import FlightChange, change_in
-from bemt.flight.identify import Constant, Identified, identify
-from bemt.flight.inflow import Inflow, inflow
-from bemt.flight.judge import FALSE_ALARM, FlightVerdict, judge
-from bemt.flight.layout import layout_of
-from bemt.flight.log import FlightLog
-from bemt.flight.mass import mass_faults
-from bemt.flight.motor_speed import speed_changes
-from bemt.flight.repeat import flight_scatter
-from bemt.flight.rules import BesideBalance
-from bemt.flight.simulator import simulator_constants
-from bemt.flight.vibration import Vibration, shaken, vibration
-from bemt.flight.wind import Wind, wind
+from bemt.judge.diagnose.explanation import NONE
+from bemt.judge.diagnose.suggest import Suggestion
+from bemt.judge.diagnose.verdict import Decision
+from bemt.tools.flight.balance import axes_of, features
+from bemt.tools.flight.change import FlightChange, change_in
+from bemt.tools.flight.identify import Constant, Identified, identify
+from bemt.tools.flight.inflow import Inflow, inflow
+from bemt.tools.flight.judge import FALSE_ALARM, FlightVerdict, judge
+from bemt.tools.flight.layout import layout_of
+from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.mass import mass_faults
+from bemt.tools.flight.motor_speed import speed_changes
+from bemt.tools.flight.repeat import flight_scatter
+from bemt.tools.flight.rules import BesideBalance
+from bemt.tools.flight.simulator import simulator_constants
+from bemt.tools.flight.vibration import Vibration, shaken, vibration
+from bemt.tools.flight.wind import Wind, wind
 
 _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]
@@ -64,8 +64,8 @@ class FlightAnswer:
     change: FlightChange | None = None  # A change within the flight
     # At the frequencies of the rotors
     vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
-    shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.flight.vibration.shaken` gives it
-    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.flight.motor_speed.speed_changes` gives it
+    shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.tools.flight.vibration.shaken` gives it
+    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.motor_speed.speed_changes` gives it
     inflow: Inflow | None = None  # Thrust over the flow
     mass: Constant | None = None  # Mass from healthy flights of known mass [kg]
     predicted: Predicted | None = None  # The case in this flight
@@ -139,7 +139,7 @@ def answer_on(
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
     `false_alarm` is the accepted probability that a healthy flight is accused [1]. InputError when logs have another
-    number of rotors, or the layout (as :func:`bemt.flight.layout.layout_of` takes it) does not fit, or a mass
+    number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a mass
     cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.layout import LAYOUTS
-from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined
+from bemt.tools.flight.layout import LAYOUTS
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 KIND = "ArduPilot DataFlash"
 _HEAD, _FORMATS, _FORMAT_SIZE, _CHUNK = b"\xa3\x95", 128, 89, 1 << 20

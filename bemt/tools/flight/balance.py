@@ -28,8 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.flight.layout import effect_matrix
-from bemt.flight.log import FlightLog
+from bemt.tools.flight.layout import effect_matrix
+from bemt.tools.flight.log import FlightLog
 
 __all__ = ["BLADE", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
 

@@ -1,8 +1,8 @@
 """A change within one flight: a rotor that suddenly, or more and more, needs another drive than the others.
 
-The readings of :mod:`bemt.flight.judge` over time, in blocks, are regressed on a step at each possible time, or on a
-slope, beside a level and the mean velocity of the block where it was logged (a rotor meets other air in flight). What
-the regression leaves is correlated in time, so its variance is that of means over batches (e.g. Law, Simulation
+The readings of :mod:`bemt.tools.flight.judge` over time, in blocks, are regressed on a step at each possible time, or
+on a slope, beside a level and the mean velocity of the block where it was logged (a rotor meets other air in flight).
+What the regression leaves is correlated in time, so its variance is that of means over batches (e.g. Law, Simulation
 Modeling and Analysis, ch. 9). The bar is Student's, divided by causes and by independent times (Bonferroni).
 """
 
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.thresholds import GATE, NAMED
-from bemt.flight.balance import axes_of, directions
-from bemt.flight.log import FlightLog
+from bemt.judge.diagnose.thresholds import GATE, NAMED
+from bemt.tools.flight.balance import axes_of, directions
+from bemt.tools.flight.log import FlightLog
 
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
 _ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))  # chi squares that differ by less leave a name open

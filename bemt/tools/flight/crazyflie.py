@@ -15,8 +15,8 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.flight.log import FlightLog, joined, thrust_axis
-from bemt.readers import crazyflie_log
+from bemt.data.readers import crazyflie_log
+from bemt.tools.flight.log import FlightLog, joined, thrust_axis
 
 KIND = "Crazyflie usdlog"
 

@@ -2,7 +2,7 @@
 
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
-Bands are from ten pieces of the flight (:mod:`bemt.flight.batches`).
+Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.batches`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.flight.batches import BATCHES, half_width, jackknifed
-from bemt.flight.log import FlightLog
+from bemt.tools.flight.batches import BATCHES, half_width, jackknifed
+from bemt.tools.flight.log import FlightLog
 
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
@@ -132,7 +132,7 @@ def _yaw(
     log: FlightLog, on: NDArray[np.bool_], power: Array, speeds: bool, out: dict[str, Constant], unseen: list[str]
 ) -> None:
     """Angular acceleration in yaw over the difference of the two directions of turning."""
-    from bemt.flight.layout import layout_of
+    from bemt.tools.flight.layout import layout_of
 
     known = layout_of(log.layout, log.rotors)
     if log.rates is None or known is None:

@@ -2,8 +2,8 @@
 
 The specific force along the thrust axis over the sum of squared speeds is regressed, as a logarithm, on V_axial / n and
 (V_inplane / n)^2, n in turns a second: linear and even in the flow, as blade elements in oblique flow are to first
-order (:mod:`bemt.bem.oblique`). The velocity is that over the ground: calm air. Lift and drag of the body along the
-axis count as the rotors' own. Bands are from ten pieces of the flight (:mod:`bemt.flight.batches`).
+order (:mod:`bemt.physics.bem.oblique`). The velocity is that over the ground: calm air. Lift and drag of the body along
+the axis count as the rotors' own. Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.batches`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.flight.batches import BATCHES, jackknifed
-from bemt.flight.log import FlightLog
+from bemt.tools.flight.batches import BATCHES, jackknifed
+from bemt.tools.flight.log import FlightLog
 
 _BINS, _LEAST_M_S = 7, 0.5  # bins of the picture; least span of a velocity [m/s]
 

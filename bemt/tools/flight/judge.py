@@ -1,7 +1,7 @@
 """What is wrong with a flight: the judge of :mod:`bemt.diagnose` on the balance of a body in the air.
 
 Its decision, prior, thresholds, words and way of asking (one ordered list, the first that holds answers, the last ones
-may revise it) are those of the diagnosis; the signatures are those of :mod:`bemt.flight.balance`.
+may revise it) are those of the diagnosis; the signatures are those of :mod:`bemt.tools.flight.balance`.
 
 The evidence of a cause is Student's density of what it leaves, at the size that fits best, times the share of the
 sizes that fit as well (Laplace's approximation; MacKay, Information Theory, Inference and Learning Algorithms, ch. 28;
@@ -21,15 +21,15 @@ from itertools import combinations
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.prior import LEFT_OUT, log_priors
-from bemt.diagnose.rule import decide
-from bemt.diagnose.suggest import Suggestion
-from bemt.diagnose.thresholds import GATE
-from bemt.diagnose.verdict import CLAIMS, Decision
-from bemt.flight.balance import BLADE, WIND, axes_of, directions, healthy_flight
-from bemt.flight.next_flight import next_flight
-from bemt.flight.rules import RULES, BesideBalance, FlightEvidence, FlightQuery
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.prior import LEFT_OUT, log_priors
+from bemt.judge.diagnose.rule import decide
+from bemt.judge.diagnose.suggest import Suggestion
+from bemt.judge.diagnose.thresholds import GATE
+from bemt.judge.diagnose.verdict import CLAIMS, Decision
+from bemt.tools.flight.balance import BLADE, WIND, axes_of, directions, healthy_flight
+from bemt.tools.flight.next_flight import next_flight
+from bemt.tools.flight.rules import RULES, BesideBalance, FlightEvidence, FlightQuery
 
 __all__ = ["FALSE_ALARM", "FlightVerdict", "judge", "weighed"]
 

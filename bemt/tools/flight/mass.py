@@ -15,7 +15,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.base.tables import number_text
 from bemt.base.units import G0
-from bemt.flight.log import FlightLog
+from bemt.tools.flight.log import FlightLog
 
 LEAST_KG, MOST_KG = 0.005, 1000.0
 _TIP, _LARGEST = 170.0, 2.0  # fastest tip in hover, Mach 0.5 [m/s]; largest rotor where no speed is logged [m]

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.diagnose.thresholds import GATE
-from bemt.flight.log import FlightLog
+from bemt.judge.diagnose.thresholds import GATE
+from bemt.tools.flight.log import FlightLog
 
 _SCATTER, _FREE, _EXPONENT, _U_EXPONENT = 0.011, 4, 0.5, 0.2
 """Standard deviation between healthy flights (six flights of two Crazyflies 2.1: brushed 1.3 %, brushless 0.24 %), the

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.diagnose.suggest import Suggestion
-from bemt.diagnose.verdict import Decision
-from bemt.flight.balance import BLADE, WEIGHT, WIND
+from bemt.judge.diagnose.suggest import Suggestion
+from bemt.judge.diagnose.verdict import Decision
+from bemt.tools.flight.balance import BLADE, WEIGHT, WIND
 
 _HOVER = "hover 30 s in still air and judge that flight"
 

@@ -11,8 +11,8 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.canvas import BLUE, GREEN, ORANGE
 from bemt.base.units import G0
-from bemt.flight.answer import FlightAnswer
-from bemt.flight.text import headline
+from bemt.tools.flight.answer import FlightAnswer
+from bemt.tools.flight.text import headline
 
 _LINES = canvas.CYCLE[:6]
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.flight.layout import LAYOUTS, layout_text
-from bemt.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
+from bemt.tools.flight.layout import LAYOUTS, layout_text
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",

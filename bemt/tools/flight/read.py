@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError, system_fault
-from bemt.flight import ardupilot, crazyflie, px4, table
-from bemt.flight.log import FlightLog
+from bemt.tools.flight import ardupilot, crazyflie, px4, table
+from bemt.tools.flight.log import FlightLog
 
 _READERS = (crazyflie, px4, ardupilot, table)
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.diagnose.rotor_calibration import learn
-from bemt.flight.repeat import flight_scatter
+from bemt.judge.diagnose.rotor_calibration import learn
 from bemt.rotors.model import air_fields, air_of_points
+from bemt.tools.flight.repeat import flight_scatter
 
 if TYPE_CHECKING:
-    from bemt.case import Case
-    from bemt.compare.as_measured import AsMeasured
-    from bemt.flight.identify import Identified
+    from bemt.judge.compare.as_measured import AsMeasured
+    from bemt.rotors.case import Case
+    from bemt.tools.flight.identify import Identified
 
 AIR = 0.03
 """Uncertainty of the density, which logs do not hold, against that of the case: 8 K or 300 m of altitude [1]."""
@@ -25,8 +25,8 @@ def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Ident
     """Condition the rotor of a case on hovering flights, one point a flight, by the names of their logs.
 
     Thrust is that of the rotor where it sits: body in its wash and neighbours included. Flights differ by what
-    :func:`bemt.flight.repeat.flight_scatter` says; all share the uncertainty of the density. InputError when a flight
-    has no thrust constant in N/rpm^2, or one that is not of this propeller.
+    :func:`bemt.tools.flight.repeat.flight_scatter` says; all share the uncertainty of the density. InputError when a
+    flight has no thrust constant in N/rpm^2, or one that is not of this propeller.
     """
     faults, k, own, rpm = [], [], [], []
     for file, flight in zip(files, flights, strict=True):

@@ -1,6 +1,6 @@
 """The rules by which a flight is judged: one ordered list; the first that holds answers, those that revise see it.
 
-Thresholds and words are those of :mod:`bemt.diagnose.rules`.
+Thresholds and words are those of :mod:`bemt.judge.diagnose.rules`.
 """
 
 from __future__ import annotations
@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from bemt.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.diagnose.rule import Rule
-from bemt.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, LIKE, MOST, NAMED, NEAR, RARE, SMALL, SURE
-from bemt.diagnose.verdict import BESIDE_IT, Decision, credible_sets
-from bemt.flight.balance import BLADE, WEIGHT, blade
-from bemt.flight.change import FlightChange
+from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.diagnose.rule import Rule
+from bemt.judge.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, LIKE, MOST, NAMED, NEAR, RARE, SMALL, SURE
+from bemt.judge.diagnose.verdict import BESIDE_IT, Decision, credible_sets
+from bemt.tools.flight.balance import BLADE, WEIGHT, blade
+from bemt.tools.flight.change import FlightChange
 
 __all__ = ["BUILD", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery"]
 

@@ -20,8 +20,8 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.flight import crazyflie
-from bemt.flight.log import SPARSE, FlightLog, Stretches, joined
+from bemt.tools.flight import crazyflie
+from bemt.tools.flight.log import SPARSE, FlightLog, Stretches, joined
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.diagnose.verdict import BESIDE_IT, Decision
-from bemt.flight.answer import FlightAnswer
-from bemt.flight.identify import Constant
-from bemt.flight.judge import FlightVerdict
-from bemt.flight.rules import IN_FLIGHT
+from bemt.judge.diagnose.verdict import BESIDE_IT, Decision
+from bemt.tools.flight.answer import FlightAnswer
+from bemt.tools.flight.identify import Constant
+from bemt.tools.flight.judge import FlightVerdict
+from bemt.tools.flight.rules import IN_FLIGHT
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
 

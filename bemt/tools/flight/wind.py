@@ -30,8 +30,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.flight.batches import BATCHES, jackknifed, u_of_mean
-from bemt.flight.log import FlightLog
+from bemt.tools.flight.batches import BATCHES, jackknifed, u_of_mean
+from bemt.tools.flight.log import FlightLog
 
 _SMOOTH_S = 0.2
 _SHARE, _FACTOR = 0.041, 1.0  # r [s/m] and the standard deviation of its logarithm

@@ -27,10 +27,10 @@ import numpy as np
 
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
-from bemt.case import Case
-from bemt.case.schema import CaseFile
-from bemt.sweep.grid.formats import program_hash
-from bemt.sweep.grid.run import Grid, GridSolver, Solved, solve_chunk
+from bemt.results.sweep.grid.formats import program_hash
+from bemt.results.sweep.grid.run import Grid, GridSolver, Solved, solve_chunk
+from bemt.rotors.case import Case
+from bemt.rotors.case.schema import CaseFile
 
 IN_FLIGHT = 2
 """Chunks per worker thread that are out at a time: one at work, one waiting; this bounds the memory."""

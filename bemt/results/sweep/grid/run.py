@@ -20,16 +20,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.air import air_arrays
 from bemt.base.tables import plain, write_atomic
-from bemt.bem.coaxial import LOADS, RATIOS
-from bemt.case import Case
-from bemt.case.propagate import prepared, solve_at
-from bemt.sweep.grid.formats import Block, encode, join
+from bemt.physics.air import air_arrays
+from bemt.physics.bem.coaxial import LOADS, RATIOS
+from bemt.results.sweep.grid.formats import Block, encode, join
+from bemt.rotors.case import Case
+from bemt.rotors.case.propagate import prepared, solve_at
 
 if TYPE_CHECKING:
-    from bemt.air import Air
-    from bemt.dataset import Dataset
+    from bemt.physics.air import Air
+    from bemt.physics.dataset import Dataset
 
 CHUNK = 50_000
 """Points per chunk, at most."""

@@ -4,8 +4,8 @@ Made for OpenFOAM 1912 (the package of Debian 12). The frame is that of :mod:`ge
 thrust, blade 1 on the x axis.
 """
 
-from bemt.exports.openfoam.settings import Body, Settings, Sweep, sector_choice
-from bemt.exports.openfoam.target import OpenfoamExport
-from bemt.exports.openfoam.write import case_files
+from bemt.tools.cfd.openfoam.settings import Body, Settings, Sweep, sector_choice
+from bemt.tools.cfd.openfoam.target import OpenfoamExport
+from bemt.tools.cfd.openfoam.write import case_files
 
 __all__ = ["Body", "OpenfoamExport", "Settings", "Sweep", "case_files", "sector_choice"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from bemt.exports.openfoam.settings import Settings
-from bemt.exports.openfoam.text import dictionary, vector
+from bemt.tools.cfd.openfoam.settings import Settings
+from bemt.tools.cfd.openfoam.text import dictionary, vector
 
 BINS = 24
 """Bins along the radius in which the blade's loads are recorded."""
@@ -50,7 +50,7 @@ def control(s: Settings, balance: bool = True) -> str:
 
     ``forces`` holds blade and hub of the sector that is solved; ``standing`` duct, stator and centre body; ``plate``
     the plate; ``radial`` the blade in bins along x, which blade 1 lies on (no bins for the whole rotor). ``mass_...``,
-    ``momentum_...``, ``open`` and ``sides`` are for :mod:`bemt.cfd.balance`.
+    ``momentum_...``, ``open`` and ``sides`` are for :mod:`bemt.tools.cfd.balance`.
     """
     functions: dict[str, Any] = {"forces": _forces(s, ["blade", "hub"])}
     standing = [name for name in s.walls if name != "plate"]

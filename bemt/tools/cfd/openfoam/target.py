@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from bemt.exports.base import Files, Job, SolidExport
+from bemt.tools.exports.base import Files, Job, SolidExport
 
 
 class OpenfoamExport(SolidExport):
@@ -15,12 +15,12 @@ class OpenfoamExport(SolidExport):
     title = "OpenFOAM case with resolved blades"
     holds = "shape and an operating point; the flow solver finds the loads"
     conventions = "z along the shaft towards thrust, metres; thrust and torque as in functionObjects of the case"
-    source = "OpenFOAM 1912; bemt.exports.openfoam"
+    source = "OpenFOAM 1912; bemt.tools.cfd.openfoam"
     uses = frozenset({"rpm", "airspeed_m_s", "sideslip_deg", "level", "domain", "sector", "turbulence", "solver"})
 
     def write(self, job: Job) -> Files:
         """The whole case."""
-        from bemt.exports.openfoam.write import Run, write_openfoam
+        from bemt.tools.cfd.openfoam.write import Run, write_openfoam
 
         with tempfile.TemporaryDirectory() as folder:
             home = Path(folder)

@@ -18,12 +18,12 @@ from bemt.base.errors import Fault, InputError, needs
 from bemt.base.tables import write_atomic
 from bemt.base.toml import Table, check_field, entry
 from bemt.base.toml_text import Collector
-from bemt.case import Case
-from bemt.case.schema import AIRSPEED, RPM
-from bemt.exports.openfoam.flow import constants, fields, schemes, solution
-from bemt.exports.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
-from bemt.exports.openfoam.run import all_run, control
-from bemt.exports.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
+from bemt.rotors.case import Case
+from bemt.rotors.case.schema import AIRSPEED, RPM
+from bemt.tools.cfd.openfoam.flow import constants, fields, schemes, solution
+from bemt.tools.cfd.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
+from bemt.tools.cfd.openfoam.run import all_run, control
+from bemt.tools.cfd.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
@@ -74,7 +74,7 @@ class Run:
     sideslip_deg: float = 0.0
     # ``incompressible`` or ``compressible``; None decides by the helical tip Mach number, compressible above 0.5
     solver: str | None = None
-    gas: str = "isentropic"  # As in :class:`bemt.exports.openfoam.settings.Settings`
+    gas: str = "isentropic"  # As in :class:`bemt.tools.cfd.openfoam.settings.Settings`
     sector: str | None = None  # As there; `sector` None is the smallest that fits
     domain: str = "free"  # As there; `sector` None is the smallest that fits
     turbulence: str = "kOmegaSST"  # As there; `sector` None is the smallest that fits

@@ -1,0 +1,49 @@
+"""What the tools offer: found by scanning ``bemt/tools``, loaded on first use, missing without harm.
+
+A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a name to ``module:attribute``:
+
+* ``CASE_PARTS``: entry of a case's results; the attribute takes a :class:`bemt.rotors.case.Case` and gives a document
+  or None;
+* ``EXPORTS``: target of ``export``; the attribute is its class;
+* ``ACTIONS``: name at both doors; the attribute is the public function.
+
+>>> offered("CASE_PARTS"), offered("NOTHING")
+({'drive': 'bemt.tools.drive.drive_result:full_document'}, {})
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+
+@cache
+def _tools() -> tuple[ModuleType, ...]:
+    """Module ``offers`` of every tool that is here."""
+    path = importlib.import_module("bemt.tools").__path__
+    names = sorted(info.name for info in pkgutil.iter_modules(path) if info.ispkg)
+    return tuple(importlib.import_module(f"bemt.tools.{name}.offers") for name in names)
+
+
+def offered(table: str) -> dict[str, str]:
+    """Names of one table of all tools, each with its ``module:attribute``."""
+    return {name: where for tool in _tools() for name, where in getattr(tool, table, {}).items()}
+
+
+def load(where: str) -> Any:
+    """Attribute that ``module:attribute`` names.
+
+    >>> load("bemt.base.units:INCH")
+    0.0254
+    """
+    module, _, attribute = where.partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def part(name: str, case: Any) -> Any:
+    """Entry of a case's results that a tool makes; None where the tool is not here or has nothing to say."""
+    where = offered("CASE_PARTS").get(name)
+    return None if where is None else load(where)(case)

@@ -1,0 +1,1 @@
+"""A file becomes points with uncertainty: readers and recordings."""

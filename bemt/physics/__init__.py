@@ -1,0 +1,1 @@
+"""The rotor in air: air, coefficients, sections, effects, the solver, and the K1/K2 law."""

@@ -1,0 +1,3 @@
+"""What the drive offers to the house (:mod:`bemt.base.plugins`)."""
+
+CASE_PARTS = {"drive": "bemt.tools.drive.drive_result:full_document"}

@@ -1,0 +1,1 @@
+"""What this tool offers to the house (:mod:`bemt.base.plugins`)."""
