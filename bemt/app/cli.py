@@ -1,4 +1,4 @@
-"""Command line: scans the commands, calls the chosen one, turns errors into exit codes.
+"""Command line: finds the action, hands it the words, turns errors into exit codes.
 
 Exit codes: 0 fine; 1 out of tolerance or unconverged; 2 usage or input; 3 internal; 130 interrupted.
 """
@@ -6,162 +6,56 @@ Exit codes: 0 fine; 1 out of tolerance or unconverged; 2 usage or input; 3 inter
 from __future__ import annotations
 
 import argparse
-import difflib
 import gc
-import importlib
 import importlib.util
 import os
-import pkgutil
-import re
 import sys
-from collections.abc import Iterable, Sequence
-from types import ModuleType
-from typing import Any
+from collections.abc import Sequence
 
-import bemt.app.commands
 from bemt import __version__
-from bemt.app.commands._terminal import coloured
+from bemt.app import registry
+from bemt.app.face import Parser, described, parser_of, run
+from bemt.app.old_names import COMMANDS
+from bemt.app.terminal import coloured, complain
+from bemt.base import plugins
+from bemt.base.action import about, did_you_mean, options_of
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 
 EXIT_INTERRUPTED = 130
-GROUPS = ("Propellers and fans", "Recordings", "Drive", "Solids and CFD", "Models and checks")
-"""Groups of the help in order; other groups come after them."""
-FILE_ENDINGS = tuple(".csv .json .toml .txt .md .html .png .pdf .stl .step .stp .obj .3mf".split())
-"""Endings of a name that was meant for a file, where a folder is asked for."""
+LAB = "lab"
 CODES = "Exit codes: 0 fine, 1 out of tolerance or unconverged, 2 usage or input, 3 internal."
+WHAT = "Propeller and ducted-fan aerodynamics: BEMT, compared with the K1/K2 model, CFD and bench recordings."
 
 
-class _Once(argparse.Action):
-    """Option with one value; a second one is refused, because the last would silently win."""
-
-    def __call__(
-        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
-    ) -> None:
-        given = namespace.__dict__.setdefault("_given", set())
-        if self.dest in given and self.option_strings:
-            parser.error(f"argument {option}: got it twice; expected it once")
-        given.add(self.dest)
-        setattr(namespace, self.dest, values)
-
-
-class _Parser(argparse.ArgumentParser):
-    """Parser that takes full option names, each once, and suggests a correction for a typo."""
-
-    def __init__(self, **more: Any) -> None:
-        super().__init__(**{**more, "allow_abbrev": False})
-        self.register("action", None, _Once)
-        self.register("action", "store", _Once)
-        self._words: list[str] = []
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse, and keep the words: what is missing may be there with a typo."""
-        self._words = list(args or ())
-        return super().parse_known_args(args, namespace)
-
-    def error(self, message: str) -> Any:
-        if message.startswith("the following arguments are required"):
-            options = [option for action in self._actions for option in action.option_strings]
-            typed = [word.partition("=")[0] for word in self._words if word.startswith("--")]
-            message += "".join(f". Got {w}.{did_you_mean(w, options)}" for w in typed if w not in options)
-        number = re.match(r"argument (.+?): invalid (float|int) value: '(.*)'$", message)
-        if number:
-            expected = "a number, without its unit" if number[2] == "float" else "a whole number, without its unit"
-            message = f"{number[1]}: got {number[3] or 'nothing'}; expected {expected}."
-        wrong = re.match(r"argument (.+?): invalid choice: '([^']*)' \(choose from (.*)\)", message)
-        if wrong:
-            name, got, known = wrong.groups()
-            choices = [word.strip(" '") for word in known.split(",")]
-            what = "command" if name == "COMMAND" else name
-            message = f"{what}: got {got}; expected one of {', '.join(choices)}.{did_you_mean(got, choices)}"
-        super().error(message)
+def help_text(lab: bool = False) -> str:
+    """Commands of the house, or of the laboratory, each with an example."""
+    known = registry.homes()
+    shown = [name for name in registry.ORDER if name in known]
+    names = sorted(set(known) - set(shown)) if lab else shown
+    prog = f"bemt {LAB}" if lab else "bemt"
+    lines = [f"usage: {prog} [-h]{'' if lab else ' [--version]'} COMMAND ...", "", WHAT, ""]
+    for name in names:
+        function = registry.find(name)
+        words = described(function)[0]
+        lines += [f"  {name:<16}{words[0].lower()}{words[1:].rstrip('.')}", f"{'':<18}{prog} {about(function).example}"]
+    if not lab:
+        rest = ", ".join(sorted(set(known) - set(shown)))
+        lines += ["", f"  {LAB:<16}more commands: {rest}"]
+        lines += [f"  {'-':<16}{line}" for line in plugins.missing()]
+    return "\n".join([*lines, "", f"{prog} COMMAND --help lists the options that people use. {CODES}", ""])
 
 
-class _Top(_Parser):
-    """Parser of the whole command line."""
-
-    found: dict[str, ModuleType]
-    parsers: dict[str, argparse.ArgumentParser]
-
-    def format_help(self) -> str:
-        """Commands in their groups, each with an example."""
-        groups: dict[str, list[ModuleType]] = {name: [] for name in GROUPS}
-        for module in self.found.values():
-            groups.setdefault(module.GROUP, []).append(module)
-        lines = [f"usage: {self.prog} [-h] [--version] COMMAND ...", "", str(self.description)]
-        for name, modules in groups.items():
-            lines += ["", name] if modules else []
-            for module in modules:
-                lines += [f"  {module.NAME:<16}{module.HELP}", f"{'':<18}{self.prog} {module.EXAMPLE}"]
-        return "\n".join([*lines, "", f"{self.prog} COMMAND --help lists the options. {CODES}", ""])
-
-    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse; the command that got an unknown option answers."""
-        known, extra = self.parse_known_args(args, namespace)
-        if extra:
-            parser = self.parsers.get(getattr(known, "command", None) or "", self)
-            options = [option for action in parser._actions for option in action.option_strings]
-            words = [did_you_mean(word.partition("=")[0], options) for word in extra if word.startswith("-")]
-            parser.error(f"unrecognized arguments: {' '.join(extra)}" + "".join(f".{w}" for w in words if w))
-        return known
-
-
-def did_you_mean(got: str, known: Iterable[str]) -> str:
-    """`` Did you mean X?`` when a known word is near, else nothing.
-
-    >>> did_you_mean("swep", ["sweep", "report"]), did_you_mean("x", ["sweep"])
-    (' Did you mean sweep?', '')
-    """
-    near = difflib.get_close_matches(got, list(known), 2, 0.6)
-    return f" Did you mean {' or '.join(near)}?" if near else ""
-
-
-def commands() -> dict[str, ModuleType]:
-    """Find every file of this folder that defines a command, by the command's name."""
-    names = [info.name for info in pkgutil.iter_modules(bemt.app.commands.__path__) if not info.name.startswith("_")]
-    files = [importlib.import_module(f"bemt.app.commands.{name}") for name in names if name != "cli"]
-    return {file.NAME: file for file in files if hasattr(file, "NAME")}
-
-
-def build_parser() -> _Top:
-    """Make the parser of the whole command line.
-
-    >>> args = build_parser().parse_args(["sweep", "cases/", "--jobs", "2"])
-    >>> args.command, args.paths, args.jobs
-    ('sweep', ['cases/'], 2)
-    """
-    what = "Propeller and ducted-fan aerodynamics: BEMT, compared with the K1/K2 model, CFD and bench recordings."
-    parser = _Top(prog="bemt", description=what)
-    parser.add_argument("--version", action="version", version=f"bemt {__version__}")
-    adder = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
-    parser.found, parser.parsers = commands(), {}
-    for name, module in parser.found.items():
-        # percent signs in help belong to argparse
-        one = adder.add_parser(
-            name,
-            help=module.HELP,
-            description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
-            epilog=f"example: {parser.prog} {module.EXAMPLE}",
-        )
-        module.arguments(one)
-        parser.parsers[name] = one
-    return parser
-
-
-def _check_folders(args: argparse.Namespace) -> None:
-    """Refuse a file in place of a folder before the work starts, not after it."""
-    faults = []
-    for name in ("out", "work", "dir"):
-        asked = near = getattr(args, name, None) or "."
-        while near and not os.path.exists(near):
-            near = os.path.dirname(near)
-        if near and not os.path.isdir(near):
-            hint = f"{args.command} writes files into it: give a folder, or a name that is not taken"
-            faults.append(Fault(f"--{name}", "", f"{near}, a file", "a folder", hint))
-        elif not os.path.exists(asked) and asked.lower().endswith(FILE_ENDINGS):
-            hint = f"{args.command} names the files in it: give {os.path.splitext(asked)[0]}"
-            faults.append(Fault(f"--{name}", "", f"{asked}, the name of a file", "a folder", hint))
-    if faults:
-        raise InputError(faults)
+def whole_parser() -> tuple[argparse.ArgumentParser, list[Parser]]:
+    """Parser of the whole command line, for the completion of a shell, and those of its commands."""
+    top = argparse.ArgumentParser(prog="bemt", description=WHAT)
+    adder = top.add_subparsers(dest="command")
+    parts = []
+    for name in registry.homes():
+        one = parser_of(registry.find(name), everything=True)
+        adder._name_parser_map[name] = one
+        adder._choices_actions.append(adder._ChoicesPseudoAction(name, (), described(registry.find(name))[0]))
+        parts.append(one)
+    return top, parts
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -171,24 +65,45 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _main(sys.argv[1:] if argv is None else list(argv))
 
 
+def _dispatch(argv: list[str]) -> int:
+    """Call the action that the first word names."""
+    if not argv or argv[0] in ("-h", "--help", "--help-all"):
+        print(help_text(), end="")
+        return EXIT_OK
+    if argv[0] == "--version":
+        print(f"bemt {__version__}")
+        return EXIT_OK
+    lab = argv[0] == LAB
+    words = argv[1:] if lab else argv
+    if lab and (not words or words[0] in ("-h", "--help")):
+        print(help_text(lab=True), end="")
+        return EXIT_OK
+    known = registry.homes()
+    if words[0] in COMMANDS:
+        complain(f"bemt: {words[0]} is now {LAB} {COMMANDS[words[0]]}")
+        words = [COMMANDS[words[0]], *words[1:]]
+    if words[0] not in known:
+        gone = plugins.tool_of(words[0])
+        if gone:
+            raise InputError(Fault("", words[0], f"no tool {gone}", plugins.how_to_get(gone)))
+        names = [name for name in registry.ORDER if name in known]
+        near = did_you_mean(words[0], known)
+        what = f"bemt: error: COMMAND: got {words[0]}; expected one of {', '.join(names)}, {LAB}.{near}"
+        print(f"usage: bemt [-h] [--version] COMMAND ...\n{what}", file=sys.stderr)
+        return EXIT_INPUT
+    return run(registry.find(words[0]), words[1:], f"bemt {LAB}" if lab else "bemt")
+
+
 def _main(argv: list[str]) -> int:
     for stream in (sys.stdout, sys.stderr):  # a terminal without UTF-8 must not end a run
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    parser = build_parser()
-    if not argv:
-        parser.print_help()
-        return EXIT_OK
-    args = parser.parse_args(argv)
-    if getattr(args, "json", False) and hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     try:
-        _check_folders(args)
-        code = commands()[args.command].run(args)
+        code = _dispatch(argv)
         sys.stdout.flush()
-        return EXIT_OK if code is None else int(code)
+        return code
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(InputError([options_of(fault) for fault in error.faults]), file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

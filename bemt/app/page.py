@@ -140,14 +140,17 @@ def exports(st: Any, propeller: bemt.Propeller) -> None:
             right.code(written.text.replace(folder, "."), language=None)
             right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
     with st.expander("Sources of this answer"):
-        for source in bemt.cite(propeller):
-            st.markdown(f"**{source.name}** ({source.kind}): {source.source}")
+        for source in bemt.cite(propeller).to_dict()["sources"]:
+            st.markdown(f"**{source['name']}** ({source['kind']}): {source['source']}")
 
 
 def main() -> None:
     """Draw the page."""
     import streamlit as st
 
+    from bemt.app.served import end_with_parent
+
+    end_with_parent()
     st.set_page_config(page_title="bemt", layout="wide")
     st.title("Propellers with uncertainty")
     st.caption(ABOUT)

@@ -47,3 +47,31 @@ def part(name: str, case: Any) -> Any:
     """Entry of a case's results that a tool makes; None where the tool is not here or has nothing to say."""
     where = offered("CASE_PARTS").get(name)
     return None if where is None else load(where)(case)
+
+
+KNOWN = {
+    "drive": ("drive", "map", "motor", "thrusters"), "design": ("choose", "design"), "flight": ("fly",),
+    "exports": ("export",), "cfd": ("cfd",),
+}  # fmt: skip
+"""Tools of a whole installation, and their commands."""
+
+
+def absent() -> list[str]:
+    """Tools that are not here."""
+    here = {tool.__name__.split(".")[2] for tool in _tools()}
+    return sorted(set(KNOWN) - here)
+
+
+def tool_of(command: str) -> str:
+    """Absent tool that a command belongs to; empty where there is none."""
+    return next((tool for tool in absent() if command in KNOWN[tool]), "")
+
+
+def how_to_get(tool: str) -> str:
+    """How an absent tool comes back."""
+    return f"bemt/tools/{tool}; install bemt again to have it"
+
+
+def missing() -> list[str]:
+    """A line for each absent tool."""
+    return [f"not here: {', '.join(KNOWN[tool])} ({how_to_get(tool)})" for tool in absent()]

@@ -1,197 +1,87 @@
-"""Functions of the public API: read, diagnose, compare, drive, validate."""
+"""Actions that judge recordings: diagnose, compare, plan, calibrate_rotor, prove."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
-from bemt.app.library.given import in_words_of_the_library, number, path_text
-from bemt.app.library.rotors import Propeller, rotor_of
-from bemt.base.errors import Fault, InputError
-from bemt.base.face import as_html
-from bemt.physics.dataset import Dataset, from_pandas
-from bemt.rotors.case import case_of
+from bemt.base.action import Count, Told, action
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TypeAlias
+
     import pandas as pd
+    from numpy.typing import ArrayLike
 
-    from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.ask import Answer, OnePoint
     from bemt.judge.diagnose.contrast import Contrast
-    from bemt.judge.diagnose.record import Record
-    from bemt.tools.drive.drive_result import DriveResult
+    from bemt.judge.diagnose.plan import Plan
+    from bemt.judge.diagnose.rotor_calibration import CalibratedRotor
+    from bemt.physics.dataset import Dataset
+    from bemt.rotors.propeller import Propeller
 
-__all__ = ["Answer", "compare", "diagnose", "drive", "read", "validate"]
+    Path: TypeAlias = str | os.PathLike[str]
+    Recording: TypeAlias = str | os.PathLike[str] | Dataset | pd.DataFrame
 
-
-def read(path: str | os.PathLike[str], format: str | None = None) -> Dataset:  # noqa: A002
-    r"""Read a recording: a bench log, a table, a CFD export, a vendor file.
-
-    Parameters
-    ----------
-    path : str or path
-        The file.
-    format : str, optional
-        Name of the reader; detected from the content by default.
-
-    Returns
-    -------
-    Dataset
-        Steady points of a log, rows of a table of points, or one point with the means of a CFD history. ``notes`` list
-        the decisions made and what looks wrong. Suspicious data are not corrected.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be interpreted; the message says what to write.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> file = Path(tempfile.mkdtemp()) / "bench.csv"
-    >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\n5000,340,0.05\n6000,490,0.07\n")
-    >>> read(file).thrust_N.round(2)
-    array([3.33, 4.81])
-    """
-    from bemt.data.recordings.load import as_dataset, import_file
-
-    return as_dataset(import_file(path_text("path", path), format))
+__all__ = ["calibrate_rotor", "compare", "diagnose", "plan", "prove"]
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """Result of a diagnosis, returned by :func:`diagnose`.
-
-    Parameters
-    ----------
-    diagnosis : bemt.judge.diagnose.answer.Diagnosis
-        The complete result.
-    propeller : Propeller
-        The propeller that was compared with the recording.
-
-    Examples
-    --------
-    The blades of this recording are 1.5 deg steeper than those of its reference:
-
-    >>> import numpy as np
-    >>> from bemt.app.library import propeller
-    >>> p = propeller("10x5")
-    >>> rpm, J = np.repeat([5000.0, 10000.0, 15000.0], 6), np.tile(np.linspace(0.0, 0.5, 6), 3)
-    >>> turned = p.replaced({"blade.beta_offset_deg": 2.2}).solve(rpm, J=J, bands=False)
-    >>> answer = diagnose(turned, p, reference=p.solve(rpm, J=J, bands=False), only=["pitch_offset", "torque_gain"])
-    >>> answer
-    <answer on prop_10x5: named pitch_offset>
-    >>> answer.verdict, answer.effects, answer.to_dict()["schema"]
-    ('named', ('pitch_offset',), 'bemt.diagnosis/1')
-    >>> print(answer.text.splitlines()[0])
-    Cause found: wrong blade angle (+1.49 deg).
-    >>> improved = answer.improved.solve(rpm, J=J, bands=False)
-    >>> bool(np.max(np.abs(improved.thrust_N / turned.thrust_N - 1)) < 0.02)
-    True
-    >>> import tempfile
-    >>> "before_after.png" in {file.name for file in answer.plot(tempfile.mkdtemp())}
-    True
-    """
-
-    diagnosis: Diagnosis
-    propeller: Propeller
-
-    def __repr__(self) -> str:
-        """Say the verdict in a line."""
-        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
-
-    def _repr_html_(self) -> str:
-        """Show the answer in a notebook."""
-        return as_html(f"{self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects)))}", self.text)
-
-    @property
-    def verdict(self) -> str:
-        """One of none, named, class, sensor, unknown, insufficient."""
-        return self.diagnosis.said.verdict
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Effects of the verdict; for a class, all members."""
-        return self.diagnosis.said.effects
-
-    @property
-    def text(self) -> str:
-        """The answer as text, as on the command line."""
-        from bemt.judge.diagnose.document import text
-
-        return text(self.diagnosis)
-
-    @property
-    def improved(self) -> Propeller | None:
-        """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
-        from bemt.judge.diagnose.improve import improved_case
-
-        text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
-        return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Convert the answer to plain values.
-
-        Returns
-        -------
-        dict
-            Schema ``bemt.diagnosis/1``.
-        """
-        from bemt.judge.diagnose.document import document
-
-        return document(self.diagnosis)
-
-    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Draw the figures of the answer.
-
-        Parameters
-        ----------
-        folder : str or path
-            Folder for the PNG files.
-
-        Returns
-        -------
-        list of Path
-            The files.
-        """
-        from bemt.base.errors import system_fault
-        from bemt.judge.diagnose import figures
-
-        try:
-            return figures.draw(self.diagnosis, Path(path_text("folder", folder)))
-        except OSError as error:
-            raise InputError(system_fault(error)) from error
-
-
+@action(
+    "Recordings", "diagnose log.csv --case cases/prop_8x5", words=("recordings",), shown=True,
+    common=("case", "reference", "ruled_out", "only", "channels", "rpm", "airspeed_m_s", "out"),
+)  # fmt: skip
 def diagnose(
-    recording: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any], propeller: Propeller | str, *,
-    reference: str | os.PathLike[str] | Dataset | pd.DataFrame | Sequence[Any] | None = None,
-    only: Sequence[str] | None = None, progress: Callable[[str], None] | None = None,
-) -> Answer:  # fmt: skip
-    """Find the physics or the stand fault that explains why a recording differs from the model.
+    recordings: Recording | Sequence[Recording], case: Propeller | Path | Sequence[Propeller | Path], *,
+    reference: Recording | Sequence[Recording] | None = None, reference_case: Propeller | Path | None = None,
+    only: Sequence[str] = (), ruled_out: Sequence[str] = (), off: Sequence[str] = (),
+    baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
+    rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
+    along: Path | None = None, out: Path | None = None, figures: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Answer | OnePoint:  # fmt: skip
+    """Say which physics or stand fault explains why a recording differs from the model.
 
     Parameters
     ----------
-    recording : path, Dataset, DataFrame, or sequence of these
-        The measurement; columns of a frame carry units (``thrust_N``, ``thrust_gf``, ``torque_Nm``).
-    propeller : Propeller or str
-        The propeller that was measured; a label or a case is enough.
+    recordings : path, Dataset, DataFrame, or sequence of these
+        Tables or logs, analysed together; columns of a frame carry units (``thrust_N``, ``thrust_gf``).
+    case : Propeller, str, path, or sequence of these
+        Case or label of all recordings, or one per recording.
     reference : path, Dataset, DataFrame, or sequence of these, optional
-        Recordings from the same stand without the suspected cause; they show how far model and stand differ anyway.
-    only : sequence of str, optional
-        Consider only these effects.
+        Recordings from the same stand without the cause; they show how far model and stand differ anyway.
+    reference_case : Propeller, str or path, optional
+        Case of the references where it differs: without an effect that was put into the case.
+    only : sequence of str
+        Consider only these effects; all by default.
+    ruled_out : sequence of str
+        Effects that a check has ruled out.
+    off : sequence of str
+        Effects to leave out of the baseline.
+    baseline : {"bemt", "k1k2"}
+        Model to compare with the recordings; k1k2 knows thrust only.
+    channels : sequence of {"thrust", "torque", "speed"}
+        Use only these channels; all that were measured by default.
+    rpm : array_like
+        Speed for files without one: one for all, or one per file. [rev/min]
+    airspeed_m_s : array_like
+        Airspeed for files without one: one for all, or one per file; from the case by default. [m/s]
+    repeatability_pct : float, optional
+        What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
+    along : path, optional
+        Blade loads (radial.csv of a campaign), compared with the first case.
+    out : path, optional
+        Folder for diagnosis.json, figures and the improved cases.
+    figures : bool
+        With a folder: draw the figures.
     progress : callable, optional
         Called with a line of text.
 
     Returns
     -------
     Answer
-        ``.verdict``, ``.effects``, ``.text``, ``.plot(folder)``, ``.improved``.
+        ``.verdict``, ``.effects``, ``.text``, ``.to_dict()``, ``.plot(folder)``, ``.improved``. For a single point,
+        which cannot be diagnosed, the point beside the model, with the verdict ``insufficient``.
 
     Raises
     ------
@@ -208,106 +98,55 @@ def diagnose(
     >>> bemt.diagnose(points, p, only=["pitch_offset", "thrust_gain"]).verdict
     'none'
     """
-    from dataclasses import replace
+    from bemt.judge.diagnose.ask import diagnosed
 
-    from bemt.judge.diagnose import load as loading
-    from bemt.judge.diagnose import record as records
-    from bemt.judge.diagnose.chain import diagnose as run
-
-    rotor = rotor_of(propeller)
-
-    def record(given: Any) -> Record:
-        if isinstance(given, (str, os.PathLike)):
-            return loading.load(os.fspath(given), rotor.case)
-        if not isinstance(given, Dataset) and not hasattr(given, "columns"):
-            expected = "a path, a Dataset or a DataFrame"
-            raise InputError(Fault("", "recording", f"{type(given).__name__} {given!r:.40}", expected))
-        table = given if isinstance(given, Dataset) else from_pandas(given)
-        return records.from_series(table, rotor.case)
-
-    only = [only] if isinstance(only, str) else only
-    loading.check_effects(only or ())
-    if not _several(recording):
-        raise InputError(Fault("", "recording", "none", "one or more"))
-    loaded = [record(given) for given in _several(recording)]
-    loaded += [replace(record(given), reference=True) for given in _several(reference)]
-    return Answer(run(loaded, [rotor.case], list(only) if only else None, progress), rotor)
+    return diagnosed(
+        recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, off=off, baseline=baseline,
+        channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
+        out=out, figures=figures, progress=progress,
+    )  # fmt: skip
 
 
-def _several(given: Any) -> list[Any]:
-    return [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
-
-
-def drive(
-    propeller: Propeller | str, *, kv: float | None = None, cells: int | None = None, mass_kg: float | None = None,
-    rotors: int | None = None, capacity_Ah: float | None = None, airspeed_m_s: float = 0.0,
-) -> DriveResult:  # fmt: skip
-    """Solve a propeller with its motor and battery.
-
-    Parameters
-    ----------
-    propeller : Propeller or str
-        Propeller, case or label.
-    kv : float, optional
-        Speed constant of the motor; from the case's table [drive] by default, like all that follows. [rev/min/V]
-    cells : int, optional
-        LiPo cells in series.
-    mass_kg : float, optional
-        Mass of the vehicle, for the hover point. [kg]
-    rotors : int, optional
-        Number of rotors that carry the vehicle and share the battery.
-    capacity_Ah : float, optional
-        Capacity of the battery, for the flight time. [A h]
-    airspeed_m_s : float
-        Flight speed. [m/s]
-
-    Returns
-    -------
-    bemt.tools.drive.drive_result.DriveResult
-        ``.full``, ``.hover``, ``.text``, ``.to_dict()``; each value with its band.
-
-    Raises
-    ------
-    InputError
-        For impossible values, and without K_v and cells from either side.
-
-    Examples
-    --------
-    >>> import bemt
-    >>> d = bemt.drive("10x5", kv=1000, cells=3)
-    >>> bool(7.0 < d.full["thrust_N"].value < 13.0)
-    True
-    """
-    from bemt.tools.drive import drive_result
-
-    given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
-    for name, value in (*given.items(), ("airspeed_m_s", airspeed_m_s)):
-        if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float, np.number))):
-            raise InputError(Fault("", name, repr(value), "a number"))
-    case = rotor_of(propeller).case
-    with in_words_of_the_library():
-        return drive_result.solve(drive_result.with_drive(case, **given), float(airspeed_m_s))
-
-
+@action(
+    "Recordings", "compare monday.csv tuesday.csv --case cases/prop_8x5", words=("a", "b"), shown=True,
+    common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "out"),
+)  # fmt: skip
 def compare(
-    a: str | os.PathLike[str], b: str | os.PathLike[str], *, case: str | os.PathLike[str] | None = None,
-    diameter_m: float | None = None,
-) -> Contrast:  # fmt: skip
-    r"""Find what changed between two recordings from one stand.
+    a: Path, b: Path | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
+    diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
+    air_b: str | None = None, out: Path | None = None, figures: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Contrast | Told:  # fmt: skip
+    r"""Say what changed between two recordings, or compare one CFD run with BEMT.
 
     Parameters
     ----------
-    a, b : str or path
-        Recordings before and after a change, or without and with it.
-    case : str or path, optional
-        Case of the rotor; `b` is then diagnosed with `a` as its reference.
+    a : path
+        First recording, before or without the change.
+    b : path, optional
+        Second recording, after or with the change; without it `a` is one CFD run, compared with BEMT of the case.
+    case : Propeller, str or path, optional
+        Case or label of the rotor: `b` is diagnosed with `a` as its reference. Without it, causes that scale like the
+        ratios are named.
+    label : str, optional
+        Label such as 10x5; it gives the diameter for the advance ratio.
     diameter_m : float, optional
-        Rotor diameter for the advance ratio, if there is no case. [m]
+        The diameter instead of a label. [m]
+    rows_a, rows_b : sequence of str
+        Rows of `a` or `b` to use: column=text, column=number, column=low:high, rotor=left.
+    air_a, air_b : str, optional
+        Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
+    out : path, optional
+        Folder for comparison.json, its text and a picture.
+    figures : bool
+        With a folder: draw the picture.
+    progress : callable, optional
+        Called with a line of text.
 
     Returns
     -------
-    bemt.judge.diagnose.contrast.Contrast
-        ``.document`` is the answer in the format ``bemt.comparison/1``.
+    Contrast
+        ``.verdict``, ``.effects``, ``.text``, ``.to_dict()`` in the format ``bemt.comparison/1``.
 
     Raises
     ------
@@ -329,40 +168,201 @@ def compare(
     >>> print(found.text.splitlines()[0])
     Gain error of the thrust cell, or second rotor on the same axis (thrust -10.0% and torque +0.0%).
     """
+    from bemt.base.errors import Fault, InputError
+    from bemt.base.given import number, path_text
     from bemt.judge.diagnose import contrast
 
-    diameter = contrast.label_diameter(None) if diameter_m is None else number("diameter_m", diameter_m)
-    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
+    if diameter_m is not None and not 0.01 <= number("diameter_m", diameter_m) <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    known = None if case is None else path_text("case", case)
-    return contrast.compare(path_text("a", a), path_text("b", b), known, diameter_m=diameter)
+    names = path_text("a", a), None if b is None else path_text("b", b)
+    return contrast.compared(
+        *names, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
+        out=None if out is None else path_text("out", out), figures=figures, progress=progress,
+    )  # fmt: skip
 
 
-def validate(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """Compare BEMT with a folder of measured propellers in UIUC layout.
+@action("Recordings", "plan points.csv --case cases/prop_8x5", words=("points",))
+def plan(
+    points: Recording | Mapping[str, ArrayLike], case: Propeller | Path, *, off: Sequence[str] = (),
+    out: Path | None = None, progress: Callable[[str], None] | None = None,
+) -> Plan:  # fmt: skip
+    """Say which effects a set of test points can see, before anyone measures.
 
     Parameters
     ----------
-    folder : str or path
-        The folder, or ``"uiuc"`` for the installed data.
+    points : path, Dataset, DataFrame or mapping
+        Columns ``rpm``, ``airspeed_m_s``, ``time_s`` and others, one row per point; no loads.
+    case : Propeller, str or path
+        Propeller, case or label.
+    off : sequence of str
+        Effects to leave out of the baseline.
+    out : path, optional
+        Folder for plan.json.
+    progress : callable, optional
+        Called with a line of text.
 
     Returns
     -------
-    dict
-        Schema ``bemt.validation/1``.
+    Plan
+        ``.detectable``, ``.text``, ``.to_dict()``.
 
     Raises
     ------
     InputError
-        If it contains no propeller that can be compared.
+        For points without a speed of rotation.
 
     Examples
     --------
-    >>> validate("no/such/folder")  # doctest: +ELLIPSIS
+    >>> p = plan({"rpm": [4000, 6000, 8000]}, "10x5")
+    >>> set(p.detectable.values()) <= {"yes", "maybe", "no"}, p.to_dict()["schema"], len(p.text) > 100
+    (True, 'bemt.plan/1', True)
+    >>> plan({"airspeed_m_s": [0.0]}, "10x5")
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: no/such/folder: got ...
+    bemt.base.errors.InputError: points: got columns airspeed_m_s; expected a column rpm.
     """
-    from bemt.rotors.validate import propellers
+    from pathlib import Path as File
 
-    return propellers.validate(propellers.where(path_text("folder", folder)))
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.judge.diagnose import plan as planning
+    from bemt.judge.diagnose.load import cases_of
+
+    (rotor,) = cases_of([case], off, 1)
+    found = planning.plan(planning.given(points, rotor), rotor, progress)
+    if out is not None:
+        write_atomic(File(out) / "plan.json", json_text(found.to_dict()))
+    return found
+
+
+@action("Recordings", "calibrate-rotor static.csv --case cases/prop_10x5 --out measured_10x5", words=("recordings",))
+def calibrate_rotor(
+    recordings: Path | Sequence[Path], case: Propeller | Path, *, out: Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> CalibratedRotor:  # fmt: skip
+    r"""Learn a rotor's blade as built from clean runs of it.
+
+    Parameters
+    ----------
+    recordings : path or sequence of paths
+        Runs of this rotor with nothing else changed; best a static one and a flight point.
+    case : Propeller or path
+        Its case, in a file: what is learnt is written next to a copy of it.
+    out : path, optional
+        Folder for the case of the rotor as measured.
+    progress : callable, optional
+        Called with a line of text.
+
+    Returns
+    -------
+    CalibratedRotor
+        ``.converged``, ``.text``, ``.to_dict()``, ``.write(folder)``.
+
+    Raises
+    ------
+    InputError
+        For recordings without loads, and for loads that no blade of the case has.
+
+    Examples
+    --------
+    >>> import bemt, tempfile
+    >>> from pathlib import Path
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> case = bemt.propeller("10x5").write(folder / "case")
+    >>> d = bemt.load(case).solve(rpm=[4000, 6000, 8000])
+    >>> rows = [f"{n},{T:.4f},{Q:.5f}" for n, T, Q in zip(d.rpm, 1.05 * d.thrust_N, 1.05 * d.torque_Nm)]
+    >>> _ = (folder / "run.csv").write_text("\n".join(["rpm,thrust_N,torque_Nm", *rows]))
+    >>> rotor = calibrate_rotor(folder / "run.csv", case)
+    >>> rotor.converged, rotor.to_dict()["points"], rotor.text.splitlines()[0].startswith("prop_10x5: 3 points")
+    (True, 3, True)
+    >>> measured = rotor.write(folder / "measured").solve(rpm=6000)
+    >>> bool(measured.u["thrust_N"][0] < 0.7 * d.u["thrust_N"][1])
+    True
+    """
+    from bemt.base.errors import Fault, InputError
+    from bemt.base.given import path_text, paths_text
+    from bemt.judge.diagnose.rotor_calibration import CalibratedRotor, calibrate
+    from bemt.rotors.propeller import load, rotor_of
+
+    paths = tuple(paths_text("recordings", recordings))
+    if not paths:
+        raise InputError(Fault("", "recordings", "none", "one or more"))
+    rotor, found = calibrate(paths, rotor_of(case).case.path.as_posix(), progress)
+    made = CalibratedRotor(load(rotor.path), found, paths, None if out is None else path_text("out", out))
+    if made.folder is not None:
+        made.write(made.folder)
+    return made
+
+
+@action("Models and checks", "prove --seed 1")
+def prove(
+    *, size: Literal["small", "full", "ccblade", "real"] = "small", seed: int | None = None, jobs: Count | None = None,
+    follow: bool = False, loop: Count | None = None, fixed: bool = False, calibrate_intervals: Sequence[Path] = (),
+    out: Path | None = None, progress: Callable[[str], None] | None = None,
+) -> Told:  # fmt: skip
+    """Hide causes in recordings, diagnose them, score the answers.
+
+    Parameters
+    ----------
+    size : {"small", "full", "ccblade", "real"}
+        41 or 605 generated items, 68 by CCBlade (extra wisdem), or published recordings.
+    seed : int, optional
+        Random seed; from the operating system by default.
+    jobs : int, optional
+        Parallel diagnoses; one per core by default.
+    follow : bool
+        With published recordings and a folder: also take the steps that open answers recommend, if the data allow.
+    loop : int, optional
+        Then take the runs that open answers recommend, up to so many each, on the hidden stand.
+    fixed : bool
+        With a loop: a fixed programme of runs instead.
+    calibrate_intervals : sequence of paths
+        Folders of kept proofs made with the current interval factors: write new factors instead.
+    out : path, optional
+        Folder that keeps items, key, answers and score.
+    progress : callable, optional
+        Called with a line of text.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.proof/1``; ``exit_code`` 0 if every target is met, 1 if some are missed.
+
+    Raises
+    ------
+    InputError
+        For a follow-up without a folder.
+
+    Examples
+    --------
+    >>> prove(follow=True)
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: follow: got size small without out; expected size real and out.
+    """
+    import os
+    from pathlib import Path as File
+
+    from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+    from bemt.judge.proof import follow as following
+    from bemt.judge.proof import intervals, proof_text
+    from bemt.judge.proof import loop as looping
+    from bemt.judge.proof.prove import prove as run
+
+    got = f"size {size}" + ("" if out else " without out")
+    if follow and not (out and size == "real"):
+        raise InputError(Fault("--follow", "", got, "size real and out"))
+    if loop and (not out or size == "real"):
+        raise InputError(Fault("--loop", "", got, "generated items and out"))
+    if seed is not None and seed < 0:
+        raise InputError(Fault("--seed", "", f"{seed}", "a whole number of 0 or more"))
+    if calibrate_intervals:
+        return Told({"schema": "bemt.intervals/1"}, intervals.rewrite([File(p) for p in calibrate_intervals], out))
+    say, cores = progress or (lambda line: None), jobs or os.cpu_count() or 1
+    found = run(None if out is None else os.fspath(out), size, seed, jobs, say, lambda line: say(f"{line}\n"))
+    taken = []
+    if follow and out is not None:
+        taken.append(following.text(following.follow(File(out), cores, say)))
+    if loop and out is not None:
+        taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say)))
+    code = EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
+    return Told(found, "\n\n".join([proof_text.text(found), *taken]), exit_code=code)

@@ -1,50 +1,44 @@
-"""Functions of the public API that make something: estimate, plan, calibrate_rotor, export, report, cite."""
+"""Actions on a rotor: from a label to numbers, to a case, to its sources, and against measured rotors."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from bemt.app.library.given import in_words_of_the_library, number, numbers, path_text
-from bemt.app.library.rotors import Propeller, load, rotor_of
-from bemt.base.errors import Fault, InputError, system_fault
-from bemt.physics.dataset import Dataset, from_pandas
+from bemt.base.action import Count, Told, action
 
 if TYPE_CHECKING:
-    import pandas as pd
+    import os
+    from collections.abc import Callable, Sequence
 
-    from bemt.judge.compare.as_measured import AsMeasured
-    from bemt.judge.diagnose.plan import Plan
-    from bemt.rotors.case.sources import Source
+    from numpy.typing import ArrayLike
 
-__all__ = [
-    "CalibratedRotor", "ExportedCase", "TestPlan", "calibrate_rotor", "cite", "estimate", "export", "plan", "report",
-]  # fmt: skip
+    from bemt.rotors.case.estimate import Estimate
+    from bemt.rotors.propeller import Propeller
 
-Recording = str | os.PathLike[str]
+__all__ = ["calibrate", "cite", "estimate", "new", "stations", "validate"]
 
 
+@action(
+    "Propellers and fans", "estimate 10x5 --rpm 6000", words=("label",), shown=True,
+    common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "angle_deg"),
+)  # fmt: skip
 def estimate(
-    label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: int | None = None,
+    label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
     density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0,
-) -> Dataset:  # fmt: skip
-    """Estimate thrust and power from a label, every speed of rotation with every airspeed at every angle.
+) -> Estimate:  # fmt: skip
+    """Estimate thrust and power from a label such as 10x5, with bands; K1/K2 for comparison.
+
+    Every speed of rotation is solved with every airspeed at every angle.
 
     Parameters
     ----------
     label : str
-        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``.
+        As on the propeller: ``10x4.7``, ``APC 10x4.7SF``, ``8x5x3``, ``5045``.
     rpm : array_like
         Speeds of rotation. [rev/min]
     airspeed_m_s : array_like
-        Speeds of the wind. [m/s]
+        Speeds of the wind, 0 by default. [m/s]
     blades : int, optional
         Number of blades; from the label by default, else 2.
     chord_mm : float, optional
@@ -62,7 +56,7 @@ def estimate(
     -------
     Dataset
         Kind ``bemt``, with standard uncertainties in ``u``; ``k1k2_thrust_N`` is the K1/K2 formula. The speed of
-        rotation is the outer loop.
+        rotation is the outer loop. ``.text`` is the table, ``.to_dict()`` has schema ``bemt.estimate/2``.
 
     Raises
     ------
@@ -79,397 +73,281 @@ def estimate(
         ...
     bemt.base.errors.InputError: density_kg_m3: got 1225; expected 0.01 to 10 kg/m3. In g/m3? Divide by 1000.
     """
-    from bemt.rotors.case import estimate as estimating
+    from bemt.base.given import number
+    from bemt.rotors.case.estimate import of_label
 
-    asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
-    n, V, angle = (np.atleast_1d(numbers(*pair)).tolist() for pair in asked)
     density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
-    with in_words_of_the_library():
-        found = estimating.document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
-    rows: list[dict[str, Any]] = found["rows"]
-    columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
-    u = {k[2:]: v for k, v in columns.items() if k.startswith("u_")}
-    values = {k: v for k, v in columns.items() if not k.startswith(("u_", "u95_"))}
-    if (sideslip := np.radians(values.pop("angle_deg"))).any():
-        values["sideslip_rad"] = sideslip
-    return Dataset("bemt", found["case"], values, u, flags=tuple(tuple(r["flags"]) for r in rows))
-
-
-@dataclass(frozen=True, eq=False)
-class TestPlan:
-    """What a set of test points can show, returned by :func:`plan`.
-
-    Parameters
-    ----------
-    found : bemt.judge.diagnose.plan.Plan
-        The complete result.
-
-    Examples
-    --------
-    >>> p = plan({"rpm": [4000, 6000, 8000]}, "10x5")
-    >>> p
-    <plan of 3 points>
-    >>> set(p.detectable.values()) <= {"yes", "maybe", "no"}, p.to_dict()["schema"], len(p.text) > 100
-    (True, 'bemt.plan/1', True)
-    """
-
-    __test__ = False  # the name is no test of pytest's
-    found: Plan
-
-    def __repr__(self) -> str:
-        """Say how many points."""
-        return f"<plan of {self.found.points} points>"
-
-    @property
-    def detectable(self) -> dict[str, str]:
-        """Each effect: yes, maybe or no at its ordinary strength."""
-        from bemt.judge.diagnose.plan import DETECTABLE
-
-        return {effect: DETECTABLE[word] for effect, word in self.found.sight.items()}
-
-    @property
-    def text(self) -> str:
-        """The tables, as on the command line."""
-        from bemt.judge.diagnose.plan import text
-
-        return text(self.found)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Convert to plain values of schema ``bemt.plan/1``."""
-        from bemt.judge.diagnose.plan import document
-
-        return document(self.found)
-
-
-def plan(
-    points: Recording | Dataset | pd.DataFrame | Mapping[str, ArrayLike], propeller: Propeller | str, *,
-    progress: Callable[[str], None] | None = None,
-) -> TestPlan:  # fmt: skip
-    """Say which effects a set of test points can see, before anyone measures.
-
-    Parameters
-    ----------
-    points : path, Dataset, DataFrame or mapping
-        Columns ``rpm``, ``airspeed_m_s``, ``time_s`` and others, one row per point; no loads.
-    propeller : Propeller or str
-        Propeller, case or label.
-    progress : callable, optional
-        Called with a line of text.
-
-    Returns
-    -------
-    TestPlan
-        ``.detectable``, ``.text``, ``.to_dict()``.
-
-    Raises
-    ------
-    InputError
-        For points without a speed of rotation.
-
-    Examples
-    --------
-    >>> plan({"airspeed_m_s": [0.0]}, "10x5")
-    Traceback (most recent call last):
-        ...
-    bemt.base.errors.InputError: points: got columns airspeed_m_s; expected a column rpm.
-    """
-    from bemt.judge.diagnose import plan as planning
-
-    with in_words_of_the_library():
-        case = rotor_of(propeller).case
-        if isinstance(points, (str, os.PathLike)):
-            record = planning.points(path_text("points", points), case)
-        else:
-            record = planning.record_of(_table(points), case)
-        return TestPlan(planning.plan(record, case, progress))
-
-
-def _table(points: Any) -> Dataset:
-    if isinstance(points, Dataset):
-        return points
-    import pandas as pd
-
-    if not isinstance(points, (Mapping, pd.DataFrame)):
-        expected = "a path, a Dataset, a DataFrame or columns by name"
-        raise InputError(Fault("", "points", f"{type(points).__name__} {points!r:.40}", expected))
-    return from_pandas(pd.DataFrame(points), name="points")
-
-
-@dataclass(frozen=True, eq=False)
-class CalibratedRotor:
-    """A rotor as its own runs show it, returned by :func:`calibrate_rotor`.
-
-    Parameters
-    ----------
-    source : Propeller
-        The propeller as its case describes it.
-    found : bemt.judge.compare.as_measured.AsMeasured
-        What the runs say.
-    recordings : tuple of str
-        The files.
-
-    Examples
-    --------
-    See :func:`calibrate_rotor`, which shows ``.converged``, ``.text``, ``.to_dict()`` and ``.write(folder)``.
-    """
-
-    source: Propeller
-    found: AsMeasured
-    recordings: tuple[str, ...]
-
-    @property
-    def converged(self) -> bool:
-        """Whether the fit converged."""
-        return bool(self.found.found.converged)
-
-    @property
-    def text(self) -> str:
-        """The answer, as on the command line."""
-        from bemt.judge.diagnose.rotor_calibration import text
-
-        return text(self.to_dict())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Convert to plain values of schema ``bemt.rotor_calibration/1``."""
-        from bemt.judge.diagnose.rotor_calibration import document
-
-        return document(self.source.case, self.found, self.recordings)
-
-    def write(self, folder: str | os.PathLike[str]) -> Propeller:
-        """Write the case of the rotor as measured, and load it.
-
-        Parameters
-        ----------
-        folder : str or path
-            Folder for the case; not the one of the case itself.
-
-        Returns
-        -------
-        Propeller
-            The rotor with its narrower band.
-        """
-        from bemt.judge.diagnose.rotor_calibration import write
-
-        with in_words_of_the_library():
-            write(self.source.case, self.found, self.recordings, path_text("folder", folder))
-        return load(folder)
-
-
-def calibrate_rotor(
-    recordings: Recording | Sequence[Recording], propeller: Propeller | Recording, *,
-    progress: Callable[[str], None] | None = None,
-) -> CalibratedRotor:  # fmt: skip
-    r"""Learn a rotor's blade as built from clean runs of it.
-
-    Parameters
-    ----------
-    recordings : path or sequence of paths
-        Runs of this rotor with nothing else changed; best a static one and a flight point.
-    propeller : Propeller or path
-        Its case, in a file: what is learnt is written next to a copy of it.
-    progress : callable, optional
-        Called with a line of text.
-
-    Returns
-    -------
-    CalibratedRotor
-        ``.converged``, ``.text``, ``.to_dict()``, ``.write(folder)``.
-
-    Raises
-    ------
-    InputError
-        For recordings without loads, and for loads that no blade of the case has.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from bemt.app.library import propeller
-    >>> folder = Path(tempfile.mkdtemp())
-    >>> case = propeller("10x5").write(folder / "case")
-    >>> d = load(case).solve(rpm=[4000, 6000, 8000])
-    >>> rows = [f"{n},{T:.4f},{Q:.5f}" for n, T, Q in zip(d.rpm, 1.05 * d.thrust_N, 1.05 * d.torque_Nm)]
-    >>> _ = (folder / "run.csv").write_text("\n".join(["rpm,thrust_N,torque_Nm", *rows]))
-    >>> rotor = calibrate_rotor(folder / "run.csv", case)
-    >>> rotor.converged, rotor.to_dict()["points"], rotor.text.splitlines()[0].startswith("prop_10x5: 3 points")
-    (True, 3, True)
-    >>> measured = rotor.write(folder / "measured").solve(rpm=6000)
-    >>> bool(measured.u["thrust_N"][0] < 0.7 * d.u["thrust_N"][1])
-    True
-    """
-    from bemt.judge.diagnose.rotor_calibration import calibrate
-
-    given = [recordings] if isinstance(recordings, (str, os.PathLike)) else list(recordings)
-    paths = tuple(path_text("recordings", one) for one in given)
-    if not paths:
-        raise InputError(Fault("", "recordings", "none", "one or more"))
-    path = propeller.case.path if isinstance(propeller, Propeller) else Path(path_text("propeller", propeller))
-    with in_words_of_the_library():
-        case, found = calibrate(paths, str(path), progress)
-    return CalibratedRotor(load(case.path), found, paths)
-
-
-@dataclass(frozen=True, eq=False)
-class ExportedCase:
-    """What an export wrote, returned by :func:`export`.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files are.
-    manifest : dict
-        Contents of ``manifest.json``: files with hashes, what each target holds, its greatest error, notes.
-
-    Examples
-    --------
-    See :func:`export`.
-    """
-
-    folder: Path
-    manifest: dict[str, Any]
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Files that were written now."""
-        from bemt.tools.exports.folder import listed
-
-        return tuple(self.folder / name for name in listed(self.manifest))
-
-    @property
-    def text(self) -> str:
-        """What was written and how well it holds the case, as on the command line."""
-        from bemt.tools.exports.folder import text
-
-        return text(self.manifest, self.folder)
-
-
-def export(
-    propeller: Propeller | str, folder: str | os.PathLike[str], formats: str | Sequence[str] = "stl", *,
-    rpm: float | None = None, airspeed_m_s: float | None = None, hold: Sequence[str] = (),
-) -> ExportedCase:  # fmt: skip
-    """Write a propeller or fan for other programs.
-
-    Parameters
-    ----------
-    propeller : Propeller or str
-        Propeller, case or label.
-    folder : str or path
-        Folder for the files and ``manifest.json``.
-    formats : str or sequence of str
-        Targets, such as ``"stl"``, ``"jsbsim"`` or ``"qprop"``; docs/exports.md lists them.
-    rpm : float, optional
-        Highest speed of tables and fits, speed of a disk; from the case by default. [rev/min]
-    airspeed_m_s : float, optional
-        Axial speed of disks, blades and openfoam; from the case by default. [m/s]
-    hold : sequence of str
-        Refuse targets that cannot represent these: torque, airspeed, density and others.
-
-    Returns
-    -------
-    ExportedCase
-        ``.files``, ``.text``, ``.manifest``.
-
-    Raises
-    ------
-    InputError
-        For unknown targets, and for targets that were refused; other targets are written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> made = export("10x5", tempfile.mkdtemp(), "qprop")
-    >>> [file.suffix for file in made.files], "qprop" in made.text.lower()
-    (['.qprop'], True)
-    >>> export("10x5", tempfile.mkdtemp(), "qpropp")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-        ...
-    bemt.base.errors.InputError: formats: got 'qpropp'; expected one of ...
-    """
-    from bemt.tools.cfd.openfoam.write import Run, check_run
-    from bemt.tools.exports import target_ids
-    from bemt.tools.exports.folder import export_case
-
-    wanted = [formats] if isinstance(formats, str) else list(formats)
-    known = target_ids()
-    faults = [Fault("", "formats", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
-    flow = Run(
-        rpm=None if rpm is None else number("rpm", rpm),
-        airspeed_m_s=None if airspeed_m_s is None else number("airspeed_m_s", airspeed_m_s),
+    return of_label(
+        label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg
     )
-    faults += check_run(flow)
-    if faults:
-        raise InputError(faults)
-    out = Path(path_text("folder", folder))
-    try:
-        with in_words_of_the_library():
-            return ExportedCase(out, export_case(rotor_of(propeller).case, out, wanted, flow=flow, hold=tuple(hold)))
-    except OSError as error:
-        raise InputError(system_fault(error)) from error
 
 
-def report(
-    cases: Recording | Sequence[Recording], folder: str | os.PathLike[str], *, title: str = "", author: str = "",
-    date: str = "", progress: Callable[[str], None] | None = None,
-) -> tuple[Path, Path]:  # fmt: skip
-    """Write the validation report of cases: one HTML file that opens from disk, and a summary in Markdown.
+@action(
+    "Propellers and fans", "new 10x5", words=("label",), shown=True,
+    common=("stations", "scan", "fan", "blades", "kv", "cells", "rpm", "out"),
+)  # fmt: skip
+def new(
+    label: str | None = None, *, stations: str | os.PathLike[str] | None = None,
+    scan: str | os.PathLike[str] | None = None, unit: Literal["mm", "m", "in"] | None = None,
+    diameter_mm: float | None = None, diameter_in: float | None = None, fan: bool = False,
+    blades: Count | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, series: str | None = None,
+    kv: float | None = None, cells: Count | None = None, campaign: bool = False,
+    out: str | os.PathLike[str] | None = None,
+) -> Told:  # fmt: skip
+    """Write a new case: from a label, blade stations, a scan, or a fan's diameter.
 
     Parameters
     ----------
-    cases : path or sequence of paths
-        Case files, or folders of cases.
-    folder : str or path
-        Folder for the report and its sweep.
-    title, author, date : str
-        For the head of the page.
+    label : str, optional
+        As on the propeller: ``10x5``; with ``--fan`` the diameter, ``70mm``; with a file the name of the case.
+    stations : str or path, optional
+        File with blade stations: CSV with r_over_R, chord_over_R, beta_deg (or r_mm, chord_mm); UIUC geometry; APC PE0.
+    scan : str or path, optional
+        Scan or CAD model of the blade (STL, OBJ, STEP); the label is then the name of the case.
+    unit : {"mm", "m", "in"}, optional
+        With a scan: its unit, if the file does not state it.
+    diameter_mm, diameter_in : float, optional
+        With stations or a fan: the diameter. [mm] or [in]
+    fan : bool
+        A ducted fan; with a diameter the label is the name of the case.
+    blades : int, optional
+        Number of blades; from the label by default, else 2.
+    rpm : float, optional
+        Speed of the operating point; by default one of a typical tip speed. [rev/min]
+    airspeed_m_s : float
+        Airspeed of the operating point. [m/s]
+    series : str, optional
+        Maker and series, such as ``"APC Thin Electric"`` or ``apce``.
+    kv : float, optional
+        Speed constant of the motor. [rev/min/V]
+    cells : int, optional
+        LiPo cells in series, with K_v.
+    campaign : bool
+        Also write ``cfd/campaign.toml``: OpenFOAM runs on three grids.
+    out : str or path, optional
+        Folder to write; named after the label by default.
+
+    Returns
+    -------
+    Told
+        Folder and files, and the next commands.
+
+    Raises
+    ------
+    InputError
+        For what cannot be read or does not go together; nothing is written then.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> print(new("10x5", out=tempfile.mkdtemp() + "/mine").text)  # doctest: +ELLIPSIS
+    /.../mine: case.toml
+    next: bemt sweep /.../mine
+    """
+    import os
+    import shlex
+
+    from bemt.base.errors import Fault, InputError
+    from bemt.rotors.case import new_folder
+
+    if diameter_in is not None and diameter_mm is not None:
+        raise InputError(Fault("", "--diameter-mm, --diameter-in", "both", "one of them"))
+    diameter_mm = diameter_mm if diameter_in is None else diameter_in * 25.4
+    table, solid = (None if path is None else os.fspath(path) for path in (stations, scan))
+    wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
+                               cells, campaign)  # fmt: skip
+    folder, files = new_folder.write(wanted, None if out is None else os.fspath(out))
+    typed = shlex.quote(folder.as_posix())
+    lines = [f"{folder.as_posix()}: {', '.join(files)}", f"next: bemt sweep {typed}"]
+    lines += [f"      bemt drive {typed}"] if kv is not None else []
+    lines += [f"      bemt cfd {typed}/cfd"] if campaign else []
+    document = {"schema": "bemt.new/1", "folder": folder.as_posix(), "files": files}
+    return Told(document, "\n".join(lines))
+
+
+@action("Solids and CFD", "stations rotor.stl --unit mm --out cases/mine", words=("file",))
+def stations(
+    file: str | os.PathLike[str], *, unit: Literal["mm", "m", "in"] | None = None,
+    out: str | os.PathLike[str] | None = None,
+) -> Told:  # fmt: skip
+    """Turn the blade of a CAD model, a scan or a design file into a case.
+
+    Parameters
+    ----------
+    file : str or path
+        STL, OBJ, STEP; XROTOR, QPROP, DFDC or an AeroDyn driver.
+    unit : {"mm", "m", "in"}, optional
+        Unit of an STL or OBJ that does not state it.
+    out : str or path, optional
+        Folder for case.toml, stations.csv and section files.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.stations/1``.
+
+    Raises
+    ------
+    InputError
+        For a file without a blade.
+
+    Examples
+    --------
+    >>> stations("no/such/rotor.stl")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: no/such/rotor.stl: got ...
+    """
+    from pathlib import Path
+
+    from bemt.rotors.case import from_blade_file, from_solid
+
+    path, folder = Path(file), None if out is None else Path(out)
+    blade = from_blade_file.read_blade(path, unit)
+    told = None if folder is None else str(folder)
+    if blade is not None:
+        if folder is not None:
+            from_blade_file.write(blade, path, folder)
+        return Told(from_blade_file.document(blade, path), from_blade_file.text(blade, path, told))
+    found, scale, words = from_solid.find_stations(path, unit)
+    if folder is not None:
+        from_solid.write(found, scale, path, folder)
+    return Told(from_solid.document(found, scale, path, words), from_solid.text(found, scale, path, words, told))
+
+
+@action("Models and checks", "cite cases/prop_8x5", words=("case",))
+def cite(case: Propeller | str | os.PathLike[str]) -> Told:
+    """List the sources that an answer for a case stands on: method, effects, section tables, bands, data.
+
+    Parameters
+    ----------
+    case : Propeller, str or path
+        Propeller, case or label.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.sources/1``: sources with ``kind``, ``name`` and ``source``.
+
+    Examples
+    --------
+    >>> found = cite("10x5").to_dict()["sources"]
+    >>> [s["source"][:25] for s in found if s["name"] == "swirl"]
+    ['Glauert (1935), Airplane ']
+    """
+    import shutil
+
+    from bemt.rotors.case import sources
+    from bemt.rotors.propeller import rotor_of
+
+    found = rotor_of(case).case
+    width = min(100, shutil.get_terminal_size((100, 24)).columns)
+    return Told(sources.document(found), sources.text(found, width))
+
+
+@action("Models and checks", "validate uiuc", words=("folders",))
+def validate(
+    folders: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], *, reynolds: float | None = None,
+    off: Sequence[str] = (), match_J0: bool = False, as_drawn: bool = False,
+    out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
+) -> Told:  # fmt: skip
+    """Compare BEMT with folders of measured propellers in UIUC layout.
+
+    Parameters
+    ----------
+    folders : path or sequence of paths
+        Folders with geometry, static and J files, or ``uiuc`` for the installed data.
+    reynolds : float, optional
+        Section tables at this one Reynolds number.
+    off : sequence of str
+        Effects to switch off.
+    match_J0 : bool
+        Also turn each blade to the measured zero-thrust J (an experiment that uses the measurement).
+    as_drawn : bool
+        Use the stations as given, without the population of rotors as built.
+    out : str or path, optional
+        Folder for the tables.
     progress : callable, optional
         Called with a line of text.
 
     Returns
     -------
-    tuple of Path
-        The HTML file and the summary.
+    Told
+        Schema ``bemt.validation/1``; ``exit_code`` 1 when points did not converge.
 
     Raises
     ------
     InputError
-        If no case is found, or the folder cannot be written.
+        If a folder contains no propeller that can be compared.
 
     Examples
     --------
-    >>> report("no/such/case", "out")  # doctest: +ELLIPSIS
+    >>> validate("no/such/folder")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: no/such/case: got ...
+    bemt.base.errors.InputError: no/such/folder: got ...
     """
-    from bemt.results.report import write
+    import os
 
-    given = [cases] if isinstance(cases, (str, os.PathLike)) else list(cases)
-    about = {"title": title, "author": author, "date": date}
-    with in_words_of_the_library():
-        return write([path_text("cases", one) for one in given], path_text("folder", folder),
-                     progress or (lambda line: None), about)[1]  # fmt: skip
+    from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+    from bemt.base.given import paths_text
+    from bemt.rotors.validate import propellers
+
+    if reynolds is not None and not 1e3 <= reynolds <= 1e9:
+        raise InputError(Fault("", "--reynolds", f"{reynolds:g}", "a Reynolds number from 1e3 to 1e9"))
+    effects = propellers.effects_without(off)
+    found = [propellers.where(name) for name in paths_text("folders", folders)]
+    document = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
+    if out is not None:
+        propellers.write(document, os.fspath(out))
+    code = EXIT_UNCONVERGED if document["unconverged"] else EXIT_OK
+    return Told(document, propellers.text(document), exit_code=code)
 
 
-def cite(propeller: Propeller | str) -> tuple[Source, ...]:
-    """List what an answer for this propeller stands on: method, effects, section tables, bands, data.
+@action("Models and checks", "calibrate uiuc --out calibration", words=("files",))
+def calibrate(
+    files: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (), *,
+    test: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
+    out: str | os.PathLike[str] | None = None, progress: Callable[[str], None] | None = None,
+) -> Told:  # fmt: skip
+    """Refit K1/K2 on measured propellers, with intervals and scores.
 
     Parameters
     ----------
-    propeller : Propeller or str
-        Propeller, case or label.
+    files : path or sequence of paths
+        Files or folders with diameter, pitch, rpm and thrust or CT; ``uiuc``, the installed data, by default.
+    test : path or sequence of paths
+        Held-out data: scored, never fitted.
+    out : str or path, optional
+        Folder for tables and JSON.
+    progress : callable, optional
+        Called with a line of text.
 
     Returns
     -------
-    tuple of bemt.rotors.case.sources.Source
-        Each with ``kind``, ``name`` and ``source``.
+    Told
+        Schema ``bemt.calibration/2``.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read or say nothing of thrust.
 
     Examples
     --------
-    >>> found = cite("10x5")
-    >>> [s.source[:25] for s in found if s.name == "swirl"]
-    ['Glauert (1935), Airplane ']
-    >>> sorted({s.kind for s in found})
-    ['band', 'comparison', 'effect', 'method', 'sections']
+    >>> calibrate("no/such/file.csv")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    bemt.base.errors.InputError: no/such/file.csv: got ...
     """
-    from bemt.rotors.case.sources import sources
+    import os
 
-    return sources(rotor_of(propeller).case)
+    from bemt.base.given import paths_text
+    from bemt.rotors import k1k2_calibration as k1k2
+
+    fitted, held = paths_text("files", files), paths_text("test", test)
+    points, scored = k1k2.read(fitted, held)
+    found: dict[str, Any] = k1k2.document(points, scored, fitted, held, progress or (lambda line: None))
+    if out is not None:
+        k1k2.write(found, os.fspath(out))
+    return Told(found, k1k2.text(found))

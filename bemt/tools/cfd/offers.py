@@ -1,1 +1,3 @@
-"""What this tool offers to the house (:mod:`bemt.base.plugins`)."""
+"""What campaigns of CFD offer to the house (:mod:`bemt.base.plugins`)."""
+
+ACTIONS = {"cfd": "bemt.tools.cfd.actions:cfd"}
