@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bemt.base.units import G0, INCH
 from bemt.data.readers._uiuc_names import class_of, parse_file_name
-from bemt.tools.design import choose
+from bemt.tools.design.search import choose
 from bemt.tools.design.motors_file import KnownMotor
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from bemt.base.units import G0
-from bemt.tools.design import choose
+from bemt.tools.design.search import choose
 from bemt.tools.design.motors_file import KnownMotor
 
 LOADED_CELL_V = 3.84 * 0.94

@@ -109,7 +109,7 @@ def relinked(text: str, source: Path) -> str:
 
 def commands() -> str:
     """Page of all commands, from their parsers."""
-    from bemt.app.commands.cli import GROUPS, build_parser
+    from bemt.app.cli import GROUPS, build_parser
 
     parser = build_parser()
     groups: dict[str, list[str]] = {name: [] for name in GROUPS}

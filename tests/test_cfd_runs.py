@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.readers.cfd_run import RunToml, toml_text
 from bemt.data.recordings.cfd_run import assemble

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.tools.design import choose
+from bemt.tools.design.search import choose
 from bemt.tools.design.answer import best_of_each, front
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.drive import drive_result

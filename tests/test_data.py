@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base import cache, folders
 from bemt.base.errors import InputError
 from bemt.data.recordings import archive as data_archive

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemt
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case

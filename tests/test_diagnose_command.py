@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
-from bemt.app.commands.cli import build_parser, main
+from bemt.app.cli import build_parser, main
 from bemt.base.errors import InputError
 from bemt.judge.diagnose import assemble, chain, document, record
 from bemt.judge.diagnose.load import load

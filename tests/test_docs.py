@@ -32,7 +32,7 @@ PACKAGES = ("bemt", "geometry")
 # What users call and plug-ins implement: here every parameter is documented. Elsewhere one line will do, and what a
 # docstring does say must be right.
 FACE = (
-    "bemt|bemt.app.library.answers|bemt.app.library.rotors|bemt.physics.dataset.make|bemt.physics.dataset.points|bemt.physics.effects.base|bemt.data.readers"
+    "bemt|bemt.judge.actions|bemt.judge.import_files|bemt.judge.diagnose.ask|bemt.rotors.actions|bemt.rotors.propeller|bemt.data.actions|bemt.results.actions|bemt.tools.drive.actions|bemt.physics.dataset.make|bemt.physics.dataset.points|bemt.physics.effects.base|bemt.data.readers"
     "|bemt.tools.exports|bemt.base.errors"
 )
 # Types of numbers that have a dimension: float, array_like, (N,) float, tuple of float; not counts, masks or records.
@@ -137,7 +137,7 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["bemt.app.library.answers", "bemt.app.library.rotors", "bemt.physics.dataset"]
+    "module", ["bemt.judge.actions", "bemt.rotors.actions", "bemt.rotors.propeller", "bemt.physics.dataset"]
 )
 def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
     """Its own, or a line of its class's; pytest runs them."""
@@ -217,7 +217,7 @@ def test_the_two_commands_are_those_that_ci_runs(project: Path) -> None:
 
 
 def test_the_commands_of_the_page_exist(project: Path) -> None:
-    from bemt.app.commands.cli import build_parser
+    from bemt.app.cli import build_parser
 
     page = (project / "docs" / "command_line.md").read_text(encoding="utf-8")
     table = re.findall(r"^\| `bemt ([^`]+)` \| (.*) \|$", page, flags=re.MULTILINE)
@@ -241,7 +241,7 @@ def test_the_structure_names_every_room(project: Path) -> None:
 
 
 def test_the_readme_is_short_and_its_commands_exist(project: Path) -> None:
-    from bemt.app.commands.cli import build_parser
+    from bemt.app.cli import build_parser
 
     readme = (project / "README.md").read_text(encoding="utf-8")
     assert len(readme.split()) <= 900
@@ -280,7 +280,7 @@ DOCUMENTS = sorted(path.name for path in (Path(__file__).parents[1] / "docs").gl
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_the_commands_of_the_documents_exist(project: Path, document: str) -> None:
-    from bemt.app.commands.cli import build_parser
+    from bemt.app.cli import build_parser
 
     for line in shell_commands((project / "docs" / document).read_text(encoding="utf-8")):
         if found := re.match(r"(?:.* -m )?bemt (.*)", line.rpartition("&& ")[2]):

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.physics import effects
 from bemt.rotors.case import load_case

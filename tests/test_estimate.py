@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import bemt
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base.units import INCH
 from bemt.physics import k1k2
 from bemt.physics.air import Air

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
 from bemt.rotors.case import Case, load_case

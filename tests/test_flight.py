@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from flight_files import broken_copies
 
-from bemt.app.commands.cli import main
-from bemt.app.library.rotors import rotor_of
+from bemt.app.cli import main
+from bemt.rotors.propeller import rotor_of
 from bemt.base.errors import InputError
 from bemt.judge.diagnose.rule import decide
 from bemt.rotors.case import load_case

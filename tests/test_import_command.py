@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.data.recordings.choice import Choice
 from bemt.data.recordings.load import document, import_file
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 
 TABLE = "rpm,thrust_N,torque_Nm\n4000,1.1,0.016\n6000,2.4,0.034\n8000,4.3,0.061\n"
 Put = Callable[[str, str], str]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bemt
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.rotors.case import case_of, fresh, load_case
 from bemt.rotors.case.unknowns import section_of
 

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.tools.cfd.openfoam import Body, Settings, Sweep, case_files

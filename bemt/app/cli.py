@@ -14,7 +14,8 @@ from collections.abc import Sequence
 
 from bemt import __version__
 from bemt.app import registry
-from bemt.app.face import Parser, described, parser_of, run
+from bemt.app.face import Parser, described, parser_of, run, values
+from bemt.app.face import parsed as read_words
 from bemt.app.old_names import COMMANDS
 from bemt.app.terminal import coloured, complain
 from bemt.base import plugins
@@ -63,6 +64,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     gc.set_threshold(50_000, 20, 20)  # looking for cycles where there are few took 5 % of a diagnosis
     with coloured():
         return _main(sys.argv[1:] if argv is None else list(argv))
+
+
+def parsed(argv: Sequence[str]) -> tuple[str, dict[str, object]]:
+    """Command and arguments of a line, as its action gets them.
+
+    >>> parsed(["sweep", "cases/", "--jobs", "2"])
+    ('sweep', {'cases': ['cases/'], 'jobs': 2})
+    """
+    words = list(argv[1:] if argv[0] == LAB else argv)
+    function = registry.find(COMMANDS.get(words[0], words[0]))
+    return about(function).command, values(function, read_words(function, words[1:]))
 
 
 def _dispatch(argv: list[str]) -> int:

@@ -243,14 +243,19 @@ def _fault(one: Parameter, got: str, expected: str) -> Exception:
     return InputError(Fault("", one.option, got, expected))
 
 
-def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> int:
-    """Parse, call, show; gives the exit code."""
-    told = about(function)
-    typed = old_names.renamed(told.command, argv, {p.option for p in parameters(function)}, complain)
+def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
+    """Words of a command line, by the parameters of its action."""
+    typed = old_names.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
     if "--help-all" in typed:
         parser_of(function, prog, everything=True).print_help()
-        return EXIT_OK
-    args = parser_of(function, prog).parse_args(typed)
+        raise SystemExit(EXIT_OK)
+    found: argparse.Namespace = parser_of(function, prog).parse_args(typed)
+    return found
+
+
+def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> int:
+    """Parse, call, show; gives the exit code."""
+    told, args = about(function), parsed(function, argv, prog)
     if args.json and hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     given = values(function, args)

@@ -25,7 +25,9 @@ def renamed(command: str, argv: Sequence[str], known: Collection[str], say: Call
     (['10x5', '--airspeed-m-s', '5'], ['estimate: --airspeed is now --airspeed-m-s'])
     """
     out: list[str] = []
-    for word in argv:
+    for k, word in enumerate(argv):
+        if k and argv[k - 1] == "--polar":
+            word = word.removeprefix("fixed:")
         name, mark, value = word.partition("=")
         new = None if name in known else EVERYWHERE.get(name)
         if new is None:
