@@ -10,10 +10,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from bemt.app.commands import report
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt.app.commands import report
 from bemt.base.checkout import commit
 from bemt.base.errors import InputError
 from bemt.base.tables import csv_text

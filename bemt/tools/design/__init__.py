@@ -1,1 +1,1 @@
-"""Which propeller, which motor constant, and a better blade: labels and motors against a target, blades for a thrust."""
+"""Which propeller and motor constant reach a target, and a blade that does it better."""
