@@ -9,9 +9,9 @@ import pytest
 
 from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
-from bemt.tools.design import choose
 from bemt.tools.design.answer import best_of_each, front
 from bemt.tools.design.motors_file import KnownMotor, read_motors
+from bemt.tools.design.search import choose
 from bemt.tools.drive import drive_result
 
 FEW = ("9x6", "10x4.5", "11x5.5", "10x7")

@@ -55,7 +55,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Rank; 1 if nothing meets the target with the probability asked for."""
     from bemt.base.tables import json_text
-    from bemt.tools.design import answer, choose
+    from bemt.tools.design import answer
+    from bemt.tools.design.search import choose
 
     table = choose(
         args.thrust, args.cells, kv=args.kv, motors=args.motors or (),

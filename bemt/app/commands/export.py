@@ -44,16 +44,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     held = f"refuse targets that cannot represent it: {words}"
     parser.add_argument("--hold", metavar="WHAT", help=held, **_options.MANY)
     parser.add_argument(
-        "--sideslip-deg", type=float, default=0.0, metavar="A", help="openfoam: angle between shaft and wind, 0 to 90"
+        "--sideslip-deg", type=float, metavar="A", help="openfoam: angle between shaft and wind, 0 to 90"
     )
     grid = "openfoam: cells on the blade are R/2^(level+2), all others scale (default 6; 5 is faster)"
-    parser.add_argument("--level", type=float, default=6.0, help=grid)
+    parser.add_argument("--level", type=float, help=grid)
     domain = "openfoam: free field, or a cylinder of the propeller's diameter"
-    parser.add_argument("--domain", choices=("free", "pipe"), default="free", help=domain)
+    parser.add_argument("--domain", choices=("free", "pipe"), help=domain)
     sector = "openfoam: periodic part (default: one blade from three up, else half; full in oblique flow)"
     parser.add_argument("--sector", choices=("half", "blade", "full"), help=sector)
     models = ("kOmegaSST", "realizableKE")
-    parser.add_argument("--turbulence", choices=models, default=models[0], help=f"openfoam (default {models[0]})")
+    parser.add_argument("--turbulence", choices=models, help=f"openfoam (default {models[0]})")
     law = parser.add_mutually_exclusive_group()
     fast = "openfoam: rhoSimpleFoam (default above a tip Mach number of 0.5)"
     law.add_argument("--compressible", dest="solver", action="store_const", const="compressible", help=fast)
@@ -98,12 +98,12 @@ def _request(args: argparse.Namespace) -> Print | None:
 def run(args: argparse.Namespace) -> int:
     """Write every valid target of every valid case; 2 if one was refused."""
     from bemt.base.tables import json_text
-    from bemt.tools.cfd.openfoam.write import Run
     from bemt.tools.exports import folder
 
     request = _request(args)
-    flow = Run(rpm=args.rpm, airspeed_m_s=args.airspeed, sideslip_deg=args.sideslip_deg, level=args.level,
-               domain=args.domain, sector=args.sector, turbulence=args.turbulence, solver=args.solver)  # fmt: skip
+    given = {"rpm": args.rpm, "airspeed_m_s": args.airspeed, "sideslip_deg": args.sideslip_deg, "level": args.level,
+             "domain": args.domain, "sector": args.sector, "turbulence": args.turbulence,
+             "solver": args.solver}  # fmt: skip
     made, refused = folder.export_cases(
         args.case,
         args.out,
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
         args.unit,
         (args.fillet_mm or 0.0) if request is None else 0.0,
         (args.min_thickness_mm or 0.0) if request is None else 0.0,
-        flow,
+        given,
         tuple(dict.fromkeys(args.hold or ())),
         request,
     )

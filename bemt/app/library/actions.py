@@ -384,24 +384,23 @@ def export(
         ...
     bemt.base.errors.InputError: formats: got 'qpropp'; expected one of ...
     """
-    from bemt.tools.cfd.openfoam.write import Run, check_run
     from bemt.tools.exports import target_ids
-    from bemt.tools.exports.folder import export_case
+    from bemt.tools.exports.base import Job
+    from bemt.tools.exports.folder import export_case, option_faults
 
     wanted = [formats] if isinstance(formats, str) else list(formats)
     known = target_ids()
     faults = [Fault("", "formats", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
-    flow = Run(
-        rpm=None if rpm is None else number("rpm", rpm),
-        airspeed_m_s=None if airspeed_m_s is None else number("airspeed_m_s", airspeed_m_s),
-    )
-    faults += check_run(flow)
+    point = {"rpm": rpm, "airspeed_m_s": airspeed_m_s}
+    given = {key: number(key, value) for key, value in point.items() if value is not None}
+    faults += option_faults(given, str)
     if faults:
         raise InputError(faults)
     out = Path(path_text("folder", folder))
     try:
         with in_words_of_the_library():
-            return ExportedCase(out, export_case(rotor_of(propeller).case, out, wanted, flow=flow, hold=tuple(hold)))
+            job = Job(rotor_of(propeller).case, given.get("rpm"), given.get("airspeed_m_s"), tuple(hold))
+            return ExportedCase(out, export_case(job, out, wanted))
     except OSError as error:
         raise InputError(system_fault(error)) from error
 

@@ -11,7 +11,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import find_family
+from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import k1k2_case

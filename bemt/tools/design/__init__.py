@@ -2,9 +2,3 @@
 
 ``bemt.design(6.0, 10, airspeed_m_s=15.0, rpm=7000)`` designs one: ``help(bemt.app.library.design)``.
 """
-
-from __future__ import annotations
-
-from bemt.tools.design.search import Target, choose
-
-__all__ = ["Target", "choose"]
