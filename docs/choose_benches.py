@@ -20,7 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bemt.base.units import G0, INCH
-from bemt.data.readers._uiuc_names import class_of, parse_file_name
+from bemt.data.readers.uiuc_names import class_of, parse_file_name
 from bemt.tools.design.motors_file import KnownMotor
 from bemt.tools.design.search import choose
 

@@ -833,7 +833,7 @@ def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, 
 
     def now(formats: list[str], unit: str = "mm", solver: str | None = None) -> set[str]:
         """What is in the folder after an export, the owner's own files aside, which are as they were."""
-        export_case(case, tmp_path, formats, unit, COARSE, Run(solver=solver))
+        export_case(Job(case, unit=unit, solid=COARSE, own={"solver": solver}), tmp_path, formats)
         there = files(tmp_path)
         assert {name: there.pop(name) for name in mine} == mine
         manifest = json.loads(there.pop("manifest.json"))
@@ -858,7 +858,7 @@ def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, 
     assert {p.name for p in tmp_path.iterdir() if p.is_dir()} == {"constant"}, "no empty folders"
     edited = tmp_path / "prop_8x5.obj"
     edited.write_text("my own edit")
-    export_case(case, tmp_path, ["stl"], "mm", COARSE)
+    export_case(Job(case, solid=COARSE), tmp_path, ["stl"])
     assert edited.read_text() == "my own edit", "not what the manifest lists any more"
 
 
@@ -878,10 +878,10 @@ def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, sch
     listed = [{"path": path, "sha256": digest} for path in paths]
     (out / "manifest.json").write_text(json.dumps({"schema": schema, "files": listed}))
     before = files(tmp_path)
-    export_case(case, out, ["stl"], "mm", COARSE)
+    export_case(Job(case, solid=COARSE), out, ["stl"])
     after = files(tmp_path)
     gone = {"out/d"} if schema == "geometry.export/1" else set()
     assert {name for name in before if after.get(name) != before[name]} == {"out/manifest.json", *gone}
     for text in ("", "[]", "{}", '{"schema": "geometry.export/1", "files": [1]}', "[" * 100_000, "\xff"):
         (out / "manifest.json").write_bytes(text.encode("latin-1"))
-        export_case(case, out, ["stl"], "mm", COARSE)
+        export_case(Job(case, solid=COARSE), out, ["stl"])

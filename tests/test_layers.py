@@ -226,6 +226,8 @@ def violations(modules: Mapping[str, str]) -> list[str]:
         allowed = set().union(*(kinds for room, kinds in MAY.items() if match(name, room)))
         found += [f"{name}:{line}: {kind} in the pure core: {words}" for kind, line, words in touched
                   if kind not in allowed]  # fmt: skip
+        for base, names, line, _ in imported:
+            found += [f"{name}:{line}: {word} is private to its room" for word in _private(name, base, names)]
         for target, line, when in (*targets(imported, modules), *_before(name, modules)):
             top = target.split(".")[0]
             if when == "top" and (top in HEAVY or (top == "numba" and not match(name.removeprefix("bemt."), COMPILED))):
@@ -260,6 +262,15 @@ def violations(modules: Mapping[str, str]) -> list[str]:
     except CycleError as error:
         found.append(f"{error.args[1][0]}:1: imports go round: {' <- '.join(error.args[1])}")
     return found
+
+
+def _private(module: str, base: str, names: Iterable[str]) -> Iterator[str]:
+    """Modules and names with a leading ``_`` that a module takes from another room."""
+    room, other = (match[0] if (match := TOOL.match(name)) else place(name) for name in (module, f"{base}."))
+    if base.split(".")[0] in ("bemt", "geometry") and room != other:
+        for word in [f"{base}.{name}" for name in names] or [base]:
+            if any(re.match(r"_(?!_)", part) for part in word.split(".")):
+                yield word
 
 
 def _before(name: str, modules: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
@@ -351,6 +362,16 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ("bemt.novelty", "", "has no place in the flow; give it one in ROOMS"),
         ("bemt.physics.air", "from .units import INCH", "relative import; write the whole name"),
         ("bemt.physics.air", "import bemt.nowhere", "bemt.nowhere does not exist"),
+        (
+            "bemt.data.recordings.load",
+            "from bemt.data.readers import _words",
+            "bemt.data.readers._words is private to its room",
+        ),
+        (
+            "bemt.data.recordings.load",
+            "def f():\n    from bemt.base.units import _words",
+            "bemt.base.units._words is private to its room",
+        ),
         ("bemt.physics.bem.solver", "def f():\n    print(1)", "print in the pure core: print()"),
         ("bemt.physics.bem.solver", "import sys\nsys.stderr.write('x')", "print in the pure core: sys.stderr"),
         ("bemt.physics.bem.solver", "def f(p):\n    return open(p)", "files in the pure core: open()"),

@@ -32,9 +32,9 @@ from bemt.base import tables
 from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.data import readers as importers
-from bemt.data.readers._uiuc_tables import NO_SPEED
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import adapt, damaged_export, recognised
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of

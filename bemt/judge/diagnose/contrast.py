@@ -205,8 +205,9 @@ def compared(
 
 def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str], case: Any) -> None:
     """Write comparison.json, its text, a picture, and the recordings inside the prediction band of the case."""
+    from bemt.base.page import FIRST
     from bemt.base.tables import json_text, write_atomic
-    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.figures_recording import first_picture
     from bemt.judge.diagnose.load import load_all
 
     out.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers._headings import surely_shaft_speed
+from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of

@@ -18,7 +18,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.proof.items import Item, recording_text
 from bemt.judge.proof.pairs import draw_pairs
 from bemt.physics.sections import rule as section_rule

@@ -14,7 +14,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.given import numbers
 from bemt.base.tables import number_text, text_table
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import find_family
+from bemt.data.readers.uiuc_names import find_family
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import class_of, family_of
+from bemt.data.readers.uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
 from geometry.common import GeometryError
@@ -293,7 +293,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.data.readers._stations import read_stations
+        from bemt.data.readers.stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

@@ -12,7 +12,7 @@ from pathlib import Path
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import find_family
+from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 
 

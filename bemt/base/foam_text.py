@@ -1,4 +1,4 @@
-"""OpenFOAM's dictionary format."""
+"""Text in the dictionary format of OpenFOAM."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text
-from bemt.data.readers._split import decimal_mark, split_table
-from bemt.data.readers._unit_text import unit_of
 from bemt.data.readers._words import plain
+from bemt.data.readers.split import decimal_mark, split_table
+from bemt.data.readers.unit_text import unit_of
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 WIDEST = 0.8

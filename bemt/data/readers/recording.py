@@ -1,7 +1,7 @@
 """What importers of recordings share: cells that become channels, and rows that need a flag.
 
-Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.data.readers._split`), every cell
-a number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.data.readers._headings`.
+Nothing is dropped: every line below the heading becomes a row or a fault (:mod:`bemt.data.readers.split`), every cell
+a number, a text, or NaN with a flag on its row. Headings are read in :mod:`bemt.data.readers.headings`.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
-from bemt.data.readers._columns import Channel, dataset
-from bemt.data.readers._headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._samples import clock_seconds, spikes
-from bemt.data.readers._split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.data.readers._words import english, quantities
+from bemt.data.readers.columns import Channel, dataset
+from bemt.data.readers.headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
+from bemt.data.readers.samples import clock_seconds, spikes
+from bemt.data.readers.split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.physics.dataset import Dataset
 
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0

@@ -12,7 +12,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, load_text, number
-from bemt.data.readers._uiuc_names import parse_file_name
+from bemt.data.readers.uiuc_names import parse_file_name
 
 NO_SPEED = "no rpm in the file name"
 """What is missing where a line over advance ratio has no name of the database."""

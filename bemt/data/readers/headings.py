@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from bemt.base import units
-from bemt.data.readers._unit_text import FORCES, TWO_MEANINGS, WEIGHTS, si_name, unit_for, unit_of, weight_of
 from bemt.data.readers._words import english, plain, quantities
+from bemt.data.readers.unit_text import FORCES, TWO_MEANINGS, WEIGHTS, si_name, unit_for, unit_of, weight_of
 
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"

@@ -17,8 +17,8 @@ from bemt.base import units
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, number
-from bemt.data.readers._unit_text import unit_of
 from bemt.data.readers._words import english, quantities
+from bemt.data.readers.unit_text import unit_of
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
