@@ -41,17 +41,17 @@ ROOMS: tuple[str, ...] = (
     # data
     "data.readers|data.readers.*",
     "data.recordings|data.recordings.*",
-    "data",
+    "data|data.actions",
     "rotors|rotors.*",
     # judge
     "judge.compare|judge.compare.*",
     "judge.diagnose|judge.diagnose.*",
     "judge.proof|judge.proof.*",
-    "judge",
+    "judge|judge.actions|judge.import_files",
     # results
     "results.sweep|results.sweep.*",
     "results.report|results.report.*",
-    "results",
+    "results|results.actions",
     "tools|tools.*",
     # app
     "app|app.*",
@@ -69,7 +69,9 @@ MAY: dict[str, set[str]] = {
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},
     "bemt.rotors.case|bemt.rotors.case.*": {"files"},
-    "bemt.rotors.population": {"files"},
+    "bemt.rotors.population|bemt.rotors.propeller|bemt.rotors.actions": {"files"},
+    "bemt.judge.diagnose.contrast|bemt.judge.diagnose.ask|bemt.judge.import_files": {"files"},
+    "bemt.results.actions": {"clock"},
     "bemt.data.readers|bemt.data.readers.*": {"files"},
     "bemt.data.recordings.adapt": {"files"},
     "bemt.data.recordings.archive": {"files"},

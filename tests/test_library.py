@@ -207,8 +207,8 @@ def test_a_drive_of_a_label_stays_near_what_such_drives_do() -> None:
         (lambda p: bemt.drive(p, kv="900", cells=3), "^kv: "),  # type: ignore[arg-type]
         (lambda p: bemt.drive(p, kv=900, cells=3.5), "whole number"),  # type: ignore[arg-type]
         (lambda p: bemt.drive("no/such/case", kv=900, cells=3), "no/such/case"),
-        (lambda p: bemt.diagnose([], p), "^recording: "),
-        (lambda p: bemt.diagnose({"rpm": [5000]}, p), "^recording: "),
+        (lambda p: bemt.diagnose([], p), "^recordings: "),
+        (lambda p: bemt.diagnose({"rpm": [5000]}, p), "^recordings: "),
         (lambda p: bemt.compare("a.csv", "b.csv", diameter_m=254), "Divide by 1000"),
     ],
 )
@@ -262,7 +262,7 @@ def test_a_plan_takes_a_frame_or_a_file(tmp_path: Path) -> None:
 
 def test_a_report_of_one_case(tmp_path: Path) -> None:
     case = bemt.propeller("10x5").write(tmp_path / "case")
-    html, summary = bemt.report(case, tmp_path / "out", title="Mine")
+    html, summary = bemt.report(case, out=tmp_path / "out", title="Mine").files
     assert "Mine" in html.read_text(encoding="utf-8") and summary.exists()
 
 

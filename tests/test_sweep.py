@@ -435,8 +435,8 @@ def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.Captur
     path = str(make_case(tmp_path))
     assert main(["sweep", path, "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e6"]) == 0
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e-6"]) == 1
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e6"]) == 0
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e-6"]) == 1
     assert "BEMT thrust" in capsys.readouterr().err
 
 

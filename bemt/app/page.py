@@ -146,8 +146,8 @@ def exports(st: Any, propeller: bemt.Propeller) -> None:
             right.code(written.text.replace(folder, "."), language=None)
             right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
     with st.expander("Sources of this answer"):
-        for source in bemt.cite(propeller).to_dict()["sources"]:
-            st.markdown(f"**{source['name']}** ({source['kind']}): {source['source']}")
+        for source in bemt.cite(propeller):
+            st.markdown(f"**{source.name}** ({source.kind}): {source.source}")
 
 
 def main() -> None:

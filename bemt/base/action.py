@@ -13,7 +13,8 @@ import functools
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from bemt.base.errors import EXIT_OK, Fault, InputError
@@ -48,7 +49,8 @@ class Told:
     text: str
     details: str = ""  # everything, where the text is one screen
     exit_code: int = EXIT_OK
-    complaints: tuple[str, ...] = field(default=())  # lines of the error stream
+    complaints: tuple[str, ...] = ()  # lines of the error stream
+    files: tuple[Path, ...] = ()  # what was written
 
     def __str__(self) -> str:
         return self.text

@@ -148,7 +148,8 @@ def report(
     lines = [f"{file}{size if file.name == HTML_NAME else ''}" for file in files]
     faults = tuple(str(fault) for page in book["cases"] for fault in page["result"]["faults"])
     document = {"schema": "bemt.report/1", "files": [str(file) for file in files], "exit_code": book["exit_code"]}
-    return Told(document, "\n".join(lines), exit_code=int(book["exit_code"]), complaints=faults)
+    return Told(document, "\n".join(lines), exit_code=int(book["exit_code"]), complaints=faults,
+                files=tuple(files))  # fmt: skip
 
 
 @action("Models and checks", "effects")

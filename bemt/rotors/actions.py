@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from bemt.rotors.case.estimate import Estimate
+    from bemt.rotors.case.sources import Sources
     from bemt.rotors.propeller import Propeller
 
 __all__ = ["calibrate", "cite", "estimate", "new", "stations", "validate"]
@@ -216,7 +217,7 @@ def stations(
 
 
 @action("Models and checks", "cite cases/prop_8x5", words=("case",))
-def cite(case: Propeller | str | os.PathLike[str]) -> Told:
+def cite(case: Propeller | str | os.PathLike[str]) -> Sources:
     """List the sources that an answer for a case stands on: method, effects, section tables, bands, data.
 
     Parameters
@@ -226,23 +227,18 @@ def cite(case: Propeller | str | os.PathLike[str]) -> Told:
 
     Returns
     -------
-    Told
-        Schema ``bemt.sources/1``: sources with ``kind``, ``name`` and ``source``.
+    Sources
+        Tuple of :class:`bemt.rotors.case.sources.Source`, each with ``kind``, ``name`` and ``source``; ``.text``.
 
     Examples
     --------
-    >>> found = cite("10x5").to_dict()["sources"]
-    >>> [s["source"][:25] for s in found if s["name"] == "swirl"]
+    >>> [s.source[:25] for s in cite("10x5") if s.name == "swirl"]
     ['Glauert (1935), Airplane ']
     """
-    import shutil
-
-    from bemt.rotors.case import sources
+    from bemt.rotors.case.sources import sources
     from bemt.rotors.propeller import rotor_of
 
-    found = rotor_of(case).case
-    width = min(100, shutil.get_terminal_size((100, 24)).columns)
-    return Told(sources.document(found), sources.text(found, width))
+    return sources(rotor_of(case).case)
 
 
 @action("Models and checks", "validate uiuc", words=("folders",))
