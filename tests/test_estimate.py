@@ -60,10 +60,13 @@ def test_labels_of_one_propeller_give_one_answer(capsys: pytest.CaptureFixture[s
         assert a["rows"] == b["rows"]
 
 
+WRONG = ("8x5x3", "--blades", "2", "--density-kg-m3", "1225")
+
+
 @pytest.mark.parametrize(("words", "message"), [
     (("10x100", "--rpm", "5000"), "Meant 10x10?"),
-    (("8x5x3", "--blades", "2", "--density-kg-m3", "1225", "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
-    (("8x5x3", "--blades", "2", "--density-kg-m3", "1225", "--rpm", "1"), "--density-kg-m3: got 1225; expected 0.01 to 10 kg/m3"),
+    ((*WRONG, "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
+    ((*WRONG, "--rpm", "1"), "--density-kg-m3: got 1225; expected 0.01 to 10 kg/m3"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--chord-mm: got 300; expected 0.02 to 0.4 diameters, 2.54 to 50.8"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--rpm: got -1"),
     (("5x3", "--rpm", "9000", "--series", "nobody"), "--series: got 'nobody'"),
@@ -99,8 +102,8 @@ def test_numbers_that_are_none_come_all_at_once(capsys: pytest.CaptureFixture[st
              "--measured-pitch-in", "inf", "--series", "nobody"]  # fmt: skip
     assert cli.main(["estimate", *words]) == 2
     said = capsys.readouterr().err.splitlines()
-    heads = ["--density-kg-m3: got nan", "--chord-mm: got nan", "--measured-pitch-in: got inf", "--series: got 'nobody'",
-             "--rpm: got nan", "--airspeed-m-s: got inf"]  # fmt: skip
+    heads = ["--density-kg-m3: got nan", "--chord-mm: got nan", "--measured-pitch-in: got inf",
+             "--series: got 'nobody'", "--rpm: got nan", "--airspeed-m-s: got inf"]  # fmt: skip
     assert len(said) == len(heads) and all(any(line.startswith(head) for line in said) for head in heads)
     words[words.index("--density-kg-m3") + 1] = "19"
     assert cli.main(["estimate", "8by5", *words[1:-2]]) == 2  # an unreadable label hides nothing

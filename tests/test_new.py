@@ -165,7 +165,8 @@ def test_nobody_loses_a_case(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass-kg", "1.4", "--rotors", "4", "--capacity-Ah", "3"]
+    motor = ["--kv", "900", "--cells", "3", "--mass-kg", "1.4", "--rotors", "4", "--capacity-Ah", "3"]
+    words = ["drive", "10x4.5", *motor]
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "flight time", "motor's sheet", "±"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
 import os
@@ -10,7 +9,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from bemt.app.commands import report
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -52,8 +50,7 @@ def test_a_report_runs_nothing_that_the_checkout_of_the_cases_names(
     (git / "hooks").mkdir()
     shutil.copy(script, git / "hooks" / "post-index-change")
     monkeypatch.setenv("PATH", f"{script.parent}{os.pathsep}{os.environ['PATH']}")
-    args = argparse.Namespace(paths=[str(own)], title=None, author=None, date="today", commit=None)
-    assert report._about(args)["revision"] == f"commit {HASH[:12]}"
+    assert commit(own) == HASH[:12]
     assert not ran.exists()
 
 

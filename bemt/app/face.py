@@ -184,7 +184,7 @@ def _add(parser: Parser, one: Parameter, told: About, visible: bool) -> None:
         more |= {"choices": one.choices, "metavar": None if len(one.choices) < 5 else metavar}
     if one.name in told.words:
         needed = one.required
-        more["nargs"] = ("+" if needed else "*") if one.many else (None if needed else "?")
+        more["nargs"] = "*" if one.many else None if needed else "?"  # an option before them may have taken them
         more["help"] = one.help.replace("%", "%%")
         if one.choices:
             more.pop("metavar")

@@ -13,8 +13,8 @@ from bemt.base.errors import Fault, InputError
 __all__ = ["number", "numbers", "path_text"]
 
 
-def numbers(name: str, value: Any) -> Array:
-    """One or more finite numbers from a caller."""
+def numbers(name: str, value: Any, finite: bool = True) -> Array:
+    """One or more numbers from a caller; unless finite, infinite ones are left to who knows the range."""
     wrong = Fault("", name, f"{type(value).__name__} {value!r:.60}", "a number, or several")
     try:
         raw = np.asarray(value)
@@ -27,7 +27,7 @@ def numbers(name: str, value: Any) -> Array:
         raise InputError(wrong)
     if not found.size:
         raise InputError(Fault("", name, "no number", "one or more"))
-    if not np.all(np.isfinite(found)):
+    if finite and not np.all(np.isfinite(found)):
         raise InputError(Fault("", name, "a number that is not finite", "finite numbers"))
     return found
 
@@ -39,19 +39,21 @@ def path_text(name: str, value: Any) -> str:
     raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))
 
 
-def number(name: str, value: Any) -> float:
-    """One finite number from a caller."""
-    found = numbers(name, value)
+def number(name: str, value: Any, finite: bool = True) -> float:
+    """One number from a caller."""
+    found = numbers(name, value, finite)
     if found.size != 1:
         raise InputError(Fault("", name, f"{found.size} numbers", "one number"))
     return float(found.ravel()[0])
 
 
-def paths_text(name: str, value: Any) -> list[str]:
+def paths_text(name: str, value: Any, least: int = 0) -> list[str]:
     """Paths as text: one, or several.
 
     >>> paths_text("files", "a.csv"), paths_text("files", ("a.csv", "b.csv"))
     (['a.csv'], ['a.csv', 'b.csv'])
     """
     several = value if isinstance(value, (list, tuple)) else [value]
+    if len(several) < least:
+        raise InputError(Fault("", name, "none", "one or more"))
     return [path_text(name, one) for one in several]

@@ -278,19 +278,15 @@ def calibrate_rotor(
     >>> bool(measured.u["thrust_N"][0] < 0.7 * d.u["thrust_N"][1])
     True
     """
-    from bemt.base.errors import Fault, InputError
     from bemt.base.given import path_text, paths_text
-    from bemt.judge.diagnose.rotor_calibration import CalibratedRotor, calibrate
+    from bemt.judge.diagnose.rotor_calibration import CalibratedRotor, calibrate, write
     from bemt.rotors.propeller import load, rotor_of
 
-    paths = tuple(paths_text("recordings", recordings))
-    if not paths:
-        raise InputError(Fault("", "recordings", "none", "one or more"))
+    paths = tuple(paths_text("recordings", recordings, 1))
     rotor, found = calibrate(paths, rotor_of(case).case.path.as_posix(), progress)
-    made = CalibratedRotor(load(rotor.path), found, paths, None if out is None else path_text("out", out))
-    if made.folder is not None:
-        made.write(made.folder)
-    return made
+    folder = None if out is None else path_text("out", out)
+    files = () if folder is None else write(rotor, found, paths, folder)
+    return CalibratedRotor(load(rotor.path), found, paths, folder, tuple(files))
 
 
 @action("Models and checks", "prove --seed 1")

@@ -96,7 +96,7 @@ def import_(
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
-    names, wrote = paths_text("files", files), ""
+    names, wrote = paths_text("files", files, 1), ""
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
     told: dict[str, Any] = {"unit": _words(unit), "column": _words(column), "sign": _words(sign)}

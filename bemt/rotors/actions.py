@@ -77,7 +77,7 @@ def estimate(
     from bemt.base.given import number
     from bemt.rotors.case.estimate import of_label
 
-    density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
+    density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3, finite=False)
     return of_label(
         label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg
     )
@@ -292,7 +292,7 @@ def validate(
     if reynolds is not None and not 1e3 <= reynolds <= 1e9:
         raise InputError(Fault("", "--reynolds", f"{reynolds:g}", "a Reynolds number from 1e3 to 1e9"))
     effects = propellers.effects_without(off)
-    found = [propellers.where(name) for name in paths_text("folders", folders)]
+    found = [propellers.where(name) for name in paths_text("folders", folders, 1)]
     document = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
     if out is not None:
         propellers.write(document, os.fspath(out))

@@ -219,6 +219,8 @@ class CalibratedRotor:
         The files.
     folder : str, optional
         Where its case was written.
+    files : tuple of str
+        Names of its files there.
 
     Examples
     --------
@@ -229,6 +231,7 @@ class CalibratedRotor:
     found: AsMeasured
     recordings: tuple[str, ...]
     folder: str | None = None
+    files: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -247,7 +250,7 @@ class CalibratedRotor:
         if self.folder is None:
             return "\n".join([*lines, "nothing written; --out DIR writes the case with this rotor"])
         typed = shlex.quote(Path(self.folder).as_posix())
-        lines += [f"{Path(self.folder).as_posix()}: case.toml", f"next: bemt sweep {typed}"]
+        lines += [f"{Path(self.folder).as_posix()}: {', '.join(self.files)}", f"next: bemt sweep {typed}"]
         lines += [f"      bemt drive {typed}"] if self.source.case.file.drive is not None else []
         return "\n".join(lines)
 

@@ -213,7 +213,7 @@ def of_label(
 ) -> Estimate:
     """`document` as a Dataset, standard uncertainties in ``u``."""
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
-    n, V, angle = (np.atleast_1d(numbers(*pair)).ravel().tolist() for pair in asked)
+    n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
     try:
         found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
     except InputError as error:

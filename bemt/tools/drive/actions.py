@@ -74,10 +74,10 @@ def drive(
     from bemt.tools.drive import drive_result
 
     given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
-    told = {name: value if value is None else number(name, value) for name, value in given.items()}
+    told = {name: value if value is None else number(name, value, finite=False) for name, value in given.items()}
     told |= {name: given[name] for name in ("cells", "rotors")}
     found = drive_result.with_drive(rotor_of(case).case, **told)
-    result = drive_result.solve(found, number("airspeed_m_s", airspeed_m_s), list(off))
+    result = drive_result.solve(found, number("airspeed_m_s", airspeed_m_s, finite=False), list(off))
     if out is not None:
         drive_result.write(result, path_text("out", out))
     return result
@@ -128,7 +128,7 @@ def map(  # noqa: A001
     from bemt.tools.drive import map_result
 
     where = None if out is None else os.fspath(out)
-    found = map_result.fit(paths_text("files", files), int(sign), nodes, name, thrust_N, voltage_V, where)
+    found = map_result.fit(paths_text("files", files, 1), int(sign), nodes, name, thrust_N, voltage_V, where)
     return Told(found.document, map_result.text(found), exit_code=EXIT_OK if found.reached else EXIT_UNCONVERGED)
 
 
