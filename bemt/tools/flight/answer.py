@@ -25,6 +25,7 @@ from bemt.tools.flight.motor_speed import speed_changes
 from bemt.tools.flight.repeat import flight_scatter
 from bemt.tools.flight.rules import BesideBalance
 from bemt.tools.flight.simulator import simulator_constants
+from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
 from bemt.tools.flight.wind import Wind, wind
 
@@ -82,6 +83,7 @@ class FlightAnswer:
                 "flying_s": float(log.flying.mean() * np.ptp(log.t)), "command_unit": log.command_unit,
                 "layout": log.layout, "join_s": log.join_s, "ends": log.ends,
             },
+            "sensors": [asdict(s) for s in log.sensors],
             "constants": {k: asdict(c) for k, c in f.constants.items()},
             "simulator": {k: asdict(c) for k, c in self.simulator.items()},
             "rotors": {k: list(v) for k, v in f.rotors.items()},
@@ -153,6 +155,7 @@ def answer_on(
         raise InputError(faults)
     if layout:
         log = replace(log, layout=layout)
+    log, healthy = checked(log), [checked(replace(h, layout=layout or h.layout)) for h in healthy]
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
     found, air = identify(log, mass_kg), wind(log, healthy)
     shake, calm = vibration(log), [vibration(h) for h in healthy]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DENSE", "SPARSE", "FlightLog", "Stretches", "joined", "thrust_axis"]
+__all__ = ["DENSE", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
 
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
@@ -21,6 +21,19 @@ _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; hei
 _MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 _LARGEST = 1e9  # value above which a number is damage: no unit here comes near
 DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
+
+
+@dataclass(frozen=True)
+class SpeedSensor:
+    """A speed sensor that cannot have read its rotor's speed, and how it was repaired."""
+
+    motor: int  # From one
+    count: str  # Blades seen over blades that pass, such as "1/2"; empty where it is no such fraction
+    # Reading over the repaired speed where it reads; share of rows in the air without a reading, and at zero [1]
+    ratio: float
+    lost: float
+    zeros: float
+    u: float  # Standard uncertainty of the repaired speed, a share of it [1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +68,7 @@ class FlightLog:
     # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)
     ends: str = ""  # Where a damaged log ends; empty for a whole one
+    sensors: tuple[SpeedSensor, ...] = ()  # Speed sensors at fault, whose columns of `rpm` are repaired
 
     @property
     def rotors(self) -> int:

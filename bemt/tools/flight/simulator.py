@@ -69,8 +69,10 @@ def motor_lag(log: FlightLog) -> Constant | None:
         return None
     # From the first sample in flight to the last: a lag needs unbroken time.
     whole = slice(on[0], on[-1] + 1)
-    t, rpm = log.t[whole], log.rpm[whole]
+    sound = [i for i in range(log.rotors) if i + 1 not in {s.motor for s in log.sensors}]
+    t, rpm = log.t[whole], log.rpm[whole][:, sound]
     drive = log.command[whole] if log.voltage is None else log.command[whole] * log.voltage[whole, None]
+    drive = drive[:, sound]
     step = float(np.median(np.diff(t)))
     if np.ptp(drive) == 0.0 or not step > 0.0:
         return None

@@ -8,6 +8,7 @@ from bemt.judge.diagnose.verdict import BESIDE_IT, Decision
 from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
+from bemt.tools.flight.log import SpeedSensor
 from bemt.tools.flight.rules import IN_FLIGHT
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
@@ -71,6 +72,8 @@ def _seen(answer: FlightAnswer) -> list[str]:
     full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(answer.limited) if v > _OFTEN]
     if full:
         lines.append(f"  At full command: {', '.join(full)} of the time.")
+    for s in answer.log.sensors:
+        lines.append(f"  {sensor_text(s)}; repaired to ± {200 * s.u:.1f} % before any constant was fitted.")
     c, shake = answer.change, answer.vibration
     if c is not None and answer.judged.said.rule != IN_FLIGHT:
         when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
@@ -120,6 +123,20 @@ def _flow(a: FlightAnswer) -> list[str]:
             what = f"{100 * got[0]:+.1f} ± {100 * got[1]:.1f} % at equal speed of the rotors{more}"
             lines.append(f"  {name.format(at):<34} {what}")
     return lines
+
+
+def sensor_text(s: SpeedSensor) -> str:
+    """What is wrong with a speed sensor."""
+    parts = []
+    if s.count:
+        parts.append(f"reads {s.ratio:.2f} of the speed, as if it saw {s.count.replace('/', ' blade of ')}")
+    elif s.ratio == 0.0:
+        parts.append("reads no speed")
+    elif abs(s.ratio - 1.0) > 0.1:
+        parts.append(f"reads {s.ratio:.2f} of the speed")
+    if s.lost > _OFTEN:
+        parts.append(f"drops out in {100 * s.lost:.0f} % of the flight")
+    return f"The speed sensor of motor {s.motor} {' and '.join(parts)}"
 
 
 def _number(c: Constant) -> str:
