@@ -12,7 +12,7 @@ from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.diagnose.rule import Rule
 from bemt.judge.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, LIKE, MOST, NAMED, NEAR, RARE, SMALL, SURE
 from bemt.judge.diagnose.verdict import BESIDE_IT, Decision, credible_sets
-from bemt.tools.flight.balance import BLADE, WEIGHT, blade
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, blade
 from bemt.tools.flight.change import FlightChange
 
 __all__ = ["BUILD", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery"]
@@ -154,6 +154,15 @@ def _few(a: FlightQuery) -> Decision | None:
     return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
 
 
+def _day(a: FlightQuery) -> Decision | None:
+    """Declared: what days do to a trim is no fault, and only a flight of the same day tells."""
+    day = Explanation.of(DAY)
+    if a.leading != day or a.share((day,)) < SURE:
+        return None
+    why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
+    return a.says("insufficient", why)
+
+
 def _rest(a: FlightQuery) -> Decision | None:
     """As of a smooth rest in the diagnosis: a small share of what is explained is a detail of it."""
     rest = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading]
@@ -269,6 +278,7 @@ RULES: list[Rule] = [
     Rule("healthy flights look like it", _within, "GATE"),
     Rule("too few healthy flights", _few_and_within, "GATE"),
     Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
+    Rule("days differ", _day, "SURE"),
     Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
     Rule(BESIDE_IT, _another, "NAMED, LIKE, MOST"),
     Rule("one is sure", _one, "NAMED"),
