@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,14 @@ class FlightLog:
     layout: str = ""
     # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)
+    # Controller's demand: thrust (N,) and roll to the right, nose up, yaw to the right (N, 3), shares of full [1]
+    thrust: Array | None = None
+    torque: Array | None = None
+    vibe: Array | None = None  # (N, 3) Vibration that the autopilot states, root mean square of each axis [m/s2]
+    stated_rotors: int = 0  # Rotors by the parameters, for a log without motors
+    mixed: str = ""  # Messages whose demands make up the commands, where no output of a motor was logged
+    date: str = ""  # Day of the flight by the clock of the log, YYYY-MM-DD; may be empty
+    parameters: dict[str, float] = field(default_factory=dict)  # Of the autopilot, those of its thrust curve
     ends: str = ""  # Where a damaged log ends; empty for a whole one
     sensors: tuple[SpeedSensor, ...] = ()  # Speed sensors at fault, whose columns of `rpm` are repaired
 
@@ -85,6 +93,8 @@ class FlightLog:
     def flying(self) -> NDArray[np.bool_]:
         """Samples in the air, (N,): motors on, off the ground where a height is known, without the first moments."""
         drive = self.command if self.command is not None else self.rpm
+        if drive is None and self.thrust is not None:
+            drive = self.thrust[:, None]
         if drive is None:
             return np.zeros(self.t.size, dtype=bool)
         total = np.nan_to_num(drive.sum(axis=1))
@@ -132,7 +142,7 @@ class Stretches(Generic[T]):
 
 
 def joined(
-    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
+    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: Any
 ) -> FlightLog:
     """Put sources (times, values) with clocks of their own on one time base, linearly; units as in :class:`FlightLog`.
 
@@ -162,7 +172,7 @@ def joined(
     if raw is not None and raw[0].size > 1:
         at, v = _whole(raw[0], raw[1])
         fast = (at - t[0], v)
-    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)  # type: ignore[arg-type]
+    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)
 
 
 def _whole(t: Array, v: Array) -> Source:
