@@ -249,7 +249,8 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     layout = layout if layout and len(LAYOUTS[layout].split()) == B else ""
     main = "command" if command else "rpm" if speeds else "acceleration" if acceleration else "vibe"
     raw = _bursts(found) or acceleration
-    kept = {k: params[k] for k in ("MOT_THST_EXPO", "MOT_THST_HOVER") if np.isfinite(params.get(k, np.nan))}
+    curve = ("MOT_THST_EXPO", "MOT_THST_HOVER", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
+    kept = {k: params[k] for k in curve if np.isfinite(params.get(k, np.nan))}
     return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends, mixed=said, date=_date(found),
                   parameters=kept, stated_rotors=stated)  # fmt: skip
 

@@ -1,1 +1,2 @@
 """What this tool offers to the house (:mod:`bemt.base.plugins`)."""
+ACTIONS = {"fly": "bemt.tools.flight.actions:fly"}

@@ -109,6 +109,7 @@ def _made(name: str, found: Any) -> FlightLog:
 
     params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
+    demanded = command is not None
     if command is None:
         there = _numbered(tables, "actuator_outputs", "output")
         command, unit = _active(take("actuator_outputs", _assigned(params, there) or there)), "us"
@@ -159,6 +160,7 @@ def _made(name: str, found: Any) -> FlightLog:
     main = "command" if command else "rpm" if speeds else "acceleration" if acc else "thrust"
     raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
     kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
+    kept |= {"demanded": 1.0} if demanded else {}
     return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends, mixed=said,
                   date=_date(take), parameters=kept, stated_rotors=_stated(params))  # fmt: skip
 
