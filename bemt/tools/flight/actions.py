@@ -157,10 +157,8 @@ def fly(
     for path in (p for p in mine if p in found):
         others = [(p, day) for p, day in calm if p != path]
         inside = str(Path(path).parent)
-        day: str | None = inside if stated and any(d == inside for _, d in others) else ""
-        if healthy_day and others:
-            day = others[-1][1] if healthy_day == "same" else None
-        days = [d for _, d in others] if stated or day else []
+        day = healthy_day or (inside if any(d == inside for _, d in others) else "")
+        days = [d for _, d in others] if stated else []
         try:
             answer = answer_on(found[path], [found[p] for p, _ in others], mass_kg, layout, healthy_mass_kg,
                                false_alarm, days, day)  # fmt: skip

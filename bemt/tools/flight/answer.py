@@ -152,7 +152,7 @@ def answer_on(
     healthy_mass_kg: float | None = None,
     false_alarm: float = FALSE_ALARM,
     stated_days: Sequence[str] = (),
-    day: str | None = "",
+    day: str = "",
 ) -> FlightAnswer:
     """Identify and judge one flight, with healthy flights of the same vehicle.
 

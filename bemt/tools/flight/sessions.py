@@ -27,7 +27,7 @@ class Sessions:
 
 
 def sessions(
-    flight: FlightLog, healthy: Sequence[FlightLog], stated: Sequence[str] = (), day: str | None = ""
+    flight: FlightLog, healthy: Sequence[FlightLog], stated: Sequence[str] = (), day: str = ""
 ) -> Sessions:
     """Group healthy flights, and place the judged one.
 
@@ -37,21 +37,26 @@ def sessions(
         The judged flight and the healthy ones.
     stated : sequence of str
         Session of each healthy flight as the user groups them; empty for none, then dates tell where all have one.
-    day : str or None
-        Session of the judged flight; None: another than all; empty where the user does not say, then its date does.
+    day : str
+        "same": the judged flight is of the last session; "other": of none; or a session of `stated`; empty where the
+        user does not say: then its date tells.
     """
-    dates = [_date(h) for h in healthy]
-    if len(stated) == len(healthy) and (len(set(stated)) > 1 or day != ""):
-        labels, mine, by = list(stated), day, "stated"
+    dates, mine = [_date(h) for h in healthy], ""
+    if len(stated) == len(healthy) and len(set(stated)) > 1:
+        labels, by = list(stated), "stated"
     elif healthy and all(dates):
-        labels, by = dates, "date"
-        mine = day if day is None else (dates[-1] if day else _date(flight))
+        labels, by, mine = dates, "date", _date(flight)
     else:
-        labels, by, mine = [""] * len(healthy), "" if day == "" else "stated", None if day is None else ""
+        labels, by = list(stated) if len(stated) == len(healthy) else [""] * len(healthy), ""
     names = list(dict.fromkeys(labels))
-    if mine is None or (mine and mine not in names):
-        return Sessions(tuple(names.index(x) for x in labels), None, by)
-    return Sessions(tuple(names.index(x) for x in labels), names.index(mine) if mine else "", by)
+    days = tuple(names.index(x) for x in labels)
+    if day == "same" and days:
+        return Sessions(days, days[-1], by or "stated")
+    if day and day in names:
+        return Sessions(days, names.index(day), by or "stated")
+    if day == "other" or (mine and mine not in names):
+        return Sessions(days, None, by or "stated")
+    return Sessions(days, names.index(mine) if mine else "", by)
 
 
 def _date(log: FlightLog) -> str:
