@@ -168,10 +168,11 @@ def _drive(log: FlightLog) -> Array:
 
 
 def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
-    if log.rpm is not None and log.command is not None and log.voltage is not None and log.command_unit == "1":
-        sound = [i for i in range(log.rotors) if i + 1 not in {s.motor for s in log.sensors}]
-        volts = (log.command[on] * log.voltage[on, None])[:, sound].mean(axis=1)
-        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, sound].mean(axis=1))
+    speeds = log.rpm is not None and log.sound
+    if speeds and log.command is not None and log.voltage is not None and log.command_unit == "1":
+        assert log.rpm is not None
+        volts = (log.command[on] * log.voltage[on, None])[:, log.sound].mean(axis=1)
+        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
         if half[0] < abs(k[0]):
             out["motor line, slope"] = Constant(float(k[0]), float(half[0]), "rpm/V")
             out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")

@@ -85,6 +85,11 @@ class FlightLog:
         return 0 if drive is None else drive.shape[1]
 
     @property
+    def sound(self) -> list[int]:
+        """Rotors (0 is the first) whose speed sensor is not at fault."""
+        return [i for i in range(self.rotors) if i + 1 not in {s.motor for s in self.sensors}]
+
+    @property
     def drive(self) -> Array | None:
         """What each rotor's thrust is in proportion to, (N, B): its command, else its squared speed."""
         return self.command if self.command is not None else None if self.rpm is None else self.rpm**2

@@ -83,9 +83,8 @@ def _slope(log: FlightLog, t: Array, x: Array) -> tuple[float, float] | None:
         return np.stack([np.bincount(number, weights=c)[full] / count[full] for c in v.T], axis=1)
 
     on = log.flying
-    if log.rpm is not None and log.rpm.shape == log.command.shape:  # type: ignore[union-attr]
-        sound = [i for i in range(log.rotors) if i + 1 not in {s.motor for s in log.sensors}]
-        y, z = means(log.rpm[on][:, sound] ** 2), means(x[:, sound])
+    if log.rpm is not None and log.sound and log.rpm.shape == log.command.shape:  # type: ignore[union-attr]
+        y, z = means(log.rpm[on][:, log.sound] ** 2), means(x[:, log.sound])
     elif log.acceleration is not None:
         y, z = means(log.acceleration[on, 2:3] / G0), means(x.mean(axis=1, keepdims=True))
     else:

@@ -146,9 +146,11 @@ def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array
         X = np.concatenate([np.cos(angle[w]), np.sin(angle[w])], axis=1)
         y = v[w] - np.stack([np.convolve(c, np.ones(smooth) / smooth, "same") for c in v[w].T], axis=1)
         y, X = y[smooth:-smooth], X[smooth:-smooth]
-        if y.shape[0] < 2 * X.shape[1] or np.linalg.cond(X) > _APART:
+        normal = X.T @ X
+        low, high = np.linalg.eigvalsh(normal)[[0, -1]]
+        if y.shape[0] < 2 * X.shape[1] or not high < _APART**2 * low:
             continue
-        gram = np.linalg.inv(X.T @ X)
+        gram = np.linalg.inv(normal)
         b = gram @ X.T @ y
         noise = np.sum((y - X @ b) ** 2) / max(y.shape[0] - X.shape[1], 1) * np.diag(gram)
         B = angle.shape[1]
