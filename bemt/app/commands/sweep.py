@@ -47,22 +47,22 @@ def run(args: argparse.Namespace) -> int:
     from bemt.rotors.case import find_cases
 
     with _terminal.progress(args.quiet) as say:
-        document = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=say,
+        found = sweep(args.paths, args.out, jobs=args.jobs, resume=not args.no_resume, progress=say,
                          engine=args.engine, scheduler=args.scheduler, grid_format=args.grid_format)  # fmt: skip
-    code = int(document["exit_code"])
-    for result in document["cases"]:
-        for fault in result["faults"]:
+    code = found.exit_code
+    for result in found.cases:
+        for fault in result.faults:
             _terminal.complain(fault)
     if args.json:
-        sys.stdout.write(json_text(document))
+        sys.stdout.write(json_text(found.document()))
     elif not args.quiet and not args.details:
         files = find_cases(args.paths)
-        print(summary(document["cases"], files, cut=sys.stdout.isatty()))
+        print(summary(found.cases, files, cut=sys.stdout.isatty()))
     elif not args.quiet:
-        solved = [case_text(result) for result in document["cases"]]
-        print("\n\n".join([*solved, overview_text(document["cases"])]))
+        solved = [case_text(result) for result in found.cases]
+        print("\n\n".join([*solved, overview_text(found.cases)]))
     if args.strict:
-        reasons = [line for r in document["cases"] if r["rows"] for line in off_tolerance(r, args.tolerance)]
+        reasons = [line for r in found.cases if r.rows for line in off_tolerance(r, args.tolerance)]
         for line in reasons:
             _terminal.complain(line)
         code = max(code, EXIT_UNCONVERGED) if reasons else code
