@@ -4,6 +4,8 @@ A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a
 
 * ``CASE_PARTS``: entry of a case's results; the attribute takes a :class:`bemt.rotors.case.Case` and gives a document
   or None;
+* ``REPORT_PARTS``: part of a report; the attribute takes its book (the cases, to which it may add) and the folder of
+  results, and gives pages with id, name, title, top and sections (:mod:`bemt.results.report.values`);
 * ``EXPORTS``: target of ``export``; the attribute is its class;
 * ``ACTIONS``: name at both doors; the attribute is the public function.
 
@@ -41,6 +43,11 @@ def load(where: str) -> Any:
     """
     module, _, attribute = where.partition(":")
     return getattr(importlib.import_module(module), attribute)
+
+
+def loaded(table: str) -> list[Any]:
+    """Attributes that one table of all tools names."""
+    return [load(where) for where in offered(table).values()]
 
 
 def part(name: str, case: Any) -> Any:

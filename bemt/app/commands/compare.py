@@ -88,8 +88,9 @@ def _draw_first(args: argparse.Namespace, files: list[str]) -> None:
     """With ``--out``, draw the recordings inside the prediction band of the case."""
     if not args.out or args.no_figures:
         return
+    from bemt.base.page import FIRST
     from bemt.base.tables import write_atomic
-    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.figures_recording import first_picture
     from bemt.judge.diagnose.load import load_all
 
     cases, records = load_all(files, [args.case])

@@ -13,12 +13,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bemt.base.page import Cell, num, table
+from bemt.base.page import num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import CfdFacts, audit, audit_document
+from bemt.results.report.audit_block import audit_parts
 from bemt.results.report.found_files import read_json, safe_files
 from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
-from bemt.results.report.values import Part, Section, picture, sections
+from bemt.results.report.values import Section, picture, sections
 from bemt.results.sweep.comparison import Comparison
 from bemt.rotors.validity import serious
 
@@ -173,12 +174,25 @@ def _plain_rows(found: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -
     return rows
 
 
-def attach(book: dict[str, Any]) -> None:
-    """Audit every run, and compare the run at a case's operating point with its BEMT.
+def report_pages(book: dict[str, Any], out: Path) -> list[dict[str, Any]]:
+    """Pages of the campaigns and of the three fidelities in a folder of results; their numbers join the cases.
 
-    The uncertainty of the run is that of its audit, so it is unknown as long as one of its lines is.
+    Every run is audited, and the run at a case's operating point compared with its BEMT. The uncertainty of the run is
+    that of its audit, so it is unknown as long as one of its lines is.
     """
-    found = book["cfd"]
+    found = cfd_runs(out)
+    attach(book, found)
+    three = fidelities(out, [str(page["result"]["name"]) for page in book["cases"]])
+    return [
+        {"id": "cfd", "name": "Own CFD", "title": "Own CFD", "top": [("words", CFD_WORDS)],
+         "sections": cfd_sections(found)},
+        {"id": "fidelities", "name": "Three fidelities", "title": "Three fidelities",
+         "top": [("words", FIDELITY_WORDS)], "sections": fidelity_sections(three)},
+    ]  # fmt: skip
+
+
+def attach(book: dict[str, Any], found: Sequence[Mapping[str, Any]]) -> None:
+    """Audit the runs; put those of a case to its page."""
     results = {page["result"]["name"]: page["result"] for page in book["cases"] if page["result"].get("conditions")}
     for item in found:
         result = results.get(item["case"])
@@ -191,9 +205,11 @@ def attach(book: dict[str, Any]) -> None:
     for page in book["cases"]:
         result = page["result"]
         run = operating_run(found, result)
-        page["own_cfd"] = run
         page["own_rows"] = _plain_rows(found, result)
-        page["own_radial"] = radial_of(found, run) if run else []
+        if run is not None:
+            words = f"{run['campaign']}, {run['solver']}, {run['cells']:.0f} cells"
+            page["own_points"] = [("openfoam", words, run["thrust_N"], run["u_thrust_N"])]
+            page["own_radial"] = {f"CFD, own, {run['solver']}": radial_of(found, run)}
         bemt = next((r for r in result.get("rows", []) if r["source"] == "bemt"), None)
         if run is None or bemt is None or bemt.get("thrust_N") is None:
             continue
@@ -246,27 +262,6 @@ def fidelity_sections(found: Mapping[str, Any]) -> list[Section]:
             title = f"Axial speed {behind} R behind the rotor, compared with BEMT"
             plots.append(figure(Plot(title, "r/R [-]", "axial speed [m/s]", traces)))
     return sections(("Loads and cost", [("table", table(heads, rows))] if rows else []), ("Wake", [("figures", plots)]))
-
-
-KIND = {"fine": "fine", "doubtful": "doubtful", "fault": "fault", "not stated": "unknown"}
-
-
-def _share(value: Any) -> str:
-    return "unknown" if value is None or value != value else f"{100 * value:.1f} %"
-
-
-def audit_parts(audit: Mapping[str, Any]) -> list[Part]:
-    """Say what an audit comes to, and give its lines."""
-    rows = []
-    for line in audit["lines"]:
-        u, status = line["u_relative"], str(line["status"])
-        rows.append([str(line["topic"]), Cell(status, badge=KIND.get(status, "unknown")), str(line["finding"]),
-                     str(line["consequence"]), num(None if u is None else 100 * u, 2, none="unknown")])  # fmt: skip
-    known = audit["u_relative_known"]
-    rest = f"the known parts make {_share(known)} together" if known else "no part of it is known"
-    words = f"{audit['reference']}: uncertainty of the thrust {_share(audit['u_relative'])}; {rest}."
-    head = ["setting", "status", "what is known", "consequence for the thrust", "u %"]
-    return [("words", words), ("table", table(head, rows))]
 
 
 CFD_WORDS = (
