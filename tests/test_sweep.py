@@ -46,6 +46,7 @@ def sweep(*args: Any, **options: Any) -> dict[str, Any]:
 def summary(documents: Sequence[dict[str, Any]], **options: Any) -> str:
     return summary_of([Result.from_document(d) for d in documents], **options)
 
+
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665
 

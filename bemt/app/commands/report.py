@@ -51,12 +51,12 @@ def run(args: argparse.Namespace) -> int:
     args.paths = paths or ["."]
     with _terminal.progress(args.quiet) as say:
         book, files = write(args.paths, args.out, say, _about(args), args.recording)
-    for page in book["cases"]:
-        for fault in page["result"]["faults"]:
+    for page in book.cases:
+        for fault in page.result.faults:
             _terminal.complain(fault)
     if not args.quiet:
-        count = len(book["cases"])
+        count = len(book.cases)
         for file in files:
             size = f": {file.stat().st_size / 1e6:.2f} MB, {count} case{'s' * (count != 1)}"
             print(f"{file}{size if file.name == HTML_NAME else ''}")
-    return int(book["exit_code"])
+    return book.exit_code
