@@ -46,7 +46,7 @@ class Documented:
         if not isinstance(document, Mapping):
             raise TypeError(f"{cls.__name__}: got {type(document).__name__}; expected a mapping")
         found = {}
-        for name, kind, optional in _fields(cls):
+        for name, kind, optional in _fields(cls):  # type: ignore[arg-type]
             if name in document:
                 try:
                     found[name] = typed(kind, document[name], lenient)
@@ -57,7 +57,7 @@ class Documented:
 
 
 @cache
-def _fields(cls: type[Documented]) -> tuple[tuple[str, Any, bool], ...]:
+def _fields(cls: type) -> tuple[tuple[str, Any, bool], ...]:
     """Name, type and whether it may be missing, of every field."""
     kinds = get_type_hints(cls)
     return tuple(

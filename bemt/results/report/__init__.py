@@ -36,8 +36,8 @@ def _pages(book: Book) -> Iterator[Page]:
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
     yield Page("front", "Answers", "Answers", front_parts(book, ids), [], answers(book, ids))
     for case, name, key in zip(book.cases, names, ids, strict=True):
-        top = [("verdict", page_verdict(case))]
-        yield Page(key, name[:40], headline(case.result), top, case_sections(case, book.reproduction))
+        said = "verdict", page_verdict(case)
+        yield Page(key, name[:40], headline(case.result), [said], case_sections(case, book.reproduction))
     given = [item for item in book.reproduction if item.status.startswith("input")]
     numbers = reproduction_table([item for item in book.reproduction if item not in given])
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]

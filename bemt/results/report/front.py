@@ -60,8 +60,8 @@ def _values(page: CasePage) -> dict[str, list[tuple[str, float, float]]]:
         here = abs(row.rpm - own.rpm) <= 1e-6 * own.rpm and row.airspeed_m_s == own.airspeed_m_s
         if math.isfinite(row.thrust_N) and here:
             out.setdefault(row.source, []).append((row.label, row.thrust_N, row.u))
-    for source, *point in page.own_points:
-        out.setdefault(source, []).append(tuple(point))
+    for source, label, T, u in page.own_points:
+        out.setdefault(source, []).append((label, T, u))
     return out
 
 

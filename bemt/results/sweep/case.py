@@ -210,7 +210,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
     """Every model against every recorded value; the error on thrust also goes into the recorded row."""
     rows, out = [], []
     for row, at, u_D in recorded:
-        errors: dict[str, float] = {}
+        errors: dict[str, Any] = {}
         measured = {r for r in COMPARED if not math.isnan(getattr(row, r))}
         measured -= {"CT"} if "thrust_N" in measured else set()
         measured -= {"CP", "power_W"} if "torque_Nm" in measured else set()
@@ -237,9 +237,9 @@ def _audit(row: Row, ready: Model | PairModel, ducted: bool) -> Audit:
 def _assumption(moved: Moved) -> AssumptionRow:
     """One assumption with its effect at the case's own operating point."""
     item = moved.unknown
-    loads = (tuple(float(run[key][0]) for run in moved.runs) for key in ("thrust_N", "torque_Nm"))
+    T, Q = (tuple(float(run[key][0]) for run in moved.runs) for key in ("thrust_N", "torque_Nm"))
     us = (float(moved.u[key][0]) for key in ("thrust_N", "torque_Nm"))
-    return AssumptionRow(item.key, item.nominal, item.values, item.discrete, item.range_text, item.why, *loads, *us)
+    return AssumptionRow(item.key, item.nominal, item.values, item.discrete, item.range_text, item.why, T, Q, *us)
 
 
 def _description(case: Case, ready: Model | PairModel, stations: int) -> Conditions:
