@@ -57,10 +57,10 @@ def run(args: argparse.Namespace) -> int:
         if args.loop:
             taken = loop.text(loop.loop(Path(args.out), args.loop, args.jobs or os.cpu_count() or 1, args.fixed, say))
     if args.json:
-        print(json_text(found), end="")
+        print(json_text(found.document()), end="")
     elif not args.quiet:
         print("\n\n".join([proof_text.text(found), *([taken] if taken else [])]))
-    return EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
+    return EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
 
 
 def _intervals(folders: list[str], out: str | None) -> int:

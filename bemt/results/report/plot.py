@@ -43,7 +43,7 @@ class Trace:
     # Points, in the units of the axes; NaN and None break a line
     x: Sequence[Any] | Array
     y: Sequence[Any] | Array
-    u: Sequence[Any] | Array | None = None  # Standard uncertainty of y, same unit: a band round a line, bars through points
+    u: Sequence[Any] | Array | None = None  # Standard uncertainty of y: a band round a line, bars through points
     colour: str = SERIES[0]  # ``#rrggbb``
     dash: str = ""  # SVG dash pattern; empty is a full line
     shape: str = "circle"  # Marker of points: circle, square, triangle, diamond, cross, bar, star
