@@ -35,7 +35,7 @@ from bemt.judge.proof import (
     truth_world,
 )
 from bemt.judge.proof.items import Bench, Item
-from bemt.judge.proof.rows import Answer, Entry, Estimate, Key, Ranked
+from bemt.judge.proof.rows import Answer, Entry, Estimate, Key, Ranked, Step
 from bemt.judge.proof.stand import Stand, covariance, full_scales, record
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
@@ -537,7 +537,7 @@ def test_a_recommended_run_is_tried_on_the_truth() -> None:
     thin = [{"rpm": f * top, "airspeed_m_s": 0.0, "pressure_Pa": 50e3} for f in np.linspace(0.6, 1.0, 8)]
     same = [{"rpm": 0.5 * top, "airspeed_m_s": 0.0}]
     tried = {
-        name: resolve.resolves(bench, there, {**said, "next_measurement": {"points": points, "separates": []}})
+        name: resolve.resolves(bench, there, replace(said, next_measurement=Step(points=tuple(points))))
         for name, points in (("thin", thin), ("same", same))
     }
     assert tried == {"thin": True, "same": False}

@@ -330,7 +330,7 @@ def _across(own: Array, other: Array) -> float:
 def _judge(
     rule: Yardstick, bench: Bench, cause: Cause, signature: Mapping[str, Array]
 ) -> tuple[float, float, tuple[str, ...]]:
-    """Separation over noise, and over nuisances too; what looks alike."""
+    """Separation over noise and over all that is unknown, and what looks alike."""
     own = rule.stack(signature)
     others = {i: rule.stack(s) for i, s in bench.signatures().items() if i != cause.id and i in LISTED}
     return *rule.separation(own), tuple(rule.alike(own, others))
