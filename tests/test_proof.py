@@ -541,7 +541,7 @@ def test_a_recommended_run_is_tried_on_the_truth() -> None:
         for name, points in (("thin", thin), ("same", same))
     }
     assert tried == {"thin": True, "same": False}
-    assert resolve.resolves(bench, there, {**said, "next_measurement": {"points": []}}) is None
+    assert resolve.resolves(bench, there, replace(said, next_measurement=Step())) is None
 
 
 def test_no_answer_is_no_virtue() -> None:

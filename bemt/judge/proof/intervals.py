@@ -64,8 +64,9 @@ def _told(folder: Path, entry: Entry) -> Mapping[str, Estimate]:
 
 def _score(told: Estimate, true: float) -> float:
     """Distance of the truth from the estimate in half-widths on its side [1]."""
-    off = true - told.value
-    half = told.high - told.value if off > 0 else told.value - told.low
+    value = float(told.value)
+    off = true - value
+    half = told.high - value if off > 0 else value - told.low
     return abs(off) / max(half, 1e-12)
 
 

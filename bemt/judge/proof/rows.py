@@ -9,6 +9,8 @@ from typing import Any, Self
 
 from bemt.base.document import Documented
 
+Names = set[str]  # An entry has a field of that name
+
 
 @dataclass(frozen=True)
 class TrueValue(Documented):
@@ -41,7 +43,7 @@ class Entry(Documented):
     stated: bool | None = None
     air_known: bool | None = None
     rows: int = 0
-    stand: Mapping[str, float] = field(default_factory=dict)
+    stand: Mapping[str, Any] = field(default_factory=dict)
     separation_together: tuple[float, float] | None = None  # Of a pair, when the other may take what it can
     reason: str | None = None
 
@@ -51,7 +53,7 @@ class Entry(Documented):
         return self.separation_together or self.separation
 
     @property
-    def allowed(self) -> list[set[str]]:  # type: ignore[valid-type]
+    def allowed(self) -> list[Names]:
         """Names that stand for each cause."""
         return [{c, *a} for c, a in zip(self.causes, self.alike, strict=True)]
 
