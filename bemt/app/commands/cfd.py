@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         from bemt.tools.cfd.summary import summary, summary_text
 
         found = summary(args.campaign)
-        print(json_text(found) if args.json else summary_text(found), end="")
+        print(json_text(found.document()) if args.json else summary_text(found), end="")
         return EXIT_OK
     record = campaigns.run(
         args.campaign, args.only, args.ranks, args.work, args.keep, None if args.quiet else _terminal.complain
@@ -45,4 +45,4 @@ def run(args: argparse.Namespace) -> int:
         print(json_text(campaigns.document(record)), end="")
     elif not args.quiet:
         print(campaigns.text(record))
-    return EXIT_OK if all(row["converged"] == 1 for row in record.rows) else EXIT_UNCONVERGED
+    return EXIT_OK if all(row.settled for row in record.rows) else EXIT_UNCONVERGED

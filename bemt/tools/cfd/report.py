@@ -27,7 +27,7 @@ from bemt.results.report.values import Page, Section, picture, sections
 from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.rows import Conditions, Result, Row
 from bemt.rotors.validity import serious
-from bemt.tools.cfd.rows import COLUMNS, TEXTS, RunRow
+from bemt.tools.cfd.rows import RunRow, run_of
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
@@ -119,8 +119,7 @@ def cfd_runs(out: Path) -> list[Runs]:
             continue
         runs = []
         for row in read_rows(path.parent / "recording.csv"):
-            cells = {k: row.get(k, "") if k in TEXTS else value(row.get(k)) for k in COLUMNS}
-            run = Run(**cells, campaign=name)  # type: ignore[arg-type]
+            run = Run(**vars(run_of(row)), campaign=name)
             if run.rpm > 0 and math.isfinite(run.thrust_N):
                 runs.append(run)
         radial: dict[str, list[tuple[float, float, float]]] = {}
