@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
 from types import NoneType, UnionType
-from typing import Any, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Self, TypeVar, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class Documented:
-    """A row that knows its document.
+    """A row that knows its document; every class made from it is a frozen dataclass.
 
-    >>> @dataclass(frozen=True)
-    ... class Load(Documented):
+    >>> class Load(Documented):
     ...     thrust_N: float
     ...     flags: tuple[str, ...] = ()
     ...     u: float | None = None
@@ -31,17 +30,20 @@ class Documented:
     {'thrust_N': 1.5, 'flags': ['stall']}
     """
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Make the class a dataclass."""
+        dataclass(frozen=True, **options)(cls)
+
     def document(self) -> dict[str, Any]:
         """Plain values by name; NaN as it is."""
-        shown = ((f, getattr(self, f.name)) for f in fields(self))
+        shown = ((f, getattr(self, f.name)) for f in fields(self))  # type: ignore[arg-type]
         return {f.name: _told(value) for f, value in shown if value is not None or f.default is not None}
 
     @classmethod
     def from_document(cls, document: Any, lenient: bool = False) -> Self:
         """Row of a document; TypeError where a value has another type or is missing.
 
-        ``lenient``: such a value is the default of its field, and left out of a list; names that nobody knows always
-        are.
+        ``lenient``: such a value is the default of its field, and left out of a list; unknown names always are.
         """
         if not isinstance(document, Mapping):
             raise TypeError(f"{cls.__name__}: got {type(document).__name__}; expected a mapping")
@@ -57,7 +59,7 @@ class Documented:
 
 
 @cache
-def _fields(cls: type) -> tuple[tuple[str, Any, bool], ...]:
+def _fields(cls: Any) -> tuple[tuple[str, Any, bool], ...]:
     """Name, type and whether it may be missing, of every field."""
     kinds = get_type_hints(cls)
     return tuple(
@@ -92,8 +94,6 @@ def rows_of(kind: type[T], found: Any, lenient: bool = False) -> tuple[T, ...]:
 def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
     """Value of a document as its type says; TypeError where it is another."""
     origin, inner = get_origin(kind), get_args(kind)
-    if kind is Any:
-        return value
     if origin in (Union, UnionType):
         if value is None and NoneType in inner and float not in inner:
             return None
@@ -102,24 +102,19 @@ def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
                 return typed(one, value, lenient)
             except TypeError:
                 continue
-    elif kind is float:
-        if value is None:
-            return math.nan
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return value
-    elif origin is Literal:
-        if value in inner:
-            return value
+    elif kind is float and value is None:
+        return math.nan
+    elif kind is Any or (origin is Literal and value in inner):
+        return value
     elif origin is tuple and inner[1:] == (...,):
         return rows_of(inner[0], value, lenient)
-    elif origin is tuple:
-        if isinstance(value, list | tuple) and len(value) == len(inner):
-            return tuple(typed(one, item, lenient) for one, item in zip(inner, value, strict=True))
-    elif origin is not None:
-        if isinstance(value, Mapping):
-            return {str(key): typed(inner[1], item, lenient) for key, item in value.items()}
-    elif issubclass(kind, Documented):
+    elif origin is tuple and isinstance(value, list | tuple) and len(value) == len(inner):
+        return tuple(typed(one, item, lenient) for one, item in zip(inner, value, strict=True))
+    elif origin is Mapping and isinstance(value, Mapping):
+        return {str(key): typed(inner[1], item, lenient) for key, item in value.items()}
+    elif origin is None and issubclass(kind, Documented):
         return kind.from_document(value, lenient)
-    elif isinstance(value, kind) and not (kind is int and isinstance(value, bool)):
-        return value
+    elif origin is None and isinstance(value, int | float if kind is float else kind):
+        if kind not in (int, float) or not isinstance(value, bool):
+            return value
     raise TypeError(f"got {value!r:.80}; expected {getattr(kind, '__name__', kind)}")

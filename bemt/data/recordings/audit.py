@@ -78,7 +78,6 @@ class CfdFacts:
     ducted: bool = False
 
 
-@dataclass(frozen=True)
 class AuditLine(Documented):
     """One setting and its consequence."""
 
@@ -273,7 +272,6 @@ def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
     return (math.nan if any(map(math.isnan, parts)) else known), known
 
 
-@dataclass(frozen=True)
 class Audit(Documented):
     """Lines about one recorded value, and what they come to."""
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,15 +53,6 @@ def _asked_again(out: Path, entry: Entry) -> tuple[str, dict[str, str]] | None:
     return None
 
 
-@dataclass(frozen=True)
-class Said(Documented):
-    """Answer after the step, nothing where it failed."""
-
-    verdict: str | None = None
-    effects: tuple[str, ...] | None = None
-
-
-@dataclass(frozen=True)
 class FollowedItem(Documented):
     """A silent item, the step that was taken, and the answers before and after it in a word."""
 
@@ -70,11 +61,10 @@ class FollowedItem(Documented):
     before: str
     step: str
     after: str
-    said: Said
+    said: Mapping[str, Any]  # Verdict and effects after the step, nothing where it failed
     error: str
 
 
-@dataclass(frozen=True)
 class FollowedItems(Documented):
     """Document of the steps."""
 
@@ -103,7 +93,7 @@ def follow(out: Path, jobs: int = 2, say: Callable[[str], None] | None = None) -
             write_atomic(folder / name, content)
         answer, error = prove.diagnose_folder(folder)
         after = score.answered(score.judge(entry, answer))
-        said = Said(answer.verdict, answer.effects) if answer else Said()
+        said = {"verdict": answer.verdict, "effects": answer.effects} if answer else {}
         return FollowedItem(entry.set, entry.rig, before, step, after, said, "" if answer else error[-500:])
 
     found = prove.on_threads(one, todo, jobs, prove.teller("followed", say))
@@ -123,7 +113,7 @@ def text(told: FollowedItems) -> str:
         rows.append([kind, str(len(some)), *(str(some.count(w)) for w in words)])
     right = sum(r.after in ("found", "class") for r in found)
     head = f"{len(found)} open answers followed by the step they recommend: {right} right or in a class"
-    each = [[r.set, r.rig, r.before, r.step, f"{r.after}: {', '.join(r.said.effects or ())}"]
+    each = [[r.set, r.rig, r.before, r.step, f"{r.after}: {', '.join(r.said.get('effects', ()))}"]
             for r in found]  # fmt: skip
     return "\n\n".join([
         head, text_table(["set", "followed", *words], rows, left=(0,), indent="  "),

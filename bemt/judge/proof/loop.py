@@ -78,7 +78,6 @@ class Course:
         return int(np.count_nonzero(used[: len(self.answers)] <= runs)) - 1
 
 
-@dataclass(frozen=True)
 class After(Documented):
     """What was found after so many runs, each of how many, and the time of the stand [min]."""
 
@@ -93,7 +92,6 @@ class After(Documented):
     minutes: float
 
 
-@dataclass(frozen=True)
 class Loop(Documented):
     """Document of a loop."""
 

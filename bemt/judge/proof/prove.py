@@ -24,7 +24,7 @@ from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.proof import draw, items, proof_text, real, resolve, score, seal
-from bemt.judge.proof.rows import Answer, Key, Miss, Proof, Spent
+from bemt.judge.proof.rows import Answer, Key, Miss, Proof
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -226,7 +226,9 @@ def prove(
             tell(words)
         sealed = time.monotonic()
         diagnose_all(folder, jobs, say)
-        found = replace(proof(folder, digest), seconds=Spent(sealed - began, time.monotonic() - sealed))
+        found = replace(
+            proof(folder, digest), seconds={"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
+        )
         if out:
             write_atomic(folder / "proof.json", json_text(found.document()))
             write_atomic(folder / "proof.txt", proof_text.text(found) + "\n")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Self
 
 from bemt.base.document import Documented
@@ -12,7 +12,6 @@ from bemt.base.document import Documented
 Names = set[str]  # An entry has a field of that name
 
 
-@dataclass(frozen=True)
 class TrueValue(Documented):
     """Parameter of a concealed cause."""
 
@@ -20,7 +19,6 @@ class TrueValue(Documented):
     unit: str = ""
 
 
-@dataclass(frozen=True)
 class Entry(Documented):
     """What the key says of an item; by cause where it is a sequence."""
 
@@ -58,7 +56,6 @@ class Entry(Documented):
         return [{c, *a} for c, a in zip(self.causes, self.alike, strict=True)]
 
 
-@dataclass(frozen=True)
 class Key(Documented):
     """A sealed key."""
 
@@ -69,7 +66,6 @@ class Key(Documented):
     items: tuple[Entry, ...] = ()
 
 
-@dataclass(frozen=True)
 class Estimate(Documented):
     """Parameter that an answer tells, with its 90 % interval."""
 
@@ -78,7 +74,6 @@ class Estimate(Documented):
     high: float = math.nan
 
 
-@dataclass(frozen=True)
 class Ranked(Documented):
     """One explanation."""
 
@@ -87,7 +82,6 @@ class Ranked(Documented):
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
 class Fit(Documented):
     """Errors of a channel."""
 
@@ -97,7 +91,6 @@ class Fit(Documented):
     holdout_after: float = math.nan
 
 
-@dataclass(frozen=True)
 class Location(Documented):
     """Where the residual lies."""
 
@@ -105,7 +98,6 @@ class Location(Documented):
     ties: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
 class Step(Documented):
     """What an answer recommends."""
 
@@ -117,7 +109,6 @@ class Step(Documented):
     otherwise: Step | None = None
 
 
-@dataclass(frozen=True)
 class Answer(Documented):
     """A diagnosis or comparison, as far as the proof reads it; without a verdict, none."""
 
@@ -160,7 +151,6 @@ class Answer(Documented):
         return 0.0 if math.isnan(self.probability) else self.probability
 
 
-@dataclass(frozen=True)
 class Stored(Documented):
     """File of an answer."""
 
@@ -169,7 +159,6 @@ class Stored(Documented):
     seconds: float = math.nan
 
 
-@dataclass(frozen=True)
 class ScoreRow(Documented):
     """A row of the score table."""
 
@@ -185,7 +174,6 @@ class ScoreRow(Documented):
     met: bool | None  # Whether the value meets the target; None without data
 
 
-@dataclass(frozen=True)
 class Risk(Documented):
     """Share of wrong claims among the surest ones, and the probability down to which these go."""
 
@@ -195,7 +183,6 @@ class Risk(Documented):
     probability: float
 
 
-@dataclass(frozen=True)
 class Stratum(Documented):
     """Single causes between two separations."""
 
@@ -207,7 +194,6 @@ class Stratum(Documented):
     right: int
 
 
-@dataclass(frozen=True)
 class Miss(Documented):
     """An item that was not answered as it should be."""
 
@@ -225,15 +211,6 @@ class Miss(Documented):
     error: str
 
 
-@dataclass(frozen=True)
-class Spent(Documented):
-    """Time of a proof [s]."""
-
-    conceal: float
-    diagnose: float
-
-
-@dataclass(frozen=True)
 class Proof(Documented):
     """Document of a proof."""
 
@@ -252,4 +229,4 @@ class Proof(Documented):
     answers: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     misses: tuple[Miss, ...] = ()
     seconds_median: float = math.nan
-    seconds: Spent | None = None
+    seconds: Mapping[str, float] | None = None  # Spent on concealing and on diagnosing

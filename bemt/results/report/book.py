@@ -90,7 +90,6 @@ class CasePage:
     diagnosis: Diagnosed | None = None
 
 
-@dataclass(frozen=True)
 class Reproduced(Documented):
     """A number of the source thesis beside ours."""
 
@@ -145,24 +144,16 @@ class Choice:
     recorded: Sequence[tuple[str, str, float]]  # Label, source, ratio of a recorded thrust
 
 
-@dataclass(frozen=True)
-class Moments:
-    """Thrusts of one drive of a pair."""
-
-    name: str
-    lines: Sequence[tuple[str, str, float, float]]  # Label, source, thrust and its u [N]
-
-
 @dataclass(frozen=True, eq=False)
 class Trends:
-    """The page of trends."""
+    """The page of trends; last the thrusts of one drive of a pair: label, source, thrust and its u [N]."""
 
     family: Family | None = None
     choice: Sequence[Choice] = ()
-    moments: Moments | None = None
+    pair: str = ""
+    moments: Sequence[tuple[str, str, float, float]] = ()
 
 
-@dataclass(frozen=True)
 class About(Documented):
     """Head of the page, as far as wanted."""
 

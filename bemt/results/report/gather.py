@@ -81,7 +81,7 @@ def _trends(solved: Sequence[Case], thesis: Sequence[Result]) -> Trends:
     if base is not None:
         with suppress(InputError, GeometryError, ValueError):
             family = trends.families(base)
-    return Trends(family, trends.choice(thesis), trends.moments(thesis))
+    return Trends(family, trends.choice(thesis), *trends.moments(thesis))
 
 
 def _reproduction(out: Path) -> Sequence[Reproduced]:

@@ -18,7 +18,7 @@ from bemt.base.errors import InputError
 from bemt.base.page import num, table
 from bemt.base.units import G0, INCH, KGF
 from bemt.physics.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
-from bemt.results.report.book import Book, Choice, Family, Line, Moments
+from bemt.results.report.book import Book, Choice, Family, Line
 from bemt.results.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure, points
 from bemt.results.report.values import Section, sections
 from bemt.results.sweep.rows import Result
@@ -102,14 +102,14 @@ def choice(results: Sequence[Result]) -> list[Choice]:
     return out
 
 
-def moments(results: Sequence[Result]) -> Moments | None:
-    """Thrusts of one drive of a pair, whose roll moment about the middle grows with its mounting distance."""
+def moments(results: Sequence[Result]) -> tuple[str, list[tuple[str, str, float, float]]]:
+    """Name and thrusts of one drive of a pair, whose roll moment about the middle grows with its mounting distance."""
     solved = [r for r in results if r.rows]
     chosen = next((r for r in solved if r.kind == "fan"), solved[0] if solved else None)
     if chosen is None:
-        return None
+        return "", []
     found = [r for r in chosen.of("bemt", "cfd", "bench", "vendor") if not math.isnan(r.thrust_N)]
-    return Moments(chosen.name, [(r.label, r.source, r.thrust_N, r.u) for r in found])
+    return chosen.name, [(r.label, r.source, r.thrust_N, r.u) for r in found]
 
 
 NAMES = {"bemt": "BEMT", "cfd": "CFD, recorded"}
@@ -207,26 +207,26 @@ def _choice(rows: Sequence[Choice]) -> Section:
     ]
 
 
-def _moments(d: Moments | None) -> Section:
-    if d is None or not d.lines:
+def _moments(name: str, lines: Sequence[tuple[str, str, float, float]]) -> Section:
+    if not lines:
         return "", []
     x, arm = np.linspace(0.0, 0.4, 9), ARM_M
     traces = []
     used: dict[str, int] = {}
-    for label, source, T, u in d.lines:
+    for label, source, T, u in lines:
         k = used[source] = used.get(source, -1) + 1
         band = [v * u for v in x] if math.isfinite(u) and source == "bemt" else None
         dash = DASHES[(k + list(COLOURS).index(source)) % len(DASHES)] if source in COLOURS else ""
-        name = f"{NAMES.get(source, source) if source == 'bemt' else label}, {T:.4g} N"
-        traces.append(Trace(name, x, [v * T for v in x], band, COLOURS.get(source, COLOURS["other"]), dash))
-    at = [(arm, arm * T, None, f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m") for label, _, T, _ in d.lines]
+        said = f"{NAMES.get(source, source) if source == 'bemt' else label}, {T:.4g} N"
+        traces.append(Trace(said, x, [v * T for v in x], band, COLOURS.get(source, COLOURS["other"]), dash))
+    at = [(arm, arm * T, None, f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m") for label, _, T, _ in lines]
     traces.append(points(f"at {arm:g} m", at, "other", "circle"))
     note = (
         f"One drive of the pair pushes, the other is off. The thesis: 27 N at 0.2 m = 5.4 N m. Here {arm:g} m gives "
-        + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in d.lines)
+        + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in lines)
         + "."
     )
-    plot = Plot(f"Roll moment about the middle ({d.name})", "distance from the centre of mass [m]",
+    plot = Plot(f"Roll moment about the middle ({name})", "distance from the centre of mass [m]",
                 "roll moment [N m]", traces, [Mark(arm, f"arm {arm:g} m")], note, wide=True)  # fmt: skip
     return "Moment of two drives against mounting distance", [("figures", [figure(plot)])]
 
@@ -234,4 +234,6 @@ def _moments(d: Moments | None) -> Section:
 def trend_sections(book: Book) -> list[Section]:
     """Give how thrust moves, and what that means for the robot of the thesis."""
     t = book.trends
-    return sections(_families(t.family, [page.result for page in book.cases]), _choice(t.choice), _moments(t.moments))
+    return sections(
+        _families(t.family, [page.result for page in book.cases]), _choice(t.choice), _moments(t.pair, t.moments)
+    )

@@ -268,17 +268,11 @@ def _fan(case: Case, ready: Model, nominal: Dataset) -> Fan:
     """What a duct adds, at the case's own operating point."""
     rho, v = float(nominal.density_kg_m3[0]), float(nominal.exhaust_speed_m_s[0])
     annulus = math.pi / 4.0 * (ready.diameter_m**2 - ready.hub_diameter_m**2)
+    loads = ("rotor_thrust_N", "duct_thrust_N", "stator_thrust_N", "duct_share", "mass_flow_kg_s")
     return Fan(
-        rotor_thrust_N=nominal.rotor_thrust_N[0],
-        duct_thrust_N=nominal.duct_thrust_N[0],
-        stator_thrust_N=nominal.stator_thrust_N[0],
-        duct_share=nominal.duct_share[0],
-        exhaust_speed_m_s=v,
-        u_exhaust_speed_m_s=nominal.u["exhaust_speed_m_s"][0],
-        mass_flow_kg_s=nominal.mass_flow_kg_s[0],
-        annulus_area_m2=annulus,
-        exit_area_m2=ready.exit_area_m2,
-        exit_momentum_N=rho * ready.exit_area_m2 * v * (v - case.airspeed_m_s),
+        **{name: float(nominal[name][0]) for name in loads}, exhaust_speed_m_s=v,
+        u_exhaust_speed_m_s=nominal.u["exhaust_speed_m_s"][0], annulus_area_m2=annulus,
+        exit_area_m2=ready.exit_area_m2, exit_momentum_N=rho * ready.exit_area_m2 * v * (v - case.airspeed_m_s),
         annulus_solidity=ready.solidity * (math.pi / 4.0 * ready.diameter_m**2) / annulus,
         geometric_pitch_speed_m_s=ready.pitch_m * case.rpm / 60.0,
-    )
+    )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 from bemt.base.document import Documented
@@ -13,7 +13,6 @@ State = Literal["no result", "model unknown", "agrees", "differs", "inside", "op
 """`inside` the model's own band whatever the recording's uncertainty is, `open` until that is stated."""
 
 
-@dataclass(frozen=True)
 class Comparison(Documented):
     """One channel at one point: E = S - D beside its standard uncertainties, in `unit`; NaN where unknown.
 

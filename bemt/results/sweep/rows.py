@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 from bemt.base.document import Documented
@@ -18,7 +18,6 @@ from bemt.results.sweep.comparison import Comparison
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
 
 
-@dataclass(frozen=True)
 class Row(Documented):
     """One model or one recorded value at one operating point."""
 
@@ -58,7 +57,6 @@ class Row(Documented):
     k1k2_u_val: float | None = None
 
 
-@dataclass(frozen=True)
 class Conditions(Documented):
     """Operating point, air, rotor and model of a case."""
 
@@ -81,7 +79,6 @@ class Conditions(Documented):
     convention: str = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)"
 
 
-@dataclass(frozen=True)
 class AssumptionRow(Documented):
     """One value that the source does not state, with its effect at the case's own operating point."""
 
@@ -97,7 +94,6 @@ class AssumptionRow(Documented):
     u_torque_Nm: float
 
 
-@dataclass(frozen=True)
 class Stated(Documented):
     """A recorded value as its file has it."""
 
@@ -111,7 +107,6 @@ class Stated(Documented):
     remark: str
 
 
-@dataclass(frozen=True)
 class Band(Documented):
     """Value with its standard uncertainty."""
 
@@ -119,7 +114,6 @@ class Band(Documented):
     u: float
 
 
-@dataclass(frozen=True)
 class FullThrottle(Documented):
     """Full throttle of a case with a motor, as the tool that knows motors gives it."""
 
@@ -134,7 +128,6 @@ class FullThrottle(Documented):
     g_per_W: Band
 
 
-@dataclass(frozen=True)
 class Fan(Documented):
     """What a duct adds, at the case's own operating point."""
 
@@ -152,7 +145,6 @@ class Fan(Documented):
     geometric_pitch_speed_m_s: float
 
 
-@dataclass(frozen=True)
 class Pair(Documented):
     """What a second rotor adds, at the case's own operating point; the upper rotor is the first."""
 
@@ -178,7 +170,6 @@ class Pair(Documented):
     u_thrust_ratio: float
 
 
-@dataclass(frozen=True)
 class Axis(Documented):
     """Values of one axis of a grid, in the unit of its name."""
 
@@ -187,7 +178,6 @@ class Axis(Documented):
     max: float
 
 
-@dataclass(frozen=True)
 class Statistics(Documented):
     """What is told of the points of a grid: how many, and the ends of their finite values."""
 
@@ -198,22 +188,15 @@ class Statistics(Documented):
     M_tip: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class GridResult(Documented):
+class GridResult(Statistics):
     """A grid that was solved, and where it was written."""
 
     axes: Mapping[str, Axis]
-    points: int
-    unconverged: int
-    thrust_N: tuple[float, float]
-    torque_Nm: tuple[float, float]
-    M_tip: tuple[float, float]
     columns: tuple[str, ...]
     file: str | None
     sha256: str | None
 
 
-@dataclass(frozen=True)
 class Result(Documented):
     """One case: models beside what was recorded; without rows it was not solved, and its faults say why."""
 
@@ -270,7 +253,6 @@ class Result(Documented):
         return next((a for a in self.audit if a.reference == reference), None)
 
 
-@dataclass(frozen=True)
 class Sweep(Documented):
     """All cases, in the order in which they were given."""
 

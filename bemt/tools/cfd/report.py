@@ -38,7 +38,6 @@ Loads = Sequence[tuple[float, float, float]]
 """Radius [m], thrust [N/m] and torque [N] per radius."""
 
 
-@dataclass(frozen=True)
 class Run(RunRow):
     """A run with the campaign that recorded it, and its audit where its case is known."""
 
@@ -60,17 +59,14 @@ class Runs:
     levels: int  # Grids of its own study, 1 without
 
 
-@dataclass(frozen=True)
 class _Study(Documented):
     levels: tuple[Any, ...] = ()
 
 
-@dataclass(frozen=True)
 class _Rule(Documented):
     grid_study: bool = False
 
 
-@dataclass(frozen=True)
 class _Manifest(Documented):
     schema: str = ""
     title: str = ""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 from bemt.base.document import Documented
 from bemt.data.readers import number
 
 
-@dataclass(frozen=True)
 class RunRow(Documented):
     """Point, loads with their standard uncertainties, how it was computed, and how well it settled; NaN: not stated."""
 
@@ -61,7 +60,6 @@ class RunRow(Documented):
         return self.converged == 1
 
 
-@dataclass(frozen=True)
 class LoadStudy(Documented):
     """Grid study of one load, finest grid first; standard uncertainty by level, relative [1]."""
 
@@ -75,7 +73,6 @@ class LoadStudy(Documented):
     u_relative: Mapping[str, float]
 
 
-@dataclass(frozen=True)
 class Study(Documented):
     """Runs that differ in their grid alone, finest first."""
 

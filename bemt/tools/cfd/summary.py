@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +73,6 @@ def _edges(r: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * r[0] - middle[0]], middle, [2 * r[-1] - middle[-1]]])
 
 
-@dataclass(frozen=True)
 class Bands(Documented):
     """Loads of the blades in bands of the radius, and where BEMT's sections stand [deg]."""
 
@@ -86,8 +84,7 @@ class Bands(Documented):
     bemt_alpha_deg: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Compared:
+class Compared(Documented):
     """A run beside BEMT."""
 
     cells: Mapping[str, str]  # Line of the recording as written
@@ -102,8 +99,7 @@ class Compared:
                 "radial": self.radial and self.radial.document()}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class CampaignSummary:
+class CampaignSummary(Documented):
     """One campaign."""
 
     name: str
@@ -115,21 +111,12 @@ class CampaignSummary:
     grid_studies: tuple[Study, ...]
     rows: tuple[Compared, ...]
 
-    def document(self) -> dict[str, Any]:
-        """Entry of the summary."""
-        studies, rows = ([one.document() for one in some] for some in (self.grid_studies, self.rows))
-        return {**vars(self), "grid_studies": studies, "rows": rows}
 
-
-@dataclass(frozen=True)
-class Summary:
+class Summary(Documented):
     """All campaigns of a folder."""
 
+    schema: str
     campaigns: tuple[CampaignSummary, ...]
-
-    def document(self) -> dict[str, Any]:
-        """``bemt.cfd-summary/1``."""
-        return {"schema": "bemt.cfd-summary/1", "campaigns": [one.document() for one in self.campaigns]}
 
 
 def _radial(campaign: Campaign, run: str, found: solver.Solution) -> Bands | None:
@@ -171,7 +158,7 @@ def summary(folder: str | Path) -> Summary:
         balanced = sum(not math.isnan(run.balance_mass) for run in settled)
         out.append(CampaignSummary(campaign.name, campaign.title, len(campaign.points), len(rows), len(settled),
                                    balanced, studies_of(path.parent), tuple(rows)))  # fmt: skip
-    return Summary(tuple(out))
+    return Summary("bemt.cfd-summary/1", tuple(out))
 
 
 def _leak(run: RunRow) -> str:

@@ -252,7 +252,7 @@ def run_grid(
     axes = {n: Axis(v.size, v.min(), v.max()) for n, v in zip(grid.names, grid.values, strict=True)}
     file = None if folder is None else f"{case.name}/grid.{form}"
     merged = _merge([statistics[number] for number in range(grid.chunks)])
-    return GridResult(axes, **vars(merged), columns=names, file=file, sha256=digest)
+    return GridResult(**vars(merged), axes=axes, columns=names, file=file, sha256=digest)
 
 
 def _part(parts: Path, number: int, form: str) -> Path:
