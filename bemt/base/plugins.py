@@ -4,8 +4,8 @@ A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a
 
 * ``CASE_PARTS``: entry of a case's results; the attribute takes a :class:`bemt.rotors.case.Case` and gives a document
   or None;
-* ``REPORT_PARTS``: part of a report; the attribute takes its book (the cases, to which it may add) and the folder of
-  results, and gives pages with id, name, title, top and sections (:mod:`bemt.results.report.values`);
+* ``REPORT_PARTS``: part of a report; the attribute takes its :class:`bemt.results.report.book.Book` and the folder of
+  results, and gives the book with what it knows put to the cases and its pages to the tools;
 * ``EXPORTS``: target of ``export``; the attribute is its class;
 * ``ACTIONS``: name at both doors; the attribute is the public function.
 
