@@ -21,6 +21,7 @@ from typing import Any
 import bemt.app.commands
 from bemt import __version__
 from bemt.app.commands._terminal import coloured
+from bemt.base import plugins
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 
 EXIT_INTERRUPTED = 130
@@ -73,6 +74,7 @@ class _Parser(argparse.ArgumentParser):
             choices = [word.strip(" '") for word in known.split(",")]
             what = "command" if name == "COMMAND" else name
             message = f"{what}: got {got}; expected one of {', '.join(choices)}.{did_you_mean(got, choices)}"
+            message = plugins.missing(got) or message
         super().error(message)
 
 
@@ -199,6 +201,9 @@ def _main(argv: list[str]) -> int:
     except Exception as error:
         if isinstance(error, OSError) and error.strerror:  # a system error; others come from libraries
             print(system_fault(error), file=sys.stderr)
+            return EXIT_INPUT
+        if isinstance(error, ImportError) and (missing := plugins.missing_module(error)):
+            print(missing, file=sys.stderr)
             return EXIT_INPUT
         if isinstance(error, ImportError) and (error.name or "").partition(".")[0] == "geometry":
             found = importlib.util.find_spec("geometry")

@@ -22,11 +22,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument("case", metavar="CASE", help="case file, its folder, or a folder of cases")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the files and manifest.json")
-    from bemt.tools.exports import target_ids
+    from bemt.base.plugins import missing
 
-    kinds = target_ids()
+    kinds: list[str] = []
+    if not missing("exports"):
+        from bemt.tools.exports import target_ids
+
+        kinds = target_ids()
     what = f"one or more (default stl): {', '.join(kinds)}"
-    parser.add_argument("--format", choices=kinds, metavar="TARGET", help=what, **_options.MANY)
+    parser.add_argument("--format", choices=kinds or None, metavar="TARGET", help=what, **_options.MANY)
     parser.add_argument(
         "--unit", choices=("mm", "m"), default="mm", help="unit of the files (default mm; openfoam is always in m)"
     )

@@ -9,19 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from bemt import __version__
 from bemt.base import plugins, units
 from bemt.base.arrays import Array
-from bemt.data.readers import references as reference_file
-from bemt.data.recordings import audit_remarks
-from bemt.data.recordings.cfd_setup import references_of
-from bemt.data.recordings.load import import_file
 from bemt.physics import effects
-from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.dataset import Dataset
 from bemt.results.sweep.comparison import Comparison
 from bemt.rotors.case import Case
@@ -29,6 +24,8 @@ from bemt.rotors.case.propagate import BANDED, Moved, Points, prepared, propagat
 from bemt.rotors.validity import serious
 
 if TYPE_CHECKING:
+    from bemt.data.readers.references import Reference
+    from bemt.physics.bem.coaxial import PairModel
     from bemt.physics.bem.model import Model
 
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
@@ -39,17 +36,24 @@ COMPARED = {
 """Channels that are compared, with their units."""
 
 
-def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[float, float, float]]:
+def _points(case: Case, refs: Sequence[Reference]) -> list[tuple[float, float, float]]:
     """Distinct operating points (rpm, airspeed, density): the case's own first, then those of its references."""
     own = (case.rpm, case.airspeed_m_s, case.air().rho)
     return list(dict.fromkeys([own, *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]))
 
 
-def _references(case: Case) -> list[reference_file.Reference]:
+def _references(case: Case) -> list[Reference]:
     """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
-    read = [] if case.references_path is None else reference_file.read(case.references_path)
+    read: list[Reference] = []
+    if case.references_path is not None:
+        from bemt.data.readers import references
+
+        read += references.read(case.references_path)
     for path in case.run_paths:
+        from bemt.data.recordings.cfd_setup import references_of
+        from bemt.data.recordings.load import import_file
+
         read += references_of(import_file(path), str(path))
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
@@ -159,30 +163,43 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "variants": variants,
         "other_rows": [r for r in recorded if r["source"] not in ROW_SOURCES],
         "comparisons": comparisons,
-        "audit": audit_remarks.audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted),
+        "audit": _audit(case, recorded, ready),
         "conditions": _description(case, ready, case.file.model.stations),
         "assumptions": [_assumption(moved) for moved in found.moved],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
                         "channel": r.channel, "source": r.source, "remark": r.remark} for r in refs],
         "drive": plugins.part("drive", case),
-        "fan": None if isinstance(ready, PairModel) or not case.ducted else _fan(case, ready, nominal),
+        "fan": None if case.paired or not case.ducted else _fan(case, cast("Model", ready), nominal),
         "pair": _pair(case, nominal) if case.paired else None,
-        "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes],
+        "notes": [*([case.file.notes.strip()] if case.file.notes else []), *ready.notes, *plugins.missing_for(case)],
         "faults": [],
     }  # fmt: skip
 
 
+def _audit(case: Case, recorded: Sequence[Mapping[str, Any]], ready: Model | PairModel) -> list[dict[str, Any]]:
+    """Audit of the CFD among the recorded values."""
+    if not any(row["source"] == "cfd" for row in recorded):
+        return []
+    from bemt.data.recordings.audit_remarks import audit_rows
+
+    return audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted)
+
+
 def _recorded_rows(
     case: Case,
-    refs: list[reference_file.Reference],
+    refs: list[Reference],
     diameter: float,
     points: list[tuple[float, float, float]],
     nominal: Dataset,
 ) -> list[dict[str, Any]]:
     """Rows of all recorded values, coefficients derived."""
+    if not refs:
+        return []
+    from bemt.data.readers.references import to_series
+
     rows = []
     printed = {r.where: r.printed for r in refs}
-    for group in reference_file.to_series(refs, case.name):
+    for group in to_series(refs, case.name):
         full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
@@ -246,6 +263,8 @@ def _description(case: Case, ready: Model | PairModel, stations: int) -> dict[st
 
 def _pair(case: Case, nominal: Dataset) -> dict[str, Any]:
     """What a second rotor adds, at the case's own operating point."""
+    from bemt.physics.bem.coaxial import LOADS, RATIOS
+
     told = case.file.second_rotor
     assert told is not None  # the caller asks for a pair
     names = ("lower_rpm", *LOADS, *RATIOS)

@@ -222,8 +222,8 @@ def option_faults(given: Mapping[str, Any], name: Callable[[str], str] | None = 
     """
     out = Collector("")
     for key, value in given.items():
-        target = next(target for target in exports().values() if key in target.options.named())
-        check_field(out, name(key) if name else target.option(key, value)[0], target.options, key, value)
+        for target in [target for target in exports().values() if key in target.options.named()][:1]:
+            check_field(out, name(key) if name else target.option(key, value)[0], target.options, key, value)
     return out.faults
 
 
@@ -235,8 +235,8 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
     for key, value in given.items():
         if key not in used:
             readers = {name: target for name, target in exports().items() if key in target.uses}
-            option, got = next(iter(readers.values())).option(key, value)
-            faults.append(Fault("", option, got, wanted, f"Formats that read it: {', '.join(readers)}"))
+            option, got = next(iter([*readers.values(), *exports().values()])).option(key, value)
+            faults.append(Fault("", option, got, wanted, f"Formats that read it: {', '.join(readers) or 'none here'}"))
     if hold and all(exports()[name].kind == "solid" for name in formats):
         faults.append(
             Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")
