@@ -124,22 +124,18 @@ def draw(found: Counter[tuple[str, str]]) -> None:
     plt.close(fig)
 
 
-def table(found: Counter[tuple[str, str]]) -> str:
+def table() -> str:
     """Table of the page."""
-    rows = []
-    for name in ORDER:
-        folder = ROOT / name if name == "geometry" else ROOT / "bemt" / name
-        to = ", ".join(b for b in ORDER if (name, b) in found) or "nothing"
-        rows.append(f"| `{name}/` | {purpose(folder)} | {lines(name):,} | {to} |")
-    return "\n".join(["| wing | what it is for | lines | imports |", "|---|---|---|---|", *rows]) + "\n"
+    folders = {name: ROOT / name if name == "geometry" else ROOT / "bemt" / name for name in ORDER}
+    rows = [f"| `{name}/` | {purpose(folder)} |" for name, folder in folders.items()]
+    return "\n".join(["| wing | what it is for |", "|---|---|", *rows]) + "\n"
 
 
 def main() -> None:
     """Rewrite picture and table."""
-    found = arrows()
-    draw(found)
+    draw(arrows())
     text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(re.sub(r"\| wing \|.*\n(\|.*\n)*", lambda _: table(found), text), encoding="utf-8")
+    PAGE.write_text(re.sub(r"\| wing \|.*\n(\|.*\n)*", lambda _: table(), text), encoding="utf-8")
 
 
 if __name__ == "__main__":

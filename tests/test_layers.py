@@ -520,7 +520,7 @@ SWEEP_LINES = 22_000
 
 
 def test_a_sweep_loads_what_it_needs(project: Path) -> None:
-    """Lines of the modules in a fresh interpreter; ``pytest -n 0 tests/test_layers.py -k loads_what -s`` prints them."""
+    """Lines of the modules in a fresh interpreter; with ``-n 0 -s`` they are printed."""
     program = f"""
 import contextlib, io, runpy, sys
 sys.argv = ['bemt', 'sweep', 'cases/prop_8x5']
