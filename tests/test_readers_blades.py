@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.readers import aerodyn, detect, dfdc, qprop, xrotor
 from bemt.data.readers.stations import read_stations

@@ -25,7 +25,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.page import render
 from bemt.results.report import book_html
 from bemt.results.report.found_files import safe_files

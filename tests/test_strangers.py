@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers
 from bemt.data.readers.stations import read_stations

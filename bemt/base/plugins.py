@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import re
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -72,26 +71,28 @@ def part(table: str, case: Any) -> Any:
     return None if where is None or getattr(case.file, table) is None else load(where)(case)
 
 
-def missing(word: str) -> str:
-    """Sentence on the tool that an action, a target or a table of a case needs; empty if it is here or none is needed.
+def absent() -> list[str]:
+    """Tools that are not here."""
+    here = {tool.__name__.split(".")[2] for tool in _tools()}
+    return sorted(set(TOOLS) - here)
 
-    >>> missing("drive"), missing("nothing of ours")
-    ('', '')
+
+def tool_of(word: str) -> str:
+    """Absent tool that a command, a target or a table of a case belongs to; empty where there is none."""
+    return next((tool for tool in absent() if word in (tool, *TOOLS[tool])), "")
+
+
+def missing(tool: str) -> str:
+    """Sentence that says how an absent tool comes back.
+
+    >>> missing("drive").partition(",")[0]
+    'The drive tool is not installed: put the folder bemt/tools/drive back'
     """
-    name = next((name for name, words in TOOLS.items() if word in (name, *words)), None)
-    if name is None or any(tool.__name__.split(".")[2] == name for tool in _tools()):
-        return ""
-    how = f"put the folder bemt/tools/{name} back, or install bemt {__version__} anew"
-    return f"The {name} tool is not installed: {how}."
+    how = f"put the folder bemt/tools/{tool} back, or install bemt {__version__} anew"
+    return f"The {tool} tool is not installed: {how}."
 
 
 def missing_for(case: Any) -> list[str]:
-    """Sentences on the tools that the tables of a case need and that are not here."""
-    found = {table: missing(table) for table in CASE_TABLES if getattr(case.file, table) is not None}
-    return [f"[{table}] is left out. {sentence}" for table, sentence in found.items() if sentence]
-
-
-def missing_module(error: ImportError) -> str:
-    """Sentence on the tool whose module could not be imported; empty if it was none of a tool."""
-    found = re.match(r"bemt\.tools\.(\w+)", error.name or "")
-    return missing(found[1]) if found else ""
+    """Sentences on the absent tools that the tables of a case need."""
+    tables = [table for table in CASE_TABLES if getattr(case.file, table) is not None and tool_of(table)]
+    return [f"[{table}] is left out. {missing(tool_of(table))}" for table in tables]

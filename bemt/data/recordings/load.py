@@ -1,6 +1,6 @@
 r"""What is in a file of results, with honest means.
 
-Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``). The files of one CFD run are
+Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period-s``). The files of one CFD run are
 shown as they are, and then as one run (`bemt.data.recordings.cfd_run`): joined, with the units, sign, sector and zones
 that the user states.
 
@@ -90,7 +90,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
     elif record.provenance.get("clock") == "time":
-        note = "mean over all rows, including start-up; give --rpm or --period for whole revolutions"
+        note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
 

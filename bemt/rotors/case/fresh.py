@@ -58,7 +58,7 @@ def read_label(label: str, blades: int | None = None) -> Designation:
     try:
         found = parse_designation(label)
     except GeometryError as error:
-        raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from None
+        raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
         raise InputError(Fault("--blades", "", str(blades), f"{found.blades}, as in {label}"))
     return replace(found, blades=blades or found.blades or 2)

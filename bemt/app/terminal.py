@@ -27,12 +27,17 @@ REFUSED = ((YELLOW, r"^\S*[Ww]arning: "), (RED, r"^.*?: (?=got )|^.*?: error: |^
 
 @contextmanager
 def progress(quiet: bool = False) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a line; does nothing if quiet, or if stderr is not a terminal."""
+    """Give a function that shows a line; does nothing if quiet, or if stderr is not a terminal.
+
+    A line that ends with a line feed stays, on every stream.
+    """
     shown = sys.stderr.isatty() and not quiet
     width = shutil.get_terminal_size().columns - 1  # a wrapped line could not be taken back
 
     def say(line: str) -> None:
-        if shown:
+        if line.endswith("\n"):
+            complain(("\r\x1b[2K" if shown else "") + line.rstrip("\n"))
+        elif shown:
             sys.stderr.write(f"\r\x1b[2K{line[:width]}")
             sys.stderr.flush()
 

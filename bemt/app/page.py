@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import bemt
+from bemt.app.face import parameters
 
 FORMATS = ("stl", "qprop", "xrotor", "jsbsim", "rotor-disk", "table")
 BLUE, ORANGE = "#0072B2", "#D55E00"
@@ -68,21 +69,26 @@ def curve(st: Any, points: Any, x: str, y: str, words: tuple[str, str], measured
     st.pyplot(figure)
 
 
+def told(name: str) -> str:
+    """What the declarations of the actions say of a parameter, as in the help of the command line."""
+    return next(p.help for action in (bemt.estimate, bemt.drive) for p in parameters(action) if p.name == name)
+
+
 def asked(st: Any) -> tuple[bemt.Propeller, dict[str, float]]:
     """What the user sets: the propeller and its point."""
     with st.sidebar:
         st.header("Propeller")
-        label = st.text_input("Label", "10x5", help="10x4.7, APC 10x4.7SF, 8x5x3, 5045")
+        label = st.text_input("Label", "10x5", help=told("label"))
         known = st.checkbox("I measured the chord")
         chord = st.slider("Largest chord / radius", 0.05, 0.40, 0.20, 0.005, disabled=not known)
         pitch = st.slider("Pitch / pitch of the label", 0.7, 1.3, 1.0, 0.01)
         st.header("Operating point")
-        rpm = st.slider("Speed of rotation [rev/min]", 1000, 25000, 6000, 100)
-        airspeed = st.slider("Airspeed [m/s]", 0.0, 40.0, 0.0, 0.5)
+        rpm = st.slider("Speed of rotation [rev/min]", 1000, 25000, 6000, 100, help=told("rpm"))
+        airspeed = st.slider("Airspeed [m/s]", 0.0, 40.0, 0.0, 0.5, help=told("airspeed_m_s"))
         st.header("Motor and battery")
         motor = st.checkbox("With a motor")
-        kv = st.slider("K_v [rev/min/V]", 100, 4000, 900, 10, disabled=not motor)
-        cells = st.slider("LiPo cells", 1, 12, 3, disabled=not motor)
+        kv = st.slider("K_v [rev/min/V]", 100, 4000, 900, 10, disabled=not motor, help=told("kv"))
+        cells = st.slider("LiPo cells", 1, 12, 3, disabled=not motor, help=told("cells"))
     point = {"rpm": float(rpm), "airspeed_m_s": float(airspeed)}
     return made(label, chord if known else 0.0, pitch), point | ({"kv": kv, "cells": cells} if motor else {})
 
@@ -148,6 +154,9 @@ def main() -> None:
     """Draw the page."""
     import streamlit as st
 
+    from bemt.app.served import end_with_parent
+
+    end_with_parent()
     st.set_page_config(page_title="bemt", layout="wide")
     st.title("Propellers with uncertainty")
     st.caption(ABOUT)

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.app.library.given import conditions, in_words_of_the_library, number, numbers, path_text, turned
+from bemt.base.action import in_words_of_the_library, worded
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import table_html
+from bemt.base.given import number, numbers, path_text
 from bemt.base.tables import number_of
 from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
+from bemt.rotors.case.asked import conditions, turned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,6 +116,7 @@ class Propeller:
         """
         return {item.key: item.range_text for item in self.case.assumptions}
 
+    @worded
     def solve(
         self, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None, *, J: ArrayLike | None = None,
         angle_deg: ArrayLike | None = None, density_kg_m3: float | None = None, bands: bool = True,
@@ -175,6 +178,7 @@ class Propeller:
         return Dataset("bemt", self.name, {key: found[key] for key in names}, flags=found.flags, provenance=about,
                        u_by=by, notes=notes if bands else (), units=found.units)  # fmt: skip
 
+    @worded
     def coaxial(
         self, z_over_D: float | None = None, *, spacing_mm: float | None = None, second: str | None = None,
         turns: str = "opposite", rpm_ratio: float | None = None, rpm: float | None = None,
@@ -238,6 +242,7 @@ class Propeller:
         with in_words_of_the_library(keys, self.case.path.as_posix()):
             return Propeller(case_of(text, self.case.folder), text)
 
+    @worded
     def curve(
         self, rpm: ArrayLike | None = None, J: ArrayLike | None = None, *, airspeed_m_s: ArrayLike | None = None,
         density_kg_m3: float | None = None, bands: bool = True,
@@ -277,6 +282,7 @@ class Propeller:
             speed = {"J": b, "airspeed_m_s": airspeed_m_s}  # refused below
         return self.solve(a, density_kg_m3=density_kg_m3, bands=bands, **speed)
 
+    @worded
     def along_blade(
         self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None,
         density_kg_m3: float | None = None,
@@ -332,6 +338,7 @@ class Propeller:
             "torque_per_radius_Nm_m": at["dQ"] / width,
         })  # fmt: skip
 
+    @worded
     def gradient(
         self, rpm: float | None = None, airspeed_m_s: float | None = None, *, J: float | None = None
     ) -> Gradient:
@@ -443,6 +450,7 @@ class Propeller:
         return file
 
 
+@worded
 def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
     blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0,
@@ -508,8 +516,7 @@ def propeller(
     if faults:
         raise InputError(faults)
     if label is not None:
-        with in_words_of_the_library():
-            text = fresh.label_text(label, blades, rpm, airspeed_m_s)
+        text = fresh.label_text(label, blades, rpm, airspeed_m_s)
         return Propeller(case_of(text), text)
     assert stations is not None and diameter_m is not None
     file = Path(stations)
@@ -552,14 +559,16 @@ def load(path: str | os.PathLike[str]) -> Propeller:
     return Propeller(case, case.path.read_text(encoding="utf-8-sig"))
 
 
-def rotor_of(given: Propeller | str | os.PathLike[str]) -> Propeller:
+def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
     """Propeller as it is, of a case, or of a label."""
     if isinstance(given, Propeller):
         return given
+    if isinstance(given, Case):
+        return Propeller(given, given.path.read_text(encoding="utf-8-sig") if given.path.is_file() else "")
     what: object = given
     if not isinstance(what, (str, os.PathLike)):
         expected = "a Propeller, a case or a label"
-        raise InputError(Fault("", "propeller", f"{type(given).__name__} {given!r:.40}", expected))
+        raise InputError(Fault("", "case", f"{type(given).__name__} {given!r:.40}", expected))
     text = os.fspath(given)
     if Path(text).exists() or text.endswith(".toml") or "/" in text:
         return load(text)
