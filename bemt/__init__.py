@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from bemt.tools.drive.actions import map as map
     from bemt.tools.drive.actions import motor as motor
     from bemt.tools.drive.actions import thrusters as thrusters
+    from bemt.tools.exports.actions import export as export
 
 _OBJECTS = {
     "Answer": "bemt.judge.diagnose.ask", "Dataset": "bemt.physics.dataset", "InputError": "bemt.base.errors",

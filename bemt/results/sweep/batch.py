@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bemt
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
@@ -27,10 +27,12 @@ from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.grid.formats import FORMATS, require_extra
-from bemt.results.sweep.grid.run import Engine, run_grid
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.store import SCHEMA, fingerprint
 from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
+
+if TYPE_CHECKING:
+    from bemt.results.sweep.grid.run import Engine
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -96,9 +98,13 @@ def run_case(
             store.remove_result(folder)
         share = 0.5 if case.axes() else 1.0
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
-        grid = run_grid(
-            case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
-        )
+        grid = None
+        if case.axes():
+            from bemt.results.sweep.grid.run import run_grid
+
+            grid = run_grid(
+                case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
+            )
         result = Result.from_document(plain(replace(result, grid=grid).document()))  # as it will be read back
         if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
             if folder is not None:

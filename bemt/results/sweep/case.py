@@ -9,20 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from bemt import __version__
 from bemt.base import plugins, units
 from bemt.base.arrays import Array
-from bemt.data.readers import references as reference_file
-from bemt.data.recordings.audit import Audit, CfdFacts
-from bemt.data.recordings.audit_remarks import facts_from_remark
-from bemt.data.recordings.cfd_setup import references_of
-from bemt.data.recordings.load import import_file
 from bemt.physics import effects
-from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.dataset import Dataset
 from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.rows import (
@@ -41,6 +35,9 @@ from bemt.rotors.case.propagate import BANDED, Moved, Points, prepared, propagat
 from bemt.rotors.validity import serious
 
 if TYPE_CHECKING:
+    from bemt.data.readers.references import Reference
+    from bemt.data.recordings.audit import Audit
+    from bemt.physics.bem.coaxial import PairModel
     from bemt.physics.bem.model import Model
 
 COMPARED = {
@@ -50,17 +47,24 @@ COMPARED = {
 """Channels that are compared, with their units."""
 
 
-def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[float, float, float]]:
+def _points(case: Case, refs: Sequence[Reference]) -> list[tuple[float, float, float]]:
     """Distinct operating points (rpm, airspeed, density): the case's own first, then those of its references."""
     own = (case.rpm, case.airspeed_m_s, case.air().rho)
     return list(dict.fromkeys([own, *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]))
 
 
-def _references(case: Case) -> list[reference_file.Reference]:
+def _references(case: Case) -> list[Reference]:
     """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
-    read = [] if case.references_path is None else reference_file.read(case.references_path)
+    read: list[Reference] = []
+    if case.references_path is not None:
+        from bemt.data.readers import references
+
+        read += references.read(case.references_path)
     for path in case.run_paths:
+        from bemt.data.recordings.cfd_setup import references_of
+        from bemt.data.recordings.load import import_file
+
         read += references_of(import_file(path), str(path))
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
@@ -171,9 +175,10 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         references=tuple(Stated(r.quantity, r.kind, r.printed, r.value, r.u, r.channel, r.source, r.remark)
                          for r in refs),
         drive=None if drive is None else FullThrottle.from_document(drive),
-        fan=None if isinstance(ready, PairModel) or not case.ducted else _fan(case, ready, nominal),
+        fan=None if case.paired or not case.ducted else _fan(case, cast("Model", ready), nominal),
         pair=_pair(case, nominal) if case.paired else None,
-        notes=(*([case.file.notes.strip()] if case.file.notes else []), *ready.notes),
+        notes=(*([case.file.notes.strip()] if case.file.notes else []), *ready.notes,
+               *plugins.missing_for(case)),
     )  # fmt: skip
 
 
@@ -183,15 +188,19 @@ Recorded = tuple[Row, int, dict[str, float]]
 
 def _recorded_rows(
     case: Case,
-    refs: list[reference_file.Reference],
+    refs: list[Reference],
     diameter: float,
     points: list[tuple[float, float, float]],
     nominal: Dataset,
 ) -> list[Recorded]:
     """Rows of all recorded values, coefficients derived."""
+    if not refs:
+        return []
+    from bemt.data.readers.references import to_series
+
     rows = []
     printed = {r.where: r.printed for r in refs}
-    for group in reference_file.to_series(refs, case.name):
+    for group in to_series(refs, case.name):
         full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
@@ -228,6 +237,9 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
 
 def _audit(row: Row, ready: Model | PairModel, ducted: bool) -> Audit:
     """Audit of a recorded CFD value by its remark."""
+    from bemt.data.recordings.audit import Audit, CfdFacts
+    from bemt.data.recordings.audit_remarks import facts_from_remark
+
     D = ready.diameter_m
     known = CfdFacts(M_tip=float(row.M_tip), J=row.airspeed_m_s / (row.rpm / 60.0 * D),
                      pitch_over_D=ready.pitch_m / D, CT=row.CT, ducted=ducted)  # fmt: skip
@@ -256,6 +268,8 @@ def _description(case: Case, ready: Model | PairModel, stations: int) -> Conditi
 
 def _pair(case: Case, nominal: Dataset) -> Pair:
     """What a second rotor adds, at the case's own operating point."""
+    from bemt.physics.bem.coaxial import LOADS, RATIOS
+
     told = case.file.second_rotor
     assert told is not None  # the caller asks for a pair
     names = ("lower_rpm", *LOADS, *RATIOS)

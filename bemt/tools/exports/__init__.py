@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["exports", "target_ids"]
 
-_SHARED = {"base", "blades", "folder", "hub", "manifest", "offers", "parts", "performance", "printing"}
+_SHARED = {"actions", "base", "blades", "folder", "hub", "manifest", "offers", "parts", "performance", "printing"}
 """Files of this folder that are no targets."""
 
 

@@ -16,7 +16,7 @@ from bemt.base import plugins
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import plain, write_atomic
-from bemt.base.toml import Table, shown
+from bemt.base.toml import Table
 from bemt.rotors.case.schema import PointTable
 from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
 from bemt.tools.exports.performance import (
@@ -236,24 +236,6 @@ class Export(ABC):
             if str(data)[:2] == "#!":
                 os.chmod(path, 0o755)
         return {"schema": SCHEMA, "name": job.case.name, "files": [], "targets": [made]}
-
-    def option(self, key: str, value: Any) -> tuple[str, str]:
-        """Name on the command line of an option and how its value is shown.
-
-        Parameters
-        ----------
-        key : str
-            Field of `options`.
-        value : object
-            What was given.
-
-        Returns
-        -------
-        tuple of str
-            Name, value.
-        """
-        name = "airspeed" if key == "airspeed_m_s" else key.replace("_", "-")
-        return f"--{name}", shown(value).strip("'")
 
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal on its own part of the manifest.

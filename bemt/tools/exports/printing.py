@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from bemt.base.errors import Fault
+from bemt.base.errors import Fault, InputError
 from bemt.rotors.case import Case
 from geometry.common import GeometryError
 from geometry.duct import Duct
@@ -41,6 +41,17 @@ class Print:
 def asked(request: Print) -> list[str]:
     """Options that were given."""
     return [f"--{f.name.replace('_', '-')}" for f in fields(request) if getattr(request, f.name) is not None]
+
+
+def request_of(printable: bool, **given: Any) -> Print | None:
+    """What the options ask of a printer, None without ``printable``; InputError where one of its own comes alone."""
+    request = Print(**given)
+    if printable:
+        return request
+    alone = asked(replace(request, min_thickness_mm=None, flare_mm=None))  # those are options of any solid
+    if alone:
+        raise InputError([Fault("", name, "given", "nothing without --printable") for name in alone])
+    return None
 
 
 def faults_of(request: Print, formats: Sequence[str]) -> list[Fault]:

@@ -87,7 +87,7 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
 
     kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
     pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
-                         usecols=lambda c: bool((_USED.fullmatch(n := _label(str(c))) or _SPEED.fullmatch(n))))  # fmt: skip
+                         usecols=lambda c: bool(_USED.fullmatch(n := _label(str(c))) or _SPEED.fullmatch(n)))  # fmt: skip
     for piece in pieces:
         piece.columns = [_label(str(c)) for c in piece.columns]
         for c in piece.columns:

@@ -126,7 +126,7 @@ def _look(a: FlightAnswer) -> str:
         return f"Look at motors {names}: they work {size}or more harder than {others}. Damaged blades would do this."
     if first.startswith(BLADE):
         k = first.removeprefix(BLADE)
-        same = [f"a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
+        same = ["a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
         what = _alternatives(["a damaged blade", *same])
         return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
     where = first.removeprefix(WEIGHT)
