@@ -522,7 +522,6 @@ def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from bemt.app.cli import main
-    from bemt.results.sweep.summary import summary
 
     monkeypatch.chdir(tmp_path)
     for folder in ("one", "two"):
