@@ -37,7 +37,7 @@ _SHARE = 0.1  # flights whose sensor of one given motor is at fault, beforehand:
 _OTHER = 0.02  # of these, readings that are no such fraction: a counter counts [1]
 _SICK, _SICK_SHARE = 0.35, 0.1  # range of log speed over drive that a fault of blade or motor reaches, and its share
 _STOPPED = 1e-3  # rotors that stand in flight, of those that read so: six rotors can fly on five [1]
-_LEVEL, _ALONE, _COUNT, _EXPONENT = 0.013, 0.03, 0.01, 0.2
+_LEVEL, _ALONE, _COUNT, _EXPONENT = 0.013, 0.03, 0.015, 0.2
 """Standard deviation of log speed over the root of the command between the motors of a sound vehicle (four motors of
 two Crazyflies 2.1: brushed 1.3 %, brushless 0.4 %); of the speed alone (half the trim of the thrusts, 6 %); of a count
 (an assumption); of the exponent, 1/2 (an assumption, as in :mod:`bemt.tools.flight.motor_speed`) [1]."""
@@ -109,8 +109,8 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
             # Blades are missed more often than edges are doubled.
             share = _SHARE * (1.0 - _OTHER) * (0.8 / 4 if f < 1 else 0.2 / 3)
             over[f] = like_others + _log_normal(x - float(np.log(float(f))) - _GRID, _COUNT) + np.log(share)
-        for f, v in over.items():
-            logs[f] = float(v.max() + np.log(np.sum(np.exp(v - v.max())) * (_GRID[1] - _GRID[0])))
+        for count, v in over.items():
+            logs[count] = float(v.max() + np.log(np.sum(np.exp(v - v.max())) * (_GRID[1] - _GRID[0])))
         top = max(logs.values())
         evidence = top + float(np.log(sum(np.exp(v - top) for v in logs.values())))
         if np.exp(logs[Fraction(1)] - evidence) < 1.0 - NAMED:
