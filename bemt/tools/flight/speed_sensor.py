@@ -7,7 +7,7 @@ sound, k/m, and another number, and the evidence is
 
 * the speed over the square root of the command beside that of the rotors which are sound, in the rows where it reads;
 * the balance: with the thrusts that the reading implies, or those of the repaired one, roll, pitch and yaw are as far
-  from even as in healthy vehicles (:data:`bemt.tools.flight.balance.TRIM`);
+  from even as in healthy vehicles (:data:`bemt.tools.flight.balance.TRIM`), or as a damaged rotor leaves them;
 * the share of rows in which it reads nothing that could be a speed of its mode (zeros, counts that decay).
 
 The repaired speed is the mean of what these leave: the reading times m/k, the command, the balance. Rows without a
@@ -44,7 +44,8 @@ two Crazyflies 2.1: brushed 1.3 %, brushless 0.4 %); of the speed alone (half th
 _MODE = 0.28  # log distance from its mode up to which a row reads: half the way to the next count
 _DROPS = 0.01  # share of lost rows from which a sensor drops out [1]
 _RANGE = float(np.log(30.0))  # of log readings that are no fraction
-_GRID = np.linspace(-0.4, 0.4, 401)  # log level of a repaired speed beside the others
+_GRID = np.linspace(-0.4, 0.4, 201)  # log level of a repaired speed beside the others
+_LOSSES = np.linspace(0.05, 0.7, 8)  # log losses of the thrust constant of a damaged rotor
 
 
 def checked(log: FlightLog) -> FlightLog:
@@ -98,8 +99,7 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
         grid = np.append(_GRID, max(x, -9.0))
         every = np.broadcast_to(shares, (grid.size, B)).copy()
         every[:, i] = np.exp(2.0 * grid) * thrust[i]
-        y = (every / every.mean(axis=1, keepdims=True) - 1.0) @ axes.T / trim
-        balance = -0.5 * (TRIM_FREE + len(axes)) * np.log1p(np.sum(y**2, axis=1) / TRIM_FREE)
+        balance = _balance(every, axes / trim[:, None])
         like_others = balance[:-1] + _log_normal(_GRID, u[i])
         sick = _SICK_SHARE / (2.0 * _SICK) if abs(x) < _SICK else _STOPPED * (x < -1.0)
         sound = (1.0 - _SHARE) * ((1.0 - _SICK_SHARE) * float(np.exp(_log_normal(x, u[i]))) + sick)
@@ -127,13 +127,30 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
     for i in range(B):
         zeros = reading[:, i] <= 0.0
         if i in faults:
-            with np.errstate(divide="ignore"):
+            mode = _mode(reading[:, i], middle)
+            with np.errstate(divide="ignore", invalid="ignore"):
                 away = np.log(np.maximum(reading[:, i], 0.0) / middle)
-            lost[:, i] = ~(np.abs(away - _mode(reading[:, i], middle)) < _MODE)
-        elif zeros.mean() > _DROPS:
-            # A sound rotor that is flown hard leaves its mode, too; it does not read nothing.
+            lost[:, i] = ~(np.abs(away - mode) < _MODE) if np.isfinite(mode) else True
+        elif zeros.mean() > _DROPS and not (zeros[-1] and np.count_nonzero(np.diff(zeros)) < 2):
+            # A sound rotor that is flown hard leaves its mode, too; it does not read nothing. One that reads nothing
+            # to the end stands.
             faults[i], lost[:, i] = (Fraction(1), _mode(reading[:, i], middle), float(u[i])), zeros
     return _Reading(total, faults, lost, middle)
+
+
+def _balance(thrust: Array, rows: Array) -> Array:
+    """Log density (G,) of roll, pitch and yaw for thrusts (G, B), rows (k, B) of unit scatter.
+
+    One rotor may be damaged: then its thrust is less than its speed says.
+    """
+    B = thrust.shape[1]
+    lost = np.concatenate([np.ones((1, B)), *(1.0 - np.eye(B)[[j]] * (1.0 - np.exp(-_LOSSES[:, None])) for j in range(B))])
+    weight = np.log([1.0 - _SICK_SHARE, *np.full(len(lost) - 1, _SICK_SHARE / (len(lost) - 1))])
+    every = thrust[:, None, :] * lost
+    y = (every / every.mean(axis=2, keepdims=True) - 1.0) @ rows.T
+    density = weight - 0.5 * (TRIM_FREE + len(rows)) * np.log1p(np.sum(y**2, axis=2) / TRIM_FREE)
+    top = density.max(axis=1)
+    return np.asarray(top + np.log(np.exp(density - top[:, None]).sum(axis=1)), dtype=float)
 
 
 def _log_normal(x: Array | float, sd: float) -> Any:
