@@ -1,3 +1,6 @@
 """What the drive offers to the house (:mod:`bemt.base.plugins`)."""
 
-CASE_PARTS = {"drive": "bemt.tools.drive.drive_result:full_document"}
+CASE_PARTS = {
+    "drive": "bemt.tools.drive.drive_result:full_document",
+    "circuit": "bemt.tools.drive.drive_result:circuit",
+}

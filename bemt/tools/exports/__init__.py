@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["exports", "target_ids"]
 
-_SHARED = {"base", "blades", "folder", "hub", "manifest", "parts", "performance", "printing"}
+_SHARED = {"base", "blades", "folder", "hub", "manifest", "motor", "offers", "parts", "performance", "printing"}
 """Files of this folder that are no targets."""
 
 

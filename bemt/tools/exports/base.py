@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -108,11 +108,32 @@ class Job:
         found: dict[str, Any] | None = plugins.part("drive", self.case)
         return found
 
+    @property
+    def rpm_full(self) -> float:
+        """Speed that a full command stands for: full throttle of the case's motor, else that of the case. [rev/min]"""
+        full = self.full_throttle if self.rpm is None else None
+        return float(full["rpm"]["value"]) if full else self.rpm_top
+
     @cached_property
     def performance(self) -> Performance:
-        """Thrust and torque over rpm and advance ratio, up to full throttle where the case has a motor; solved once."""
-        full = self.full_throttle if self.rpm is None else None
-        return performance_of(self.case, full["rpm"]["value"] if full else self.rpm_top)
+        """Thrust and torque over rpm and advance ratio, up to the case's speed and its full throttle; solved once."""
+        return performance_of(self.case, max(self.rpm_top, self.rpm_full))
+
+    @cached_property
+    def flown(self) -> Job:
+        """Request up to full throttle, for a target whose few numbers are fitted to what is flown."""
+        return self if self.rpm_full >= self.rpm_top else replace(self, rpm=self.rpm_full)
+
+    @property
+    def speeds_note(self) -> str | None:
+        """Why the speeds of tables, fits and disks differ; None where they do not."""
+        if self.rpm_full == self.rpm_top:
+            return None
+        return (
+            f"speeds: the case states {self.rpm_top:.6g} rev/min (disks and blades), its motor reaches "
+            f"{self.rpm_full:.6g} at full throttle (full command of a fit); tables go to "
+            f"{max(self.rpm_top, self.rpm_full):.6g}"
+        )
 
     @cached_property
     def hub(self) -> HubTable | None:
@@ -267,6 +288,10 @@ class LoadsExport(Export):
     kind = "loads"
     uses = frozenset({"rpm"})
 
+    def asked(self, job: Job) -> Job:
+        """Request as the target takes it: numbers without a table are fitted up to full throttle."""
+        return job if "reynolds" in self.features else job.flown
+
     @abstractmethod
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The target's published formula, evaluated on the written files.
@@ -304,7 +329,7 @@ class LoadsExport(Export):
 
     def hub_checked(self, job: Job, files: Files) -> dict[str, Any] | None:
         """Errors of the hub's loads at oblique points that are no nodes of the table."""
-        table = job.performance
+        table = self.asked(job).performance
         rpm, J = table.check_points()
         keep = np.flatnonzero((J > 0.0) & (rpm >= 0.5 * table.rpm[-1]))[::3]
         angle = np.radians(np.resize(CHECK_ANGLES, keep.size))
@@ -326,7 +351,7 @@ class LoadsExport(Export):
 
     def checked(self, job: Job, files: Files) -> dict[str, Any]:
         """Errors at points that are no nodes of the table, at rest and over the flight range."""
-        table = job.performance
+        table = self.asked(job).performance
         rpm, J = table.check_points()
         V = J * rpm / 60.0 * table.diameter_m
         truth = solve_points(job.case, rpm, V)
