@@ -79,12 +79,15 @@ class Job:
         Axial speed of a disk and of frozen polars; None: from the case. [m/s]
     hold : tuple of str
         Keys of :data:`FEATURES` that the target must support.
+    slow : bool
+        Whether tables start at a twentieth of the greatest speed, else at a quarter.
     """
 
     case: Case
     rpm: float | None = None
     airspeed_m_s: float | None = None
     hold: tuple[str, ...] = ()
+    slow: bool = True
 
     @property
     def rpm_top(self) -> float:
@@ -117,12 +120,12 @@ class Job:
     @cached_property
     def performance(self) -> Performance:
         """Thrust and torque over rpm and advance ratio, up to the case's speed and its full throttle; solved once."""
-        return performance_of(self.case, max(self.rpm_top, self.rpm_full))
+        return performance_of(self.case, max(self.rpm_top, self.rpm_full), self.slow)
 
     @cached_property
     def flown(self) -> Job:
-        """Request up to full throttle, for a target whose few numbers are fitted to what is flown."""
-        return self if self.rpm_full >= self.rpm_top else replace(self, rpm=self.rpm_full)
+        """Request from a quarter of full throttle up to it, for a target whose few numbers are fitted to flight."""
+        return replace(self, rpm=self.rpm_full, slow=False)
 
     @property
     def speeds_note(self) -> str | None:

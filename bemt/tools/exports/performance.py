@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 LOWEST = 0.25
 """Speed over the greatest from which a table is whole."""
-SLOW = (0.05, 0.1, 0.15, 0.2)
+SLOW = (0.05, 0.0625, 0.08, 0.1, 0.125, 0.16, 0.2)
 """Slower ones, for small throttle: there where the whole flight range converges at their Reynolds numbers."""
 N_RPM = 16
 N_J = 25
@@ -124,7 +124,7 @@ class Performance:
             "tip_mach_greatest": float(np.pi * n[-1] * self.diameter_m / self.a_sound),
             "density_kg_m3": self.rho,
             "diameter_m": self.diameter_m,
-            "airspeed_m_s_greatest": float(self.J[-1] * LOWEST * n[-1] * self.diameter_m),
+            "airspeed_m_s_greatest": float(self.J[-1] * n[0] * self.diameter_m),
             "flight": "J from 0 to zero thrust; axial flow, steady; doubtful in descent and as a windmill",
         }
 
@@ -194,7 +194,7 @@ def _nodes(J_zero: float, CT_rest: float, ducted: bool) -> Array:
     """
     step = J_zero / N_J
     near = step * np.arange(-BELOW, N_J + BEYOND + 1)
-    last = DIVE * J_zero / LOWEST
+    last = DIVE * J_zero / SLOW[0]
     far = np.geomspace(near[-1], last, 1 + int(np.ceil(np.log(last / near[-1]) / np.log(GROWTH))))[1:]
     J = np.concatenate([near, far])
     deepest = -2.0 * np.sqrt(2.0 * max(CT_rest, 0.0) / np.pi)
@@ -204,8 +204,8 @@ def _nodes(J_zero: float, CT_rest: float, ducted: bool) -> Array:
     return J
 
 
-def performance_of(case: Case, rpm_top: float) -> Performance:
-    """Tabulate a case from a twentieth of a speed up to it, from descent to the windmill.
+def performance_of(case: Case, rpm_top: float, slow_too: bool = True) -> Performance:
+    """Tabulate a case from a twentieth (else a quarter) of a speed up to it, from descent to the windmill.
 
     Inside the flight range (`BELOW` steps under J = 0 to `BEYOND` steps over zero thrust) every point must converge.
     Outside, from the first point of a row that does not, or whose tip is sonic, the force of the point before goes on:
@@ -224,7 +224,7 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
     V = j * n / 60.0 * D
     step = greatest / N_J
     flight = (j > -(BELOW + 0.5) * step) & (j < (N_J + BEYOND + 0.5) * step)
-    slow = _slow(case, ready, rpm_top, J, flight[0])
+    slow = _slow(case, ready, rpm_top, J, flight[0]) if slow_too else np.empty(0)
     if slow.size:
         rpm, J_zero = np.r_[slow, rpm], np.r_[zero_thrust(case, slow), J_zero]
         n, j = np.meshgrid(rpm, J, indexing="ij")
