@@ -151,7 +151,9 @@ def library_at(job: Job, throttle: float) -> tuple[float, float, float]:
         motor = motor_of(job)
 
         def surplus(n: float) -> float:
-            return float(motor.torque(np.array(throttle), np.array(n))) - float(solve_points(job.case, n, 0.0).torque_Nm[0])
+            return float(motor.torque(np.array(throttle), np.array(n))) - float(
+                solve_points(job.case, n, 0.0).torque_Nm[0]
+            )
 
         rpm = float(brentq(surplus, 0.03 * job.performance.rpm[-1], job.performance.rpm[-1] * 1.001))
     found = solve_points(job.case, rpm, 0.0)

@@ -114,7 +114,9 @@ def picture(table: pd.DataFrame) -> bytes:
     best = best_of_each(table).dropna(subset=["power_W"])
     figure = canvas.figure(7.5, 4.6)
     ax = figure.add_subplot()
-    dots = ax.scatter(best.diameter_in, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3)
+    dots = ax.scatter(
+        best.diameter_in, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3
+    )
     figure.colorbar(dots, ax=ax, label="probability that the target is met")
     edge = front(table)
     if len(edge):

@@ -134,9 +134,7 @@ def _keller_N(case: Case) -> float:
     return ratio * ROOM_PA * D**2 / (1.3 + 0.3 * B)
 
 
-def scatter(
-    label: str, rpm: float, airspeed_m_s: float, fluid: str = "air", coaxial: bool = False
-) -> LoadScatter:
+def scatter(label: str, rpm: float, airspeed_m_s: float, fluid: str = "air", coaxial: bool = False) -> LoadScatter:
     """Bands of a label near a speed, by `bemt.rotors.case.propagate`: declared unknowns, model and numerics.
 
     Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.

@@ -240,7 +240,9 @@ def _target(
     if rest_kg is not None and mass_kg is None:
         faults.append(Fault("", "--rest", "given", "nothing without --mass"))
     if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
-        faults.append(Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair"))
+        faults.append(
+            Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
+        )
     if faults:
         raise InputError(faults)
     faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
@@ -289,7 +291,9 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     """Standard sizes whose disk loading at the target can be expected to work."""
     max_in = target.max_diameter_in
     least, most = LOADING["fan" if target.fan else target.fluid]
-    sizes = [mm / 25.4 for mm in FAN_MM] if target.fan else list(WATER_DIAMETERS if target.fluid == "water" else DIAMETERS)
+    sizes = (
+        [mm / 25.4 for mm in FAN_MM] if target.fan else list(WATER_DIAMETERS if target.fluid == "water" else DIAMETERS)
+    )
     area = {D: 0.25 * math.pi * (D * INCH) ** 2 for D in sizes}
     small = [D for D in sizes if max_in is None or max_in * (1.0 + 1e-9) >= D]
     fit = [D for D in small if least <= target.thrust_N / area[D] <= most]

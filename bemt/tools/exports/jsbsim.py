@@ -252,7 +252,8 @@ def _hub_channel(job: Job, name: str) -> str:
     }
     parts += [_function(name, f"force-{axis}-lbs", _product(of("force-scale"), body)) for axis, body in forces.items()]
     parts += [
-        _function(name, f"moment-{axis}-lbsft", _product(_value(D), of("force-scale"), body)) for axis, body in moments.items()
+        _function(name, f"moment-{axis}-lbsft", _product(_value(D), of("force-scale"), body))
+        for axis, body in moments.items()
     ]
     body = "\n".join(parts)
     return f' <channel name="Loads of the hub with a wind across the shaft">\n{body}\n </channel>'
