@@ -16,7 +16,7 @@ from bemt.tools.cfd.openfoam.write import Run, check_run, settings_of, write_ope
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
 from bemt.tools.exports.manifest import entry
-from bemt.tools.exports.printing import Print, faults_of, printable
+from bemt.tools.exports.printing import Print, faults_of, print_case, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA, export
 from geometry.mesh import Options
@@ -71,10 +71,8 @@ def export_case(
                 made = export(case.rotor(), case.duct(), out, solid, name=case.name, unit=unit, options=options)
                 manifest = _joined(manifest, made)
             else:
-                rotors, options = printable(case, request)
-                for end, rotor in rotors:
-                    made = export(rotor, None, out, solid, name=case.name + end, unit=unit, options=options)
-                    manifest = _joined(manifest, made | {"name": case.name})
+                for made in print_case(case, request, out, solid, unit):
+                    manifest = _joined(manifest, made)
         except GeometryError as error:
             faults += [Fault(case.path.as_posix(), *fault) for fault in error.faults]
     if "openfoam" in words:
@@ -378,6 +376,7 @@ def text(manifest: dict[str, Any], out: Path) -> str:
     else:
         words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
     lines.append(", ".join(words))
+    lines += printed_text(manifest["printed"]) if "printed" in manifest else []
     if "openfoam" in manifest:
         about = manifest["openfoam"]
         lines.append(
