@@ -11,10 +11,12 @@ import pytest
 import bemt
 from bemt.app.commands.cli import main
 from bemt.base.errors import InputError
+from bemt.base.units import INCH
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.design import design_answer
 from bemt.tools.design.best_label import standard
+from bemt.tools.design.blade_design import design_blade
 from bemt.tools.design.optimise import optimise
 from bemt.tools.design.requirement import DesignPoint, point_of
 from bemt.tools.design.shape import CONTROLS
