@@ -40,7 +40,7 @@ COMMANDS: dict[str, list[str]] = {
     "motor": ["motor", "reports/drive/motor_mn4006", "--json"],
     "cfd": ["cfd", "reports/cfd", "--json"],
     "calibrate": ["calibrate", f"{D}/uiuc/volume-1", "--test", f"{D}/uiuc/volume-2", "--json"],
-    "estimate": ["estimate", "10x5", "--rpm", "6000", "--airspeed", "5", "10", "--json"],
+    "estimate": ["estimate", "10x5", "--rpm", "6000", "--airspeed-m-s", "5", "10", "--json"],
     "effects": ["effects", "--json"],
     "import_fluent": ["import", f"{D}/cfd_exports/screw/report-def-0-rfile.out", "--json"],
     "import_bench": ["import", f"{D}/jmajew/grp01__f1507_hqprop76x8_4s_table1.csv", "--json"],

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.cfd_setup import GRID_FLOOR
 from bemt.tools.cfd.balance import BALANCE_LIMIT, balance_of

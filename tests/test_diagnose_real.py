@@ -14,7 +14,7 @@ import pytest
 from diagnosing import left_out
 from duct_fans import DUCT_76, FAN_76
 
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.diagnose import chain, document, record
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flight_files import Hover, broken_copies, dataflash, ulog
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.tools.flight import log as flight_log
 from bemt.tools.flight import px4

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from test_sweep import make_case, read_grid, tree
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.results.sweep import sweep

@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.propagate import propagate
 from bemt.tools.design.rotor_loads import case_of_label
+from bemt.tools.exports.base import Job
 from bemt.tools.exports.folder import export_case
 from bemt.tools.exports.printing import Print
 from geometry.airfoil import naca4
@@ -180,7 +181,7 @@ def test_the_propeller_that_most_people_print_is_one_body(nozzle_mm, least_mm, w
     """A 5.1x4.3x3: with the usual nozzle its tip is widened and the cost said, with a fine one it stays."""
     case = case_of_label("5.1x4.3x3")
     request = Print(nozzle_mm=nozzle_mm, adapter="m5")
-    made = export_case(case, tmp_path, ["stl"], request=request)
+    made = export_case(Job(case, printed=request), tmp_path, ["stl"])
     assert made["checks_m"]["min_thickness"] >= 1e-3 * least_mm
     vertices, triangles, unit = read_solid(tmp_path / f"{case.name}.stl")
     body = Mesh(vertices, triangles, np.zeros(len(triangles), np.int64), ("x",))
@@ -198,7 +199,7 @@ def test_the_propeller_that_most_people_print_is_one_body(nozzle_mm, least_mm, w
 def test_a_refusal_names_the_nozzle_that_would_do(tmp_path: Path) -> None:
     case = case_of_label("2x1x3")
     with pytest.raises(InputError) as error:
-        export_case(case, tmp_path, ["stl"], request=Print(min_thickness_mm=1.6))
+        export_case(Job(case, printed=Print(min_thickness_mm=1.6)), tmp_path, ["stl"])
     assert any("--nozzle-mm 0.25" in fault.hint for fault in error.value.faults)
 
 

@@ -25,10 +25,9 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.page import render
 from bemt.results.report import book_html
-from bemt.results.report.cfd import attach, cfd_runs
 from bemt.results.report.found_files import safe_files
 from bemt.results.report.front import summary
 from bemt.results.report.gather import attach_diagnoses, gather
@@ -36,6 +35,7 @@ from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.results.report.rotor_view import viewer
 from bemt.results.report.verdicts import verdict
 from bemt.results.sweep.comparison import Comparison
+from bemt.tools.cfd.report import attach, cfd_runs, cfd_sections, operating_run, report_pages
 
 CASE = """
 schema = "bemt.case/1"
@@ -395,8 +395,7 @@ def cfd_folder(root: Path, manifest: object, recording: str) -> Path:
 
 def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
     book = copy.deepcopy(made[0])
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path / "before the check", STUDY, RECORDING))
-    attach(book)
+    book["tools"] = report_pages(book, cfd_folder(tmp_path / "before the check", STUDY, RECORDING))
     line = book["cases"][0]["result"]["comparisons"][-1]
     assert math.isnan(line["u_D"]) and line["verdict"].startswith("u_D unknown"), "nobody has shown that it balances"
     book = copy.deepcopy(made[0])
@@ -404,14 +403,16 @@ def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], P
         f"{row}{',0.001,-0.002' if k else ',balance_mass,balance_momentum'}"
         for k, row in enumerate(RECORDING.splitlines())
     )
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path, STUDY, balanced))
-    attach(book)
+    found = cfd_runs(cfd_folder(tmp_path, STUDY, balanced))
+    attach(book, found)
+    book["tools"] = [{"id": "cfd", "name": "Own CFD", "title": "", "top": [], "sections": cfd_sections(found)}]
     page = book["cases"][0]
-    assert page["own_cfd"]["run"] == "fine", "settled, free, bare, compressible, finest"
+    run = operating_run(found, page["result"])
+    assert run is not None and run["run"] == "fine", "settled, free, bare, compressible, finest"
     assert {row["label"] for row in page["own_rows"]} == {"incompressible, 34000 cells", "compressible, 90000 cells"}
-    assert page["own_radial"] == [(0.05, 40.0, 1.0), (0.1, 60.0, 2.0)]
+    assert page["own_radial"] == {"CFD, own, compressible": [(0.05, 40.0, 1.0), (0.1, 60.0, 2.0)]}
     line = page["result"]["comparisons"][-1]
-    audit = page["own_cfd"]["audit"]
+    audit = run["audit"]
     parts = [item["u_relative"] for item in audit["lines"]]
     assert line["D"] == 4.8 and line["u_D"] == pytest.approx(4.8 * math.sqrt(sum(p * p for p in parts)))
     grid = next(item for item in audit["lines"] if item["topic"] == "grid study")
@@ -432,8 +433,7 @@ def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], P
 def test_broken_recordings_break_nothing(made: tuple[dict[str, Any], Path], tmp_path: Path, manifest: object,
                                          recording: str) -> None:  # fmt: skip
     book = copy.deepcopy(made[0])
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path, manifest, recording))
-    attach(book)
+    book["tools"] = report_pages(book, cfd_folder(tmp_path, manifest, recording))
     assert_harmless(book_html(book))
 
 
@@ -808,7 +808,7 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
 
 
 def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.results.report.cfd import fidelities, fidelity_sections
+    from bemt.tools.cfd.report import fidelities, fidelity_sections
 
     folder = tmp_path / "disk"
     folder.mkdir()

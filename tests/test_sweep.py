@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.physics.bem import Model
 from bemt.physics.k1k2 import U_MEASURED
@@ -430,13 +430,13 @@ def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: 
 
 
 def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
 
     path = str(make_case(tmp_path))
     assert main(["sweep", path, "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e6"]) == 0
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e-6"]) == 1
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e6"]) == 0
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e-6"]) == 1
     assert "BEMT thrust" in capsys.readouterr().err
 
 
@@ -493,7 +493,7 @@ def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
 
 
 def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
 
     shipped = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
     assert main(["sweep", *(str(project / "cases" / name) for name in shipped)]) == 0
@@ -509,7 +509,7 @@ def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.Capture
 def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
     from bemt.results.sweep.summary import summary
 
     monkeypatch.chdir(tmp_path)

@@ -13,7 +13,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data import readers
-from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
 from bemt.data.recordings.cfd_loads import DUCT
 

@@ -17,7 +17,7 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
-from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones

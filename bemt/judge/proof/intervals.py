@@ -7,6 +7,7 @@ that a new item stays below in nine cases of ten (split conformal).  Half-widths
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from bemt import __version__
-from bemt.judge.diagnose.interval_scales import scale_of
+from bemt.base.tables import json_text, write_atomic
+from bemt.judge.diagnose.interval_scales import FILE, scale_of
 from bemt.judge.proof import seal
 from bemt.judge.proof.score import VISIBLE, judge
 from bemt.physics import effects
@@ -86,3 +88,11 @@ def _factor(scores: Sequence[float]) -> dict[str, Any]:
     quantile = np.interp(SHARE * (n + 1), np.arange(1, n + 1), np.sort(scores))
     scale = float(np.clip(quantile, _LOWEST, _HIGHEST))
     return {"scale": round(scale, 3), "n": n, "held": round(float(np.mean(np.array(scores) <= 1.0)), 3)}
+
+
+def rewrite(folders: Sequence[Path], out: str | os.PathLike[str] | None) -> str:
+    """Write the factors on the intervals that kept proofs show; gives the file's name."""
+    sets, found = zip(*(misses(folder) for folder in folders), strict=True)
+    target = Path(out or ".") / FILE
+    write_atomic(target, json_text(calibrate([m for some in found for m in some], sets)))
+    return target.as_posix()

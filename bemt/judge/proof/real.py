@@ -18,7 +18,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.proof.items import Item, recording_text
 from bemt.judge.proof.pairs import draw_pairs
 from bemt.physics.sections import rule as section_rule
@@ -271,6 +271,6 @@ def draw_real(rng: np.random.Generator) -> list[Item]:
     items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor(), *draw_pairs()]
     if not items:
         roots = ", ".join(r.as_posix() for r in data_roots())
-        hint = "`bemt data uiuc` fetches the largest; BEMT_DATA names a folder of them"
+        hint = "`bemt fetch uiuc` fetches the largest; BEMT_DATA names a folder of them"
         raise InputError(Fault(roots, "", "no published recordings", "uiuc, x22a, jmajew ...", hint))
     return [items[int(i)] for i in rng.permutation(len(items))]

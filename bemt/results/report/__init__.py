@@ -21,7 +21,6 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
     from bemt.results.report.case_page import case_sections, reproduction_table
-    from bemt.results.report.cfd import CFD_WORDS, FIDELITY_WORDS, cfd_sections, fidelity_sections
     from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
     from bemt.results.report.front import answers, front_parts
     from bemt.results.report.trends import trend_sections
@@ -48,16 +47,16 @@ def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
         "reports/studies/reproduce.py where those data are."
     )
     told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
-    for key, title, top, found in (
-        ("trends", "Trends", [], trend_sections(book)),
-        ("cfd", "Own CFD", [("words", CFD_WORDS)], cfd_sections(book["cfd"])),
-        ("fidelities", "Three fidelities", [("words", FIDELITY_WORDS)], fidelity_sections(book["fidelities"])),
-        ("diagnoses", "Diagnoses", [], told),
-        ("reproduction", "Reproduction", [("words", thesis), ("table", numbers), ("more", inputs)], []),
+    for page in (
+        {"id": "trends", "name": "Trends", "title": "Trends", "top": [], "sections": trend_sections(book)},
+        *book["tools"],
+        {"id": "diagnoses", "name": "Diagnoses", "title": "Diagnoses", "top": [], "sections": told},
     ):
-        if found or (key == "reproduction" and numbers):
-            title_of = "Every number of the source thesis" if key == "reproduction" else title
-            yield {"id": key, "name": title, "title": title_of, "top": top, "sections": found}
+        if page["sections"]:
+            yield page
+    if numbers:
+        yield {"id": "reproduction", "name": "Reproduction", "title": "Every number of the source thesis",
+               "top": [("words", thesis), ("table", numbers), ("more", inputs)], "sections": []}  # fmt: skip
 
 
 def book_html(book: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.cfd import audit_parts
+from bemt.results.report.audit_block import audit_parts
 from bemt.results.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.results.report.rotor_view import viewer
@@ -157,11 +157,13 @@ def _radial(page: Mapping[str, Any]) -> Section:
         return "", []
     r = d["r_over_R"]
     R = 0.5 * page["result"]["conditions"]["diameter_m"]
-    own = page.get("own_radial") or []
-    name = f"CFD, own, {page['own_cfd']['solver']}" if own else ""
-    x = [p[0] / R for p in own]
     thrust, torque = (
-        [Trace(name, x, [p[k] for p in own], None, COLOURS["openfoam"], "7 4")] if own else [] for k in (1, 2)
+        [
+            Trace(name, [p[0] / R for p in own], [p[k] for p in own], None, COLOURS["openfoam"], "7 4")
+            for name, own in page.get("own_radial", {}).items()
+            if own
+        ]
+        for k in (1, 2)
     )
     plots = (
         Plot("Thrust loading, all blades", "r/R [-]", "dT/dr [N/m]", [Trace("BEMT", r, d["dT_dr"]), *thrust]),

@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from bemt.base.page import num, table
-from bemt.judge.diagnose.figures_recording import FIRST
+from bemt.base.page import FIRST, num, table
 from bemt.results.report.values import Part, picture
 from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 

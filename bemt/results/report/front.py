@@ -62,10 +62,8 @@ def _values(page: Mapping[str, Any]) -> dict[str, list[tuple[str, float, float]]
         here = abs(row["rpm"] - own["rpm"]) <= 1e-6 * own["rpm"] and row["airspeed_m_s"] == own["airspeed_m_s"]
         if T is not None and math.isfinite(T) and here:
             out.setdefault(row["source"], []).append((row["label"], float(T), math.nan if u is None else float(u)))
-    run = page.get("own_cfd")
-    if run:
-        words = f"{run['campaign']}, {run['solver']}, {run['cells']:.0f} cells"
-        out.setdefault("openfoam", []).append((words, run["thrust_N"], run["u_thrust_N"]))
+    for source, *point in page.get("own_points", ()):
+        out.setdefault(source, []).append(tuple(point))
     return out
 
 

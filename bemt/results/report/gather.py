@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import bemt
+from bemt.base import plugins
 from bemt.base.errors import Fault, InputError
+from bemt.base.page import FIRST
 from bemt.base.tables import json_text, number_of, write_atomic
 from bemt.results.report import curves, trends
-from bemt.results.report.cfd import attach, cfd_runs, fidelities
 from bemt.results.report.found_files import read_json, safe_files
 from bemt.results.report.rotor_view import still
 from bemt.rotors.case import Case, find_cases, load_case
@@ -47,10 +48,8 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
         "trends": _trends(solved, document["cases"]),
         "reproduction": _reproduction(out) if of_thesis else [],
         "exit_code": document["exit_code"],
-        "cfd": cfd_runs(out),
-        "fidelities": fidelities(out, [str(page["result"]["name"]) for page in pages]),
     }
-    attach(book)
+    book["tools"] = [page for part in plugins.loaded("REPORT_PARTS") for page in part(book, out)]
     attach_diagnoses(book, out)
     return book
 
@@ -145,7 +144,7 @@ def diagnose_into(
     from bemt.judge.diagnose import folder
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document
-    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.figures_recording import first_picture
     from bemt.judge.diagnose.load import load_all
 
     cases = find_cases(paths)

@@ -63,3 +63,15 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
         for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
     ]
     return found
+
+
+def joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Both manifests in one; the second is the newer."""
+    joined = {**first, **second}
+    for key in ("volumes_m3", "case_sha256"):
+        if key in first or key in second:
+            joined[key] = {**first.get(key, {}), **second.get(key, {})}
+    for key in ("files", "targets"):
+        if key in first or key in second:
+            joined[key] = [*first.get(key, []), *second.get(key, [])]
+    return joined

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy as np
 from bemt.base.errors import Fault
 from bemt.rotors.case import Case
 from geometry.common import GeometryError
-from geometry.mesh import Options
+from geometry.duct import Duct
+from geometry.mesh import MeshModel, Options, build
 from geometry.printed import ADAPTERS, Printed
 from geometry.rotor import Rotor
 
@@ -50,7 +51,7 @@ def asked(request: Print) -> list[str]:
     return [f"--{f.name.replace('_', '-')}" for f in fields(request) if getattr(request, f.name) is not None]
 
 
-def faults_of(request: Print, formats: list[str]) -> list[Fault]:
+def faults_of(request: Print, formats: Sequence[str]) -> list[Fault]:
     """What the options alone say that cannot be printed."""
     wrong = [word for word in formats if word not in SOLIDS]
     found = [Fault("", "--printable", f"the format {word}", f"one of {', '.join(SOLIDS)}") for word in wrong]
@@ -95,59 +96,49 @@ def _printed(request: Print, ducted: bool) -> Printed:
     )
 
 
-def printable(case: Case, request: Print) -> tuple[list[tuple[str, Rotor]], Options]:
-    """Rotors with what their file names end in, and how they are made; GeometryError where none can be made."""
-    rotor = case.rotor()
+@dataclass(frozen=True)
+class Shape:
+    """A solid to write: what its file name ends in, the rotor and its duct, how it is made, its mesh."""
+
+    end: str
+    rotor: Rotor
+    duct: Duct | None
+    options: Options | None
+    model: MeshModel
+    printed: Mapping[str, Any] | None = None  # least thickness, and what a wider tip changes
+
+
+def shapes(case: Case, options: Options | None, request: Print | None) -> list[Shape]:
+    """Solids of a case, as its sections say or for a printer; GeometryError where one cannot be made.
+
+    A tip too narrow for the least thickness is widened; the hint of a refusal names a nozzle that would do.
+    """
+    rotor, duct = case.rotor(), case.duct()
+    if request is None:
+        return [Shape("", rotor, duct, options, build(rotor, duct, options))]
     if request.hub_diameter_mm is not None:
         rotor = replace(rotor, blade=replace(rotor.blade, Rhub=0.5e-3 * request.hub_diameter_mm))
     if request.hub_height_mm is not None:
         rotor = replace(rotor, hub_length=1e-3 * request.hub_height_mm)
     made = {"right": ("_right", replace(rotor, rotation=1)), "left": ("_left", replace(rotor, rotation=-1))}
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
-    return rotors, Options(printed=_printed(request, case.duct() is not None))
-
-
-def print_case(case: Case, request: Print, out: Path, formats: list[str], unit: str = "mm") -> list[dict[str, Any]]:
-    """Write the rotors of a request; one whose tip is too narrow for the thickness gets a wider one, and says so.
-
-    Returns
-    -------
-    list of dict
-        A manifest per rotor; ``printed`` in it says what the wider tip changes.
-
-    Raises
-    ------
-    GeometryError
-        If no rotor can be made so; the hint names a nozzle with which one can.
-    """
-    rotors, options = printable(case, request)
-    made = []
+    options, out = Options(printed=_printed(request, duct is not None)), []
     for end, rotor in rotors:
+        told: dict[str, Any] = {"least_thickness_mm": thickness_mm(request)}
         try:
-            found, told = _export(rotor, case, end, out, formats, unit, options), {}
+            model = build(rotor, None, options)
         except GeometryError as error:
-            if not _too_thin(error):
+            if not any(fault[0] in ("thickness", "chord") for fault in error.faults):
                 raise
             wider = widened(rotor, 1e-3 * thickness_mm(request))
             try:
-                found = _export(wider, case, end, out, formats, unit, options)
+                model = build(wider, None, options)
             except GeometryError as still:
                 raise GeometryError([(*f[:3], _fine(rotor, case, request)) for f in still.faults]) from None
-            told = _changes(case, rotor, wider)
-        made.append(found | {"name": case.name, "printed": {"least_thickness_mm": thickness_mm(request)} | told})
-    return made
-
-
-def _export(
-    rotor: Rotor, case: Case, end: str, out: Path, formats: list[str], unit: str, options: Options
-) -> dict[str, Any]:
-    from geometry.export import export
-
-    return export(rotor, None, out, formats, name=case.name + end, unit=unit, options=options)
-
-
-def _too_thin(error: GeometryError) -> bool:
-    return any(fault[0] in ("thickness", "chord") for fault in error.faults)
+            told |= _changes(case, rotor, wider)
+            rotor = wider
+        out.append(Shape(end, rotor, None, options, model, told))
+    return out
 
 
 def widened(rotor: Rotor, thickness_m: float) -> Rotor:
@@ -161,13 +152,11 @@ def widened(rotor: Rotor, thickness_m: float) -> Rotor:
 
 def _fine(rotor: Rotor, case: Case, request: Print) -> str:
     """Nozzle with which the rotor can be made, else what else to change."""
-    from geometry.mesh import rotor_mesh
-
     fine = replace(request, min_thickness_mm=LINES * FINE_MM, nozzle_mm=None)
     if thickness_mm(fine) < thickness_mm(request):
         for one in (rotor, widened(rotor, 1e-3 * thickness_mm(fine))):
             try:
-                rotor_mesh(one, Options(printed=_printed(fine, case.duct() is not None)))
+                build(one, None, Options(printed=_printed(fine, case.duct() is not None)))
             except GeometryError:
                 continue
             return f"A {FINE_MM:g} mm nozzle does it: --nozzle-mm {FINE_MM:g}, {thickness_mm(fine):g} mm"
