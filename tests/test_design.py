@@ -204,4 +204,6 @@ def test_the_root_thickens_where_stress_asks_and_reaches_what_thin_sections_do_n
     assert found.values.stress_Pa.max() <= limits.material.strength_MPa * 1e6 / limits.safety * (1.0 + 2e-3)
     assert found.thickness is not None and found.thickness[0] > 0.12
     with found.case() as case:
-        assert case.rotor().blade.section(case.rotor().blade.Rhub).thickness == pytest.approx(found.thickness[0], abs=0.01)
+        assert case.rotor().blade.section(case.rotor().blade.Rhub).thickness == pytest.approx(
+            found.thickness[0], abs=0.01
+        )

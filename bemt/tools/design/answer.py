@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt.base import canvas
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.tools.design.search import Target
 
@@ -16,6 +19,53 @@ if TYPE_CHECKING:
 SCHEMA = "bemt.choose/1"
 RESULTS = ("choose.json", "choose.csv", "choose.png")
 SHOWN = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Propellers and motors for a target, best first; columns of the table are attributes as well.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        As :func:`bemt.tools.design.search.choose` gives it.
+    """
+
+    table: pd.DataFrame
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name == "table":
+            raise AttributeError(name)
+        return getattr(self.table, name)
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __str__(self) -> str:
+        return text(self.table)
+
+    def __repr__(self) -> str:
+        first = self.table.iloc[0]
+        return f"<choice of {len(self.table)} pairs: {first.label} with {first.kv:.0f} rev/min/V>"
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self)[1:-1], self.text)
+
+    @property
+    def text(self) -> str:
+        """One screen: what to take, and the best motor of each label."""
+        return text(self.table)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if no pair is sure to meet the target."""
+        return EXIT_OK if (self.table.probability >= self.table.attrs["sure"]).any() else EXIT_UNCONVERGED
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.choose/1``."""
+        return document(self.table)
+
+    to_dict = document
 
 
 def best_of_each(table: pd.DataFrame) -> pd.DataFrame:

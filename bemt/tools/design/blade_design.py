@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base import cache
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, new_folder
@@ -36,7 +36,16 @@ Progress = Callable[[str], None]
 HUB_RATIO = 0.15
 THIN_FROM = 0.5
 """r/R from which the thickness is the outer one [1]."""
-FAMILY = ((0.12, 0.09), (0.15, 0.09), (0.18, 0.12), (0.21, 0.12), (0.24, 0.15), (0.28, 0.15), (0.28, 0.18), (0.30, 0.21))
+FAMILY = (
+    (0.12, 0.09),
+    (0.15, 0.09),
+    (0.18, 0.12),
+    (0.21, 0.12),
+    (0.24, 0.15),
+    (0.28, 0.15),
+    (0.28, 0.18),
+    (0.30, 0.21),
+)
 """Thickness at the hub and on the outer half that are tried, while stress limits the blade; the first is tabulated
 without NeuralFoil [1]."""
 FAR = 0.8  # Share of the thrust below which the next but one is tried [1]
@@ -139,10 +148,28 @@ class Design:
         new_folder.write_files(self.files, Path(folder))
         return Path(folder)
 
-    def __repr__(self) -> str:
+    @property
+    def text(self) -> str:
+        """One screen: the blade next to the best label and the ideal."""
         from bemt.tools.design.design_answer import text
 
         return text(self)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if the search did not converge."""
+        return EXIT_OK if self.found.converged else EXIT_UNCONVERGED
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.design/1``."""
+        from bemt.tools.design.design_answer import document
+
+        return document(self)
+
+    to_dict = document
+
+    def __repr__(self) -> str:
+        return self.text
 
 
 def name_of(point: DesignPoint, diameter_m: float) -> str:
@@ -194,10 +221,10 @@ def design_blade(
     if robust:
         with new_folder.temporary(files) as case:
             prior = case.as_built().prior
-        variants = search.as_built_variants(problem.model, prior)
+        variants = search.as_built_variants(found.problem.model, prior)
         drawn = _over_rotors(found, variants)
         better = search.improve(found, variants, step)
-        plain = replace(better.problem, variants=problem.variants)
+        plain = replace(better.problem, variants=found.problem.variants)
         after = plain.values(better.best)
         assert after is not None
         over = _over_rotors(better, variants), drawn
@@ -383,7 +410,7 @@ def _open_case(
         faults.append(Fault("--hub-ratio", "", f"{hub:g}", "a number from 0.05 to 0.6"))
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
         faults.append(
-            Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10))
+            Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10))
         )
     if faults or diameter_m is None:
         raise InputError(faults)
@@ -419,7 +446,7 @@ def _in_duct(
     faults = [
         Fault(name, "", f"{value:g}", "nothing with --duct: the case states it")
         for name, value in (("--diameter-in", None if diameter_m is None else diameter_m / INCH),
-                            ("--hub-ratio", hub_ratio), ("--density", density))
+                            ("--hub-ratio", hub_ratio), ("--density-kg-m3", density))
         if value is not None
     ]  # fmt: skip
     if not case.ducted:

@@ -224,21 +224,23 @@ def _target(
 ) -> Target:  # fmt: skip
     faults = []
     if thrust_N is None and mass_kg is None:
-        faults.append(Fault("", "--thrust", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust 27 --cells 6"))
+        faults.append(
+            Fault("", "--thrust-N", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust-N 27 --cells 6")
+        )
     if cells is None:
-        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust 27 --cells 6"))
+        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust-N 27 --cells 6"))
     if minutes is not None and capacity_Ah is None:
-        faults.append(Fault("", "--capacity", "nothing", "the battery's capacity [A h], for the time"))
-    named = {"--thrust": thrust_N, "--mass": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed": airspeed_m_s,
-             "--max-tip-mach": max_tip_mach, "--capacity": capacity_Ah, "--hover-time": minutes,
-             "--rest": rest_kg, "--arm-mm": arm_mm}  # fmt: skip
+        faults.append(Fault("", "--capacity-Ah", "nothing", "the battery's capacity [A h], for the time"))
+    named = {"--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed-m-s": airspeed_m_s,
+             "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah, "--minutes": minutes,
+             "--rest-kg": rest_kg, "--arm-mm": arm_mm}  # fmt: skip
     faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
     if fluid not in LOADING or fluid == "fan":
         faults.append(Fault("", "--fluid", repr(fluid), "air or water"))
     if fan and (coaxial or fluid == "water"):
         faults.append(Fault("", "--fan", "with " + ("--coaxial" if coaxial else "--fluid water"), "a fan alone in air"))
     if rest_kg is not None and mass_kg is None:
-        faults.append(Fault("", "--rest", "given", "nothing without --mass"))
+        faults.append(Fault("", "--rest-kg", "given", "nothing without --mass-kg"))
     if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
         faults.append(
             Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
@@ -251,11 +253,11 @@ def _target(
     grams = "In grams? Divide by 1000" if mass_kg is not None and mass_kg > 1000.0 else ""
     fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
     for name, value, low, high, hint in (
-        ("--thrust", thrust_N, 0.01, 5000.0, ""), ("--mass", mass_kg, 0.005, 1000.0, grams),
-        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed", airspeed_m_s, 0.0, 150.0, fast),
+        ("--thrust-N", thrust_N, 0.01, 5000.0, ""), ("--mass-kg", mass_kg, 0.005, 1000.0, grams),
+        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed-m-s", airspeed_m_s, 0.0, 150.0, fast),
         ("--max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
-        ("--capacity", capacity_Ah, 0.01, 1000.0, mAh), ("--hover-time", minutes, 0.01, 1e4, ""),
-        ("--rest", rest_kg, 0.001, mass_kg or 1000.0, "Part of the mass"),
+        ("--capacity-Ah", capacity_Ah, 0.01, 1000.0, mAh), ("--minutes", minutes, 0.01, 1e4, ""),
+        ("--rest-kg", rest_kg, 0.001, mass_kg or 1000.0, "Part of the mass"),
         ("--arm-mm", arm_mm, 10.0, 5000.0, "In metres? Times 1000" if arm_mm is not None and arm_mm < 10.0 else ""),
     ):  # fmt: skip
         if value is not None and not low <= value <= high:
@@ -266,7 +268,7 @@ def _target(
     most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
     if hover is not None and most < hover:
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
-        raise InputError(Fault("", "--thrust", f"{most:g}", f"{hover:.4g} N or more", hint))
+        raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
                   thrust_N is not None, fluid, coaxial, fan, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
@@ -303,7 +305,7 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
         what = "fans" if target.fan else "standard sizes"
         expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {(small or sizes)[0]:.3g} to {(small or sizes[:1])[-1]:.3g} in"
         hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
-        raise InputError(Fault("", "--thrust", got, expected, hint))
+        raise InputError(Fault("", "--thrust-N", got, expected, hint))
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
     ratios = RATIOS if target.fluid == "air" else (*RATIOS, 0.9, 1.1)

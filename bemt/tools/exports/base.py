@@ -276,8 +276,7 @@ class Export(ABC):
         tuple of str
             Name, value.
         """
-        name = "airspeed" if key == "airspeed_m_s" else key.replace("_", "-")
-        return f"--{name}", shown(value).strip("'")
+        return f"--{key.replace('_', '-')}", shown(value).strip("'")
 
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal on its own part of the manifest.

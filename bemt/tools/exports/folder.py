@@ -11,7 +11,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import check_field
 from bemt.base.toml_text import Collector
-from bemt.rotors.case import find_cases, load_case, repeated_names
+from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
 from bemt.tools.exports.manifest import joined
@@ -162,7 +162,7 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 
 
 def export_cases(
-    path: str,
+    path: str | Case,
     out: str,
     formats: Sequence[str],
     unit: str = "mm",
@@ -189,8 +189,9 @@ def export_cases(
         faults += [Fault("", *fault) for fault in error.faults]
     if faults:
         raise InputError(faults)
-    paths = find_cases([path])
-    cases, refused, made = [], [], []
+    paths = [] if isinstance(path, Case) else find_cases([path])
+    cases = [path] if isinstance(path, Case) else []
+    refused, made = [], []
     for file in paths:
         try:
             cases.append(load_case(file))
