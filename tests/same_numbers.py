@@ -34,7 +34,7 @@ COMMANDS: dict[str, list[str]] = {
     "diagnose_k1k2": ["diagnose", *FLUENT, "--case", *CASES, "--baseline", "k1k2", "--json"],
     **{f"diagnose_{n}": ["diagnose", f"reports/diagnosis/cfd_{n}.csv", *CFD, "--json"]
        for n in ("pitch", "plate", "duct", "compressible")},
-    "plan": ["plan", "--case", "cases/prop_8x5", "--plan", "reports/diagnosis/cfd_pitch.csv", "--json"],
+    "plan": ["plan", "reports/diagnosis/cfd_pitch.csv", "--case", "cases/prop_8x5", "--json"],
     "drive": ["drive", "cases/ds30", "--json"],
     "map": ["map", f"{D}/thrust_map/xNova-SR-steps.csv", "--sign", "-1", "--json"],
     "motor": ["motor", "reports/drive/motor_mn4006", "--json"],

@@ -116,7 +116,7 @@ def test_mass_follows_from_healthy_flights(script: dict[str, Any], flights: Path
 def test_cut_blade_is_found_whatever_the_name(flights: Path, tmp_path: Path) -> None:
     """Content decides, and the right motor is named."""
     (tmp_path / "normal.txt").write_bytes((flights / "after.usdlog").read_bytes())
-    got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights)).judged
+    got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights), day="same").judged
     assert (got.said.verdict, got.said.effects) == ("named", ("damaged blade, motor 3",))
     assert got.accused == 0 and got.healthy == 6 and 0.0 <= got.rate95[0] < got.rate95[1] < 1.0
 
@@ -272,7 +272,7 @@ def test_betaflight_headings_of_each_tool(quote: str, tmp_path: Path) -> None:
 def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Text, JSON, picture, exit codes."""
     before = [str(p) for p in sorted(flights.glob("before_*"))]
-    call = ["fly", str(flights / "after.usdlog"), "--mass-kg", "0.035", "--healthy", *before]
+    call = ["fly", str(flights / "after.usdlog"), "--mass-kg", "0.035", "--healthy-day", "same", "--healthy", *before]
     assert main([*call, "--json", "--out", str(tmp_path / "a.png")]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["schema"] == "bemt.flight/1" and said["decision"]["effects"] == ["damaged blade, motor 3"]

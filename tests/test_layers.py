@@ -90,7 +90,7 @@ MAY: dict[str, set[str]] = {
     "bemt.judge.proof.real": {"files"},
     "bemt.judge.proof.seal": {"files"},
     "bemt.tools.exports.*": {"files"},
-    "bemt.tools.flight.read": {"files"},
+    "bemt.tools.flight.actions|bemt.tools.flight.read": {"files"},
     "bemt.tools.flight.ardupilot": {"files"},
     "bemt.tools.flight.crazyflie": {"files"},
     "bemt.tools.flight.px4": {"files"},

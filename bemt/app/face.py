@@ -87,12 +87,12 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
         kind = str(given.annotation)
         choices = re.search(r"Literal\[(.*?)\]", kind)
         what = (
-            "flag" if kind == "bool" else "choice" if choices else "mapping" if "Mapping[str" in kind
-            else "pair" if "tuple[float, float]" in kind else "number" if re.search("float|ArrayLike", kind)
+            "flag" if kind == "bool" else "choice" if choices else "mapping" if "Mapping[str, str]" in kind
+            else "pair" if "tuple[float, float]" in kind else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
             else "count" if re.search(r"\bint\b|Count", kind) else "text"
         )  # fmt: skip
         words = tuple(re.findall(r"[\"']([^\"']+)[\"']", choices[1])) if choices else ()
-        many = "Sequence" in kind or "ArrayLike" in kind
+        many = re.search(r"Sequence|(?<!str, )ArrayLike", kind) is not None
         found.append(Parameter(name, what, many, given.default, words, told.get(name, "")))
     return tuple(found)
 

@@ -13,6 +13,7 @@ EVERYWHERE = {
     "--repeatability": "--repeatability-pct", "--period": "--period-s", "--dir": "--out", "--from": "--source",
     "--compressible": "--solver compressible", "--incompressible": "--solver incompressible", "--plan": "",
     "--polar": "--reynolds", "--point": "--points",
+    "--csv": "--out-csv", "--healthy-mass": "--healthy-mass-kg", "--out": "--picture",
 }  # fmt: skip
 """Old option to the new words; nothing where the value is a bare word now."""
 
