@@ -1,6 +1,7 @@
 """What the exports wrote, run in the programs that read them: ``python docs/read_back.py`` rewrites docs/exports.md.
 
-``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it
+``python docs/read_back.py throttles`` runs every shipped case and three labels from rest at five throttles, at each
+program's own step, into docs/throttles.csv. ``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it
 measured in docs/read_back.json with version and date; without a target, the page is written from there. A program runs
 the export of a right-handed and of a left-handed rotor at the same operating points as BEMT. Needs ``pip install
 'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev`` (Gazebo) and ``openfoam``.
@@ -18,20 +19,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from bemt.base.tables import write_atomic
-from bemt.rotors.case import load_case
+from bemt.base.tables import csv_text, write_atomic
+from bemt.rotors.case import Case, load_case
+from bemt.tools.drive import drive_result
+from bemt.tools.drive.drive_result import case_for
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job, LoadsExport
 from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.motor import motor_of
 from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from simulators import PROGRAMS, installed
+from simulators import PROGRAMS, STARTED, installed
 
 DOCS = Path(__file__).resolve().parent
 CASES = DOCS.parent / "cases"
 KEPT = DOCS / "read_back.json"
+STARTED_CSV = DOCS / "throttles.csv"
 
 
 def compared(word: str, job: Job) -> dict[str, Any]:
@@ -90,14 +96,19 @@ def example(rotation: str = "right") -> Job:
 
 
 def measured(word: str) -> dict[str, Any]:
-    """Both directions of rotation, run in a process of their own: not all libraries bear each other."""
-    call = [sys.executable, str(DOCS / "read_back.py"), "--child", word]
+    """Both directions of rotation."""
+    found: dict[str, Any] = _apart("--child", word)
+    return found
+
+
+def _apart(what: str, word: str) -> Any:
+    """Run one target in a process of its own: not all libraries bear each other."""
+    call = [sys.executable, str(DOCS / "read_back.py"), what, word]
     out = subprocess.run(call, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
     found = [line for line in out.stdout.splitlines() if line.startswith("measured ")]
     if not found:
         raise RuntimeError(f"{word}: {out.stderr[-3000:]}")
-    result: dict[str, Any] = json.loads(found[-1].removeprefix("measured "))
-    return result
+    return json.loads(found[-1].removeprefix("measured "))
 
 
 def _child(word: str) -> dict[str, Any]:
@@ -110,6 +121,87 @@ def _child(word: str) -> dict[str, Any]:
     both = {key: max(value, left[key]) for key, value in right.items() if key.endswith("_pct") and key != "hub_pct"}
     kept = right["sense_kept"] and left["sense_kept"]
     return {"program": PROGRAMS[word].version(), "points": right["points"], "sense_kept": kept, **both, **hub}
+
+
+THROTTLES = (0.2, 0.4, 0.6, 0.8, 1.0)
+LABELS = (("5x4.3x3", 2400.0, 4), ("10x4.7SF", 1000.0, 3), ("16x5.5", 380.0, 6))
+"""Labels beside the shipped cases, with K_v [rev/min/V] and cells."""
+ROWS = ("case", "target", "throttle", "rpm_library", "thrust_N_library", "torque_Nm_library", "rpm", "thrust_N",
+        "torque_Nm", "thrust_off_pct", "torque_off_pct", "over_pct")  # fmt: skip
+
+
+def started_cases() -> list[Case]:
+    """Every shipped case, and labels with a motor."""
+    shipped = [load_case(path) for path in sorted(CASES.glob("*/case.toml"))]
+    return shipped + [case_for(label, kv=kv, cells=cells) for label, kv, cells in LABELS]
+
+
+def library_at(job: Job, throttle: float) -> tuple[float, float, float]:
+    """Speed [rev/min], thrust and torque at rest by the library: its drive, or for a case without one BEMT alone
+    on the motor that stands in."""
+    from scipy.optimize import brentq
+
+    if job.case.file.drive is not None:
+        drive, _, _ = drive_result._carried(job.case, 0.0, (), lambda _c, _d: {}, bands=False)
+        e = drive.esc
+        pulse = e.pulse_min_us + throttle * (e.pulse_max_us - e.pulse_min_us)
+        one = drive.steady(pulse, job.case.file.drive.soc)
+        rpm = float(one.rpm[0])
+    else:
+        motor = motor_of(job)
+
+        def surplus(n: float) -> float:
+            return float(motor.torque(np.array(throttle), np.array(n))) - float(
+                solve_points(job.case, n, 0.0).torque_Nm[0]
+            )
+
+        rpm = float(brentq(surplus, 0.03 * job.performance.rpm[-1], job.performance.rpm[-1] * 1.001))
+    found = solve_points(job.case, rpm, 0.0)
+    return rpm, float(found.thrust_N[0]), float(found.torque_Nm[0])
+
+
+def _started(word: str) -> list[dict[str, Any]]:
+    """Rows of one target, all cases and throttles."""
+    rows = []
+    for case in started_cases():
+        job = Job(case)
+        for throttle in THROTTLES:
+            rpm, T, Q = library_at(job, throttle)
+            with tempfile.TemporaryDirectory() as place:
+                ran = STARTED[word](job, Path(place), throttle, rpm)
+            off = (100.0 * (got / own - 1.0) for got, own in ((ran.thrust_N, T), (ran.torque_Nm, Q)))
+            values = (case.name, word, throttle, rpm, T, Q, ran.rpm, ran.thrust_N, ran.torque_Nm, *off, ran.over_pct)
+            rows.append(dict(zip(ROWS, values, strict=True)))
+    return rows
+
+
+def throttles() -> None:
+    """Run all targets from rest and write docs/throttles.csv."""
+    rows = [row for word in STARTED for row in _apart("--started", word)]
+    shown = [{k: v if isinstance(v, str) else float(f"{v:.5g}") for k, v in row.items()} for row in rows]
+    write_atomic(STARTED_CSV, csv_text(list(ROWS), shown))
+
+
+FORMULA = {
+    "gazebo": "T = k W^2 with one k for all speeds: no Reynolds number",
+    "px4": "one CT and CP for all speeds: no Reynolds number",
+    "ardupilot": "T of the share of full speed, fitted to rest and flight at once: the static end pays for T(V)",
+}
+
+
+def _started_rows() -> str:
+    """Worst of five throttles per case and target."""
+    table = pd.read_csv(STARTED_CSV)
+    out = []
+    for case, rows in table.groupby("case", sort=False):
+        cells = []
+        for word in STARTED:
+            one = rows[rows.target == word]
+            worst = [f"{one[c].abs().max():.2g}" for c in ("thrust_off_pct", "torque_off_pct")]
+            over = f"{one.over_pct.max():.1f}" if word in ("jsbsim", "mujoco", "fmu") else ""
+            cells.append(" / ".join([w.replace("nan", "-") for w in worst] + ([over] if over else [])))
+        out.append(f"| {case} | " + " | ".join(cells) + " |")
+    return "\n".join(out)
 
 
 SEEN = {
@@ -198,7 +290,7 @@ def page() -> str:
     ran = "run in | thrust off | torque off | direction of rotation | date |"
     line = "|---|---|---|---|---|---|---|"
     by_hand = {word: f"* `{word}`, {program}, {date}: {what}." for word, (program, date, what) in SEEN.items()}
-    blades = "\n".join(line for word, line in by_hand.items() if exports()[word].kind == "blade")
+    blades = "\n".join(line for word, line in by_hand.items() if word in exports() and exports()[word].kind == "blade")
     return f"""# Exports: one propeller for simulators, disks and design tools
 
 Generated by `python docs/read_back.py`; do not edit.
@@ -233,6 +325,27 @@ Tables end where simulated aircraft rarely fly, because programs hold the last v
 times the airspeed at which the greatest speed has no thrust (J up to 4.8 times that of zero thrust), and an open rotor
 in descent down to twice its induced speed at rest. The coefficients hold the Reynolds numbers of the case's air; a
 note in the manifest says what three quarters of that density would change.
+
+### From rest, at the program's own step
+
+Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim with
+its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the library's
+drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at that throttle;
+the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot are not here: the formulas of their sources on the files
+that were written. All rows: [throttles.csv](throttles.csv).
+
+| case | jsbsim | mujoco | fmu | gazebo | px4 | ardupilot |
+|---|---|---|---|---|---|---|
+{_started_rows()}
+
+The last three have the limits of their formulas, whatever the file says: `gazebo` {FORMULA["gazebo"]}; `px4` (forward
+propeller) {FORMULA["px4"]}; `ardupilot` {FORMULA["ardupilot"]}.
+
+JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current limit
+taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates the speed
+by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a note says from
+what and up to which step the file holds. Tables reach the speed that the case states and the one that its motor reaches;
+where these differ a note says so.
 
 Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
 `drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
@@ -290,6 +403,9 @@ so their loads are not those of BEMT. Runs by hand:
 
 def main(words: list[str]) -> int:
     """Run the targets, keep what they said, write the page; 1 where a program is missing."""
+    if "throttles" in words:
+        throttles()
+        words = [word for word in words if word != "throttles"]
     missing = [word for word in words if not installed(word)]
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     for word in words:
@@ -304,7 +420,8 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--child"]:
-        print("\nmeasured " + json.dumps(_child(sys.argv[2])), flush=True)
+    if sys.argv[1:2] in (["--child"], ["--started"]):
+        ask = _child if sys.argv[1] == "--child" else _started
+        print("\nmeasured " + json.dumps(ask(sys.argv[2])), flush=True)
         os._exit(0)  # without what native libraries do on the way out
     sys.exit(main(sys.argv[1:]))

@@ -84,7 +84,8 @@ def points(job: Job, count: int, seed: int = 7) -> tuple[np.ndarray, np.ndarray]
 
 
 def flight(job: Job, count: int, seed: int = 7) -> tuple[np.ndarray, np.ndarray]:
-    """Points from rest to zero thrust alone, for targets that hold no windmill."""
+    """Points from rest to zero thrust alone, from a quarter of full throttle, for targets that hold no windmill."""
+    job = job.flown
     rpm, V = points(job, 2 * count, seed)
     t = job.performance
     J = V / (rpm / 60.0 * t.diameter_m)
@@ -136,7 +137,7 @@ def table_skewed(job: Job, folder: Path) -> Skewed:
 
 
 def _jsbsim_stand(job: Job, folder: Path) -> Any:
-    """JSBSim with the stand of the export, held down."""
+    """JSBSim with the stand of the export, held down, at the program's own step."""
     import jsbsim as program
 
     fdm = program.FGFDMExec(str(folder))
@@ -144,8 +145,7 @@ def _jsbsim_stand(job: Job, folder: Path) -> Any:
     fdm.set_aircraft_path("aircraft")
     fdm.set_engine_path("engine")
     fdm.set_systems_path("systems")
-    assert fdm.load_model(f"{job.case.name}_stand")
-    fdm.set_dt(1.0 / 2000.0)
+    assert fdm.load_model(next((folder / "aircraft").iterdir()).name)
     fdm.run_ic()
     fdm["forces/hold-down"] = 1
     return fdm
@@ -165,8 +165,8 @@ def jsbsim_skewed(job: Job, folder: Path) -> Skewed:
         for way, speed in (("north", axial), ("east", y), ("down", z)):
             fdm[f"atmosphere/wind-{way}-fps"] = -speed / 0.3048
         fdm["propulsion/set-running"] = -1
-        for step in range(8000):
-            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 1000 else throttle
+        for step in range(600):
+            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 60 else throttle
             turns = fdm["propulsion/engine/propeller-rpm"]
             fdm.run()
         density = fdm["atmosphere/rho-slugs_ft3"] * SLUG_FT3
@@ -275,15 +275,15 @@ def gazebo_skewed(job: Job, folder: Path) -> Skewed:
 
 
 def jsbsim(job: Job, folder: Path) -> Ran:
-    """The stand of the export in a wind tunnel, at the speeds that it settles to; without power it windmills."""
+    """The stand of the export in a wind tunnel, at the speeds that it settles to; the motor brakes what windmills."""
     _save("jsbsim", job, folder)
     rows, rolls = [], []
-    for V, throttle in ((0.0, 0.1), (0.0, 0.6), (6.0, 0.05), (12.0, 0.5), (20.0, 0.8), (20.0, 0.0), (25.0, 0.02)):
+    for V, throttle in ((0.0, 0.1), (0.0, 0.6), (6.0, 0.2), (12.0, 0.5), (20.0, 0.8), (20.0, 0.4), (25.0, 0.5)):
         fdm = _jsbsim_stand(job, folder)
         fdm["atmosphere/wind-north-fps"] = -V / 0.3048
         fdm["propulsion/set-running"] = -1
-        for step in range(8000):
-            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 1000 else throttle  # from rest, no wind turns a propeller up
+        for step in range(600):
+            fdm["fcs/throttle-cmd-norm"] = 0.3 if step < 60 else throttle  # from rest, no wind turns a propeller up
             rpm = fdm["propulsion/engine/propeller-rpm"]  # the loads of a step are those of the speed before it
             fdm.run()
         power = fdm["propulsion/engine/propeller-power-ftlbps"] * FT_LBF
@@ -404,6 +404,95 @@ def flow360(job: Job, folder: Path) -> Ran:
         )  # fmt: skip
     assert made.number_of_blades == job.performance.blades
     return Ran([], [], [], [], 1 if made.rotation_direction_rule == "rightHand" else -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A run from rest at one throttle: last speed, thrust and torque, and the most of speed and thrust over the last."""
+
+    rpm: float
+    thrust_N: float
+    torque_Nm: float
+    over_pct: float
+
+
+SETTLED_S = 4.0
+"""Length of a run from rest: forty time constants of a slow drive [s]."""
+
+
+def _course(rpm: Any, thrust_N: Any, torque_Nm: Any) -> Course:
+    over = max(float(np.max(y) / y[-1]) - 1.0 for y in (np.asarray(rpm), np.asarray(thrust_N)))
+    return Course(float(rpm[-1]), float(thrust_N[-1]), float(torque_Nm[-1]), 100.0 * over)
+
+
+def jsbsim_started(job: Job, folder: Path, throttle: float, rpm: float) -> Course:
+    """The stand as a user runs it: load, run_ic, throttle; the program's own step and its own motor."""
+    _save("jsbsim", job, folder)
+    fdm, rows = _jsbsim_stand(job, folder), []
+    fdm["propulsion/set-running"] = -1
+    fdm["fcs/throttle-cmd-norm"] = throttle
+    for _ in range(int(SETTLED_S / fdm.get_delta_t())):
+        turns = fdm["propulsion/engine/propeller-rpm"]
+        fdm.run()
+        power = fdm["propulsion/engine/propeller-power-ftlbps"] * FT_LBF
+        rows.append((turns, fdm["propulsion/engine/thrust-lbs"] * LBF, power / max(turns * np.pi / 30.0, 1e-9)))
+    air = fdm["atmosphere/rho-slugs_ft3"] * SLUG_FT3 / job.case.air().rho
+    n, T, Q = np.transpose(rows)
+    return _course(n, T / air, Q / air)
+
+
+def _run_up(rpm: float, step_s: float) -> np.ndarray:
+    """Speeds from rest to a speed, as a motor with a time constant of 0.1 s gives them [rev/min]."""
+    return np.asarray(rpm * (1.0 - np.exp(-np.arange(0.0, SETTLED_S, step_s) / 0.1)))
+
+
+def mujoco_started(job: Job, folder: Path, throttle: float, rpm: float) -> Course:
+    """The body held at rest, MuJoCo's own step; the motor is the user's: the speed that the library has there."""
+    import mujoco as program
+
+    _save("mujoco", job, folder)
+    space: dict[str, Any] = {}
+    exec(next(folder.glob("*_mujoco.py")).read_text(encoding="utf-8"), space)
+    model = program.MjModel.from_xml_path(str(next(folder.glob("*.xml"))))
+    data = program.MjData(model)
+    propeller, rows = space["Propeller"](model), []
+    for n in _run_up(rpm, model.opt.timestep):
+        data.qpos[:], data.qvel[:] = (0, 0, 0, 1, 0, 0, 0), 0.0
+        propeller.rpm = n
+        propeller(model, data)
+        program.mj_step(model, data)
+        rows.append((n, data.qfrc_actuator[2], abs(data.qfrc_actuator[5])))
+    return _course(*np.transpose(rows))
+
+
+def fmu_started(job: Job, folder: Path, throttle: float, rpm: float) -> Course:
+    """Co-simulation by fmpy with its own step; the speed is that of the library."""
+    import fmpy
+
+    path = str(next(_save("fmu", job, folder).glob("*.fmu")))
+    n = _run_up(rpm, 0.01)
+    signals = np.array(list(zip(np.arange(n.size) * 0.01, n, strict=True)), dtype=[("time", "<f8"), ("rpm", "<f8")])
+    found = fmpy.simulate_fmu(path, stop_time=SETTLED_S, input=signals, output=["thrust_N", "torque_Nm"])
+    return _course(np.r_[n, rpm], found["thrust_N"], found["torque_Nm"])
+
+
+def _formula_started(word: str) -> Callable[[Job, Path, float, float], Course]:
+    """The published formula on the written file, at the speed that the library has there."""
+
+    def run(job: Job, folder: Path, throttle: float, rpm: float) -> Course:
+        target = exports()[word]
+        assert isinstance(target, LoadsExport)
+        T, Q = target.loads(target.write(job), np.array([rpm]), np.zeros(1))
+        return Course(rpm, float(T[0]), float(Q[0]), 0.0)
+
+    return run
+
+
+STARTED: dict[str, Callable[[Job, Path, float, float], Course]] = {
+    "jsbsim": jsbsim_started, "mujoco": mujoco_started, "fmu": fmu_started,
+    **{word: _formula_started(word) for word in ("gazebo", "px4", "ardupilot")},
+}  # fmt: skip
+"""Runs from rest: three programs, and three formulas of programs that are not here."""
 
 
 def _package(name: str) -> Callable[[], str]:

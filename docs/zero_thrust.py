@@ -1,6 +1,6 @@
 """A JSBSim aircraft where BEMT says that the thrust of its 10x5 vanishes: ``python docs/zero_thrust.py``.
 
-JSBSim gets the airspeed and the shaft power that BEMT gives for that point; speed and thrust are its own answer. Needs
+JSBSim gets the airspeed, and the throttle at which the motor of the file holds BEMT's torque at that point; speed and thrust are its own answer. Needs
 ``pip install 'bemt[simulators]'``.
 """
 
@@ -16,6 +16,7 @@ from bemt.base.tables import write_atomic
 from bemt.rotors.case import load_case
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job
+from bemt.tools.exports.motor import motor_of
 from bemt.tools.exports.performance import solve_points
 
 CASE = Path(__file__).resolve().parent.parent / "cases/prop_10x5/case.toml"
@@ -32,13 +33,12 @@ def fly(root: Path, airspeed_m_s: float, throttle: float) -> tuple[float, float]
     fdm.set_engine_path("engine")
     fdm.set_systems_path("systems")
     fdm.load_model("prop_10x5_stand")
-    fdm.set_dt(1.0 / 2000.0)
     fdm.run_ic()
     fdm["forces/hold-down"] = 1
     fdm["atmosphere/wind-north-fps"] = -airspeed_m_s / FOOT
     fdm["propulsion/set-running"] = -1
     fdm["fcs/throttle-cmd-norm"] = throttle
-    for _ in range(int(2000 * SECONDS)):
+    for _ in range(int(SECONDS / fdm.get_delta_t())):
         fdm.run()
     return fdm["propulsion/engine/propeller-rpm"], fdm["propulsion/engine/thrust-lbs"] * POUND
 
@@ -52,11 +52,10 @@ def main() -> dict[str, float]:
     torque = float(solve_points(job.case, RPM, V).torque_Nm[0])
     at_rest = float(solve_points(job.case, RPM, 0.0).thrust_N[0])
     files = exports()["jsbsim"].write(job)
-    full = float(str(files["engine/prop_10x5_motor.xml"]).split('"WATTS">')[1].split("<")[0])
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             write_atomic(Path(folder) / name, text)
-        rpm, thrust = fly(Path(folder), V, torque * RPM * np.pi / 30.0 / full)
+        rpm, thrust = fly(Path(folder), V, motor_of(job).throttle_for(RPM, torque))
     return {"airspeed_m_s": V, "J": J, "rpm": rpm, "thrust_N": thrust, "thrust_at_rest_N": at_rest}
 
 
@@ -64,5 +63,5 @@ if __name__ == "__main__":
     found = main()
     print(f"BEMT: no thrust at J {found['J']:.4f}, {found['airspeed_m_s']:.2f} m/s at {RPM:.0f} rev/min")
     share = 100 * found["thrust_N"] / found["thrust_at_rest_N"]
-    print(f"JSBSim there, with BEMT's shaft power: {found['rpm']:.0f} rev/min, thrust {found['thrust_N']:+.4f} N")
+    print(f"JSBSim there, with BEMT's torque: {found['rpm']:.0f} rev/min, thrust {found['thrust_N']:+.4f} N")
     print(f"which is {share:+.2f} % of the {found['thrust_at_rest_N']:.2f} N at rest")

@@ -11,10 +11,12 @@ import pytest
 import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.base.units import INCH
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.design import design_answer
 from bemt.tools.design.best_label import standard
+from bemt.tools.design.blade_design import design_blade
 from bemt.tools.design.optimise import optimise
 from bemt.tools.design.requirement import DesignPoint, point_of
 from bemt.tools.design.shape import CONTROLS
@@ -187,3 +189,21 @@ def test_the_command_refuses_a_folder_that_holds_something(tmp_path, capsys: pyt
     (tmp_path / "a").write_text("x")
     words = ["design", "--thrust-N", "6", "--diameter-in", "10", "--out", str(tmp_path)]
     assert main(words) == 2 and "already exists" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_root_thickens_where_stress_asks_and_reaches_what_thin_sections_do_not() -> None:
+    """12 N of a 5 in rotor in PLA: out of reach at 12 % root, within the limits when thickness is free."""
+    pytest.importorskip("neuralfoil")
+    point, size = [DesignPoint(12.0)], 5.0 * INCH
+    with pytest.raises(InputError):
+        design_blade(point, size, 3, section="2412")
+    found = design_blade(point, size, 3)
+    limits = found.need.limits
+    assert found.values.thrust_N[0] >= 12.0 * (1.0 - 1e-3)
+    assert found.values.stress_Pa.max() <= limits.material.strength_MPa * 1e6 / limits.safety * (1.0 + 2e-3)
+    assert found.thickness is not None and found.thickness[0] > 0.12
+    with found.case() as case:
+        assert case.rotor().blade.section(case.rotor().blade.Rhub).thickness == pytest.approx(
+            found.thickness[0], abs=0.01
+        )

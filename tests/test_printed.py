@@ -15,8 +15,13 @@ import numpy as np
 import pytest
 
 from bemt.app.cli import main
+from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.propagate import propagate
+from bemt.tools.design.rotor_loads import case_of_label
+from bemt.tools.exports.base import Job
+from bemt.tools.exports.folder import export_case
+from bemt.tools.exports.printing import Print
 from geometry.airfoil import naca4
 from geometry.blade import from_stations
 from geometry.common import GeometryError
@@ -169,6 +174,33 @@ def test_what_cannot_be_printed_is_refused_with_the_reason(make, where: str) -> 
         make()
     if isinstance(error.value, GeometryError):
         assert all(re.search(where, fault[0]) for fault in error.value.faults)
+
+
+@pytest.mark.parametrize(("nozzle_mm", "least_mm", "wider"), [(None, 0.8, True), (0.25, 0.5, False)])
+def test_the_propeller_that_most_people_print_is_one_body(nozzle_mm, least_mm, wider, tmp_path: Path) -> None:
+    """A 5.1x4.3x3: with the usual nozzle its tip is widened and the cost said, with a fine one it stays."""
+    case = case_of_label("5.1x4.3x3")
+    request = Print(nozzle_mm=nozzle_mm, adapter="m5")
+    made = export_case(Job(case, printed=request), tmp_path, ["stl"])
+    assert made["checks_m"]["min_thickness"] >= 1e-3 * least_mm
+    vertices, triangles, unit = read_solid(tmp_path / f"{case.name}.stl")
+    body = Mesh(vertices, triangles, np.zeros(len(triangles), np.int64), ("x",))
+    check_closed(body, "stl", bodies=1)
+    blade = case.rotor().blade
+    found = find_rotor(vertices * 1e-3, triangles)
+    inside = (found.r > 0.4 * blade.R) & (found.r < 0.88 * blade.R)
+    assert np.abs(found.chord / blade.at(found.r)[0] - 1.0)[inside].max() < 0.03
+    assert ("tip_chord_mm" in made["printed"]) == wider
+    if wider:
+        assert made["printed"]["tip_chord_mm"][1] == pytest.approx(6.0 * least_mm, rel=0.01)
+        assert 0.0 < made["printed"]["thrust_pct"] < made["printed"]["torque_pct"] < 5.0  # at the tip, drag costs most
+
+
+def test_a_refusal_names_the_nozzle_that_would_do(tmp_path: Path) -> None:
+    case = case_of_label("2x1x3")
+    with pytest.raises(InputError) as error:
+        export_case(Job(case, printed=Print(min_thickness_mm=1.6)), tmp_path, ["stl"])
+    assert any("--nozzle-mm 0.25" in fault.hint for fault in error.value.faults)
 
 
 def test_the_command_writes_both_hands_and_a_3mf_of_the_same_body(tmp_path: Path, project: Path) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt.base import canvas
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
-from bemt.tools.design.rotor_loads import size_in
 from bemt.tools.design.search import Target
 
 if TYPE_CHECKING:
@@ -17,6 +19,53 @@ if TYPE_CHECKING:
 SCHEMA = "bemt.choose/1"
 RESULTS = ("choose.json", "choose.csv", "choose.png")
 SHOWN = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Propellers and motors for a target, best first; columns of the table are attributes as well.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        As :func:`bemt.tools.design.search.choose` gives it.
+    """
+
+    table: pd.DataFrame
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name == "table":
+            raise AttributeError(name)
+        return getattr(self.table, name)
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __str__(self) -> str:
+        return text(self.table)
+
+    def __repr__(self) -> str:
+        first = self.table.iloc[0]
+        return f"<choice of {len(self.table)} pairs: {first.label} with {first.kv:.0f} rev/min/V>"
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self)[1:-1], self.text)
+
+    @property
+    def text(self) -> str:
+        """One screen: what to take, and the best motor of each label."""
+        return text(self.table)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if no pair is sure to meet the target."""
+        return EXIT_OK if (self.table.probability >= self.table.attrs["sure"]).any() else EXIT_UNCONVERGED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ``bemt.choose/1``."""
+        return document(self.table)
+
+    to_dict = document
 
 
 def best_of_each(table: pd.DataFrame) -> pd.DataFrame:
@@ -31,27 +80,61 @@ def text(table: pd.DataFrame) -> str:
     at = "hover" if t.cruise_N is not None else "this thrust"
     size = "" if t.airspeed_m_s == 0.0 else f" at {t.airspeed_m_s:g} m/s"
     good = int((table.probability >= sure).sum())
-    lines = [
-        f"{t.thrust_N:.3g} N on {t.cells}S at 50% charge{size}, tip Mach up to {t.max_tip_mach:g}: "
-        f"{good} of {len(table)} pairs meet it with a probability of {sure:.0%} or more",
-        f"power, current and time at {at} ({t.at_N:.3g} N); ± one standard deviation; best motor of each label",
+    fluid = "" if t.fluid == "air" else ", in water"
+    pair = ", each one of a coaxial pair" if t.coaxial else ""
+    what = f"{t.thrust_N:.3g} N" if t.mass_kg is None or t.fixed else f"{t.mass_kg:.3g} kg on {t.rotors} rotors"
+    lines = [*_headline(table, good, at)]
+    lines += [
         "",
+        f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
+        f"{good} of {len(table)} pairs meet it with a probability of {sure:.0%} or more",
+        f"power, current and time at {at} of one rotor; ± one standard deviation; best motor of each label",
     ]
-    if not good:
-        reach = table.loc[table.full_thrust_N.idxmax()]
-        most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
-        lines[2:] = [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}", ""]
+    if t.rest_kg is not None:
+        lines.append(
+            f"hover lifts {t.rest_kg:.3g} kg and, of each rotor, motor, propeller, controller and frame (column g, "
+            "by laws with a spread of 25 to 50 %)"
+        )
+    if t.max_diameter_in is None:
+        lines.append("no limit on the diameter: give --max-diameter-in, or --arm-mm of the frame")
+    lines.append("")
     timed = "min" if t.capacity_Ah is not None else "min/Ah"
-    head = ["propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "why not the first"]
+    head = [
+        "propeller", "kv", "P(met)", "power W", "A", "peak A", "g/W", timed, "Mach", "full N", "g", "why not the first"
+    ]  # fmt: skip
     rows = [
         [r.label, f"{r.kv:.0f}", f"{r.probability:.0%}", _banded(r.power_W, r.u_power_W),
          *(number_text(v, 3) for v in (r.current_A, r.peak_A, r.g_per_W, r.minutes)), number_text(r.tip_mach, 2),
-         number_text(r.full_thrust_N, 3), r.why or "-"]
+         number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}", r.why or "-"]
         for r in best_of_each(table).head(SHOWN).itertuples()
     ]  # fmt: skip
     width = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     lines += ["  ".join(cell.ljust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in [head, *rows]]
     return "\n".join(lines) + "\n"
+
+
+def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
+    """What to take, and what the least power would be; else the nearest."""
+    first, t = table.iloc[0], table.attrs["target"]
+    if not good:
+        reach = table.loc[table.full_thrust_N.idxmax()]
+        most = f"{reach.full_thrust_N:.3g} N, with {reach.label} at {reach.kv:.0f} rev/min/V"
+        return [f"none meets it; the most is {most if reach.full_thrust_N > 0.0 else 'no thrust at all'}"]
+    same = table[(table.label == first.label) & (table.probability >= 0.5)]
+    even = f" (an even chance from {same.kv.min():.0f})" if same.kv.min() < first.kv else ""
+    lines = [
+        f"Take {first.label} with {first.kv:.0f} rev/min/V{even}: {_banded(first.power_W, first.u_power_W)} W at {at}, "
+        f"{first.g_per_W:.3g} g/W"
+    ]
+    least = table[: int(good)].power_W.idxmin()
+    if least != 0:
+        other = table.loc[least]
+        lines.append(
+            f"The least power has {other.label} with {other.kv:.0f}: {1.0 - other.power_W / first.power_W:.1%} less, "
+            f"{other.diameter_in - first.diameter_in:.3g} in larger"
+            + ("" if t.rest_kg is None else f", {other.propulsion_g - first.propulsion_g:+.0f} g a rotor")
+        )
+    return lines
 
 
 def document(table: pd.DataFrame) -> dict[str, Any]:
@@ -71,7 +154,7 @@ def write(table: pd.DataFrame, out: str | Path) -> None:
 def front(table: pd.DataFrame) -> pd.DataFrame:
     """Pairs of the best motors that no smaller propeller beats in power, smallest first (the Pareto front)."""
     sure = best_of_each(table[table.probability >= table.attrs["sure"]])
-    sure = sure.assign(diameter_in=[size_in(label) for label in sure.label]).sort_values(["diameter_in", "power_W"])
+    sure = sure.sort_values(["diameter_in", "power_W"])
     return sure[sure.power_W < sure.power_W.cummin().shift(fill_value=math.inf)]
 
 
@@ -81,8 +164,9 @@ def picture(table: pd.DataFrame) -> bytes:
     best = best_of_each(table).dropna(subset=["power_W"])
     figure = canvas.figure(7.5, 4.6)
     ax = figure.add_subplot()
-    size = [size_in(label) for label in best.label]
-    dots = ax.scatter(size, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3)
+    dots = ax.scatter(
+        best.diameter_in, best.power_W, c=best.probability, vmin=0.0, vmax=1.0, cmap="viridis", s=32, zorder=3
+    )
     figure.colorbar(dots, ax=ax, label="probability that the target is met")
     edge = front(table)
     if len(edge):

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base import cache
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, new_folder
@@ -28,12 +29,26 @@ from bemt.tools.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
     from bemt.physics.bem.model import Model
+    from geometry.blade import Blade
 
 Progress = Callable[[str], None]
 
 HUB_RATIO = 0.15
-ROOT, THIN_FROM = 0.12, 0.5
-"""Thickness at the hub, the thickest that is tabulated without NeuralFoil, and r/R from which it is the rule's [1]."""
+THIN_FROM = 0.5
+"""r/R from which the thickness is the outer one [1]."""
+FAMILY = (
+    (0.12, 0.09),
+    (0.15, 0.09),
+    (0.18, 0.12),
+    (0.21, 0.12),
+    (0.24, 0.15),
+    (0.28, 0.15),
+    (0.28, 0.18),
+    (0.30, 0.21),
+)
+"""Thickness at the hub and on the outer half that are tried, while stress limits the blade; the first is tabulated
+without NeuralFoil [1]."""
+FAR = 0.8  # Share of the thrust below which the next but one is tried [1]
 DENSITY = (0.01, 10.0)  # of the air [kg/m3]
 KEYS_KEPT = ("rotor", "duct", "air", "model", "polars")
 """Tables of a case with a duct that the new blade keeps."""
@@ -67,6 +82,8 @@ class Design:
     ----------
     need : Requirement
         What was asked for.
+    thickness : tuple of float, or None
+        Of the section at the hub and on the outer half, as found; None where they were stated [1].
     found : Optimum
         Start and result of the optimisation, for rotors as built if robust.
     files : dict of str to bytes
@@ -88,6 +105,7 @@ class Design:
     """
 
     need: Requirement
+    thickness: tuple[float, float] | None
     found: search.Optimum
     files: dict[str, bytes]
     start: MinimumLoss | None
@@ -130,10 +148,28 @@ class Design:
         new_folder.write_files(self.files, Path(folder))
         return Path(folder)
 
-    def __repr__(self) -> str:
+    @property
+    def text(self) -> str:
+        """One screen: the blade next to the best label and the ideal."""
         from bemt.tools.design.design_answer import text
 
         return text(self)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if the search did not converge."""
+        return EXIT_OK if self.found.converged else EXIT_UNCONVERGED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ``bemt.design/1``."""
+        from bemt.tools.design.design_answer import document
+
+        return document(self)
+
+    to_dict = document
+
+    def __repr__(self) -> str:
+        return self.text
 
 
 def name_of(point: DesignPoint, diameter_m: float) -> str:
@@ -168,34 +204,27 @@ def design_blade(
                     base.air(), **limits)  # fmt: skip
     say = progress or (lambda line: None)
     say("sections")
-    model = prepare_case(base)
-    if duct is None:
-        blade, start = search.start_blade(model, need)
-    else:
-        blade, start = model.rotor.blade, None
-    _check_chords(search.problem_of(model, need, blade)[0])
+    _check_chords(search.problem_of(prepare_case(base), need, _first_blade(base, need, duct)[0])[0])
     say("propellers on sale")
     label, same = best_labels(need, duct)
     free = next((i for i, p in enumerate(need.points) if p.rpm is None), None)
     rpm0 = None if label is None or free is None else float(label.rpm[free])
-    if rpm0 is not None and duct is None:
-        known = tuple(replace(p, rpm=p.rpm or rpm0) for p in need.points)
-        blade, start = search.start_blade(model, replace(need, points=known))
-    problem, x = search.problem_of(model, need, blade, rpm0)
 
     def step(n: int, what: str) -> None:
         say(f"{what}: step {n}")
 
-    found = search.optimise(problem, x, step)
+    varied = section is None and duct is None
+    base, thickness, start, found = _thickest_needed(base, need, duct, rpm0, varied, step)
+    model = prepare_case(base)
     files = case_files(base, found, points)
     over = None
     if robust:
         with new_folder.temporary(files) as case:
             prior = case.as_built().prior
-        variants = search.as_built_variants(problem.model, prior)
+        variants = search.as_built_variants(found.problem.model, prior)
         drawn = _over_rotors(found, variants)
         better = search.improve(found, variants, step)
-        plain = replace(better.problem, variants=problem.variants)
+        plain = replace(better.problem, variants=found.problem.variants)
         after = plain.values(better.best)
         assert after is not None
         over = _over_rotors(better, variants), drawn
@@ -207,8 +236,73 @@ def design_blade(
         bands = _bands(case, need, found.after.rpm)
     label_bands = () if label is None else _bands(label.case, need, label.rpm)
     breaks = () if label is None else _breaks(label, need)
-    return Design(need, found, files, start, label, same, breaks, *_ideal(need, model, found), bands, label_bands, over,
+    return Design(need, thickness, found, files, start, label, same, breaks, *_ideal(need, model, found), bands, label_bands, over,
                   duct is not None)  # fmt: skip
+
+
+def _first_blade(
+    base: Case, need: Requirement, duct: Case | None, rpm0: float | None = None
+) -> tuple[Blade, MinimumLoss | None]:
+    """Blade to start from: of least induced loss, at the speed of the best propeller on sale; in a duct its own."""
+    model = prepare_case(base)
+    if duct is not None:
+        return model.rotor.blade, None
+    known = need if rpm0 is None else replace(need, points=tuple(replace(p, rpm=p.rpm or rpm0) for p in need.points))
+    return search.start_blade(model, known)
+
+
+def _thickest_needed(
+    base: Case, need: Requirement, duct: Case | None, rpm0: float | None, varied: bool,
+    step: Callable[[int, str], None],
+) -> tuple[Case, tuple[float, float] | None, MinimumLoss | None, search.Optimum]:  # fmt: skip
+    """Sections and blade of the least power: thicker ones are tried while stress limits what was found.
+
+    Returns the case, its thickness at the hub and on the outer half, the start and the optimum.
+    """
+    best: tuple[Case, tuple[float, float] | None, MinimumLoss | None, search.Optimum] | None = None
+    refused: InputError | None = None
+    family: tuple[tuple[float, float] | None, ...] = FAMILY if varied else (None,)
+    k = 0
+    while k < len(family):
+        made = base if k == 0 else _thicker(base, FAMILY[k])
+        blade, start = _first_blade(made, need, duct, rpm0)
+        problem, x = search.problem_of(prepare_case(made), need, blade, rpm0)
+        try:
+            found = search.optimise(problem, x, step)
+        except InputError as error:
+            if best is not None:
+                break
+            refused = error if refused is None or _share(error, need) > _share(refused, need) else refused
+            stressed, ahead = any("stress" in f.hint for f in error.faults), 1 + (_share(error, need) < FAR)
+        else:
+            if best is not None and found.after.objective > best[3].after.objective * (1.0 - ENOUGH_LESS):
+                break
+            best = made, family[k], start, found
+            stressed, ahead = any(word.startswith("stress") for word in problem.active(found.after)), 1
+        if not stressed or not cache.is_installed("neuralfoil"):
+            break
+        k += ahead
+    if best is None:
+        assert refused is not None
+        raise refused
+    return best
+
+
+ENOUGH_LESS = 1e-4
+"""Share of the power that thicker sections must save [1]."""
+
+
+def _share(error: InputError, need: Requirement) -> float:
+    """Thrust that a refusal names as the nearest, over the one asked for; 0 where it names none [1]."""
+    words = error.faults[0].expected.split()
+    return float(words[2]) / need.points[0].thrust_N if words[:2] == ["up", "to"] else 0.0
+
+
+def _thicker(base: Case, thickness: tuple[float, float]) -> Case:
+    """The case with other thicknesses of its section."""
+    section = dict(base.written["blade"]["section"]) | {"thickness": list(thickness)}
+    with _in_words_of_the_request():
+        return with_changes(base, {"blade.section": section})
 
 
 def _check_chords(problem: BladeProblem) -> None:
@@ -279,9 +373,8 @@ def _ideal(need: Requirement, model: Model, found: search.Optimum) -> tuple[floa
 def _section(text: str | None, hub_ratio: float) -> tuple[dict[str, Any], Path]:
     """Table [blade.section] of what ``--section`` says, and the folder of its files."""
     if text is None:
-        camber, thickness = (item.value for item in SECTION)
         radii = [round(hub_ratio, 4), round(max(THIN_FROM, hub_ratio + 0.1), 4)]
-        return {"camber": camber, "thickness": [max(ROOT, thickness), thickness], "r_over_R": radii}, Path(".")
+        return {"camber": SECTION[0].value, "thickness": list(FAMILY[0]), "r_over_R": radii}, Path(".")
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
         raise InputError(
@@ -317,7 +410,7 @@ def _open_case(
         faults.append(Fault("--hub-ratio", "", f"{hub:g}", "a number from 0.05 to 0.6"))
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
         faults.append(
-            Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10))
+            Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", "In g/m3? Divide by 1000" * (density > 10))
         )
     if faults or diameter_m is None:
         raise InputError(faults)
@@ -353,7 +446,7 @@ def _in_duct(
     faults = [
         Fault(name, "", f"{value:g}", "nothing with --duct: the case states it")
         for name, value in (("--diameter-in", None if diameter_m is None else diameter_m / INCH),
-                            ("--hub-ratio", hub_ratio), ("--density", density))
+                            ("--hub-ratio", hub_ratio), ("--density-kg-m3", density))
         if value is not None
     ]  # fmt: skip
     if not case.ducted:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.base.units import G0, INCH
-from bemt.tools.design.blade_design import BandedLoads, Design
+from bemt.tools.design.blade_design import FAMILY, BandedLoads, Design
 from bemt.tools.design.minimum_loss import actuator_disk
 
 SCHEMA = "bemt.design/1"
@@ -85,6 +85,10 @@ def text(d: Design) -> str:
                                                 "duct and gap are most of it"), "", *_bought(d)]  # fmt: skip
     limits = need.limits
     stress, allowed = float(np.nanmax(v.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
+    if d.thickness is not None and d.thickness != FAMILY[0]:
+        lines.append(
+            "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
+        )
     lines.append(f"limits reached: {'; '.join(d.active) or 'none'}")
     lines.append(f"largest stress {stress:.3g} MPa; {allowed:.3g} allowed ({limits.material.name}, "
                  f"{limits.material.strength_MPa:g} MPa over {limits.safety:g})")  # fmt: skip
@@ -108,6 +112,31 @@ def _ratio(times: float) -> str:
     return f"{abs(times - 1.0):.1%} {'less' if times <= 1.0 else 'more'} power than"
 
 
+SAME = 0.01
+"""Share of the power below which two blades are equals: far below the band of either [1]."""
+
+
+def _beside(d: Design, gain: float) -> str:
+    """The blade beside the best propeller on sale, up to the kind of that."""
+    assert d.label is not None
+    name = d.label.name
+    if abs(gain) <= SAME:
+        return f"No better than a {name} ({_ratio(1.0 + gain).removesuffix(' than')}), the best "
+    return f"{_ratio(1.0 + gain).capitalize()} a {name} at the speed that suits it, the best "
+
+
+def _label_breaks(d: Design) -> str:
+    """Limits that the propeller on sale does not keep, as a sentence."""
+    assert d.label is not None
+    what = {
+        "stress": f"break in {d.need.limits.material.name.upper()}",
+        "stall margin": "have less in hand before the stall",
+        "tip Mach": "turn too fast",
+    }
+    words = [what.get(w.partition(" (")[0], w) for w in d.label_breaks]
+    return f"The {d.label.name} would {' and '.join(dict.fromkeys(words))}." if words else ""
+
+
 def _bought(d: Design) -> list[str]:
     """What the design buys over the best label, and how far the ideal is."""
     kind = (
@@ -120,9 +149,7 @@ def _bought(d: Design) -> list[str]:
         lines.append(f"no {kind} does this at any speed within the tip Mach number")
     else:
         gain = d.mean_W / d.label.mean_W - 1.0
-        words = [f"stress (in {d.need.limits.material.name})" if w == "stress" else w for w in d.label_breaks]
-        breaks = f"; it does not keep: {', '.join(words)}" if words else ""
-        lines.append(f"{_ratio(1.0 + gain)} {d.label.name}, the best {kind}, at the speed that suits it{breaks}")
+        lines.append(f"{_beside(d, gain)}{kind}. {_label_breaks(d)}".rstrip())
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
             lines.append("leave the rpm out, and the speed is found too")
     ideal, name = (d.disk_W, "ideal disk") if math.isnan(d.betz_W) else (d.betz_W, "best blade without drag")
@@ -144,7 +171,7 @@ def document(d: Design) -> dict[str, Any]:
         "limits": {"min_chord_mm": 1e3 * need.limits.min_chord_m, "min_thickness_mm": 1e3 * need.limits.min_thickness_m,
                    "max_tip_mach": need.limits.max_tip_mach, "stall_margin": need.limits.stall_margin,
                    "material": need.limits.material.name, "safety": need.limits.safety},
-        "active": d.active,
+        "active": d.active, "thickness": None if d.thickness is None else list(d.thickness),
         "points": [
             {"thrust_N": float(v.thrust_N[k]), "asked_N": p.thrust_N, "airspeed_m_s": p.airspeed_m_s,
              "rpm": float(v.rpm[k]), "weight": p.weight, "power_W": float(v.power_W[k]),

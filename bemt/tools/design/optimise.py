@@ -143,7 +143,7 @@ def optimise(problem: BladeProblem, x0: Array, progress: Progress | None = None,
     before = problem.values(start)
     if before is None:
         raise InputError(
-            Fault("", "--thrust", "no blade to start from converges", "a point that the solver converges at")
+            Fault("", "--thrust-N", "no blade to start from converges", "a point that the solver converges at")
         )
     inside, n = start, 0
     if before.margins.min() < 0.0:
@@ -249,7 +249,7 @@ def _unreachable(problem: BladeProblem, x: Array, share: float) -> list[Fault]:
         at = "static" if p.airspeed_m_s == 0.0 else f"at {p.airspeed_m_s:g} m/s"
         speed = "any speed" if p.rpm is None else f"{p.rpm:g} rev/min"
         nearest = max(share, 0.0) * p.thrust_N
-        name = "--static-thrust" if p.weight == 0.0 else "--thrust"
+        name = "--static-thrust-N" if p.weight == 0.0 else "--thrust-N"
         faults.append(Fault(name, "", f"{p.thrust_N:g} N {at}, {speed}", f"up to {nearest:.3g} N within the limits",
                             hint if k == 0 else ""))  # fmt: skip
     return faults

@@ -87,10 +87,10 @@ def point_of(text: str) -> DesignPoint:
             found[names[key]] = float(value)
         except ValueError:
             faults.append(
-                Fault("--point", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
+                Fault("--points", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
             )
     if "thrust_N" not in found and not faults:
-        faults.append(Fault("--point", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
+        faults.append(Fault("--points", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
     if faults:
         raise InputError(faults)
     return DesignPoint(**found)
@@ -114,38 +114,45 @@ def required(
             faults.append(Fault(name, "", f"{value:g}", f"{ends} {unit}".rstrip(), hint))
 
     for p in points:
-        check("--thrust", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
-        check("--airspeed", p.airspeed_m_s, 0.0, FAST, "m/s", "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "")
-        check("--point", p.weight, 0.0, 1e6, "", "weight is a share of time")
+        check("--thrust-N", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
+        check(
+            "--airspeed-m-s",
+            p.airspeed_m_s,
+            0.0,
+            FAST,
+            "m/s",
+            "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "",
+        )
+        check("--points", p.weight, 0.0, 1e6, "", "weight is a share of time")
         if p.rpm is not None:
             check("--rpm", p.rpm, 100.0, 3e5, "rev/min", "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else "")
     if static_thrust_N is not None:
-        check("--static-thrust", static_thrust_N, 1e-3, 1e4, "N")
+        check("--static-thrust-N", static_thrust_N, 1e-3, 1e4, "N")
     if static_rpm is not None:
         check("--static-rpm", static_rpm, 100.0, 3e5, "rev/min")
         if static_thrust_N is None:
-            faults.append(Fault("--static-rpm", "", f"{static_rpm:g}", "nothing without --static-thrust"))
+            faults.append(Fault("--static-rpm", "", f"{static_rpm:g}", "nothing without --static-thrust-N"))
     check("--min-chord-mm", min_chord_mm, 0.1, 0.2 * D if D > 0.0 else 1e3, "mm", "At most a fifth of the diameter")
     check("--min-thickness-mm", min_thickness_mm, 0.0, 0.05 * D if D > 0.0 else 1e3, "mm", "At most D / 20")
     check("--max-tip-mach", max_tip_mach, 0.05, 0.95, "", "Section theory ends below Mach 1")
     check("--stall-margin", stall_margin, 0.0, 0.8, "", "In percent? Divide by 100" if stall_margin > 1.0 else "")
     check("--safety", safety, 1.0, 50.0)
     if not points:
-        faults.append(Fault("--thrust, --point", "", "neither", "one of them", "As in --thrust 6 --rpm 7000"))
+        faults.append(Fault("--thrust-N, --points", "", "neither", "one of them", "As in --thrust-N 6 --rpm 7000"))
     elif sum(p.weight for p in points) == 0.0:
-        faults.append(Fault("--point", "", "weight 0 everywhere", "one weight above 0"))
+        faults.append(Fault("--points", "", "weight 0 everywhere", "one weight above 0"))
     if material not in MATERIALS:
         faults.append(Fault("--material", "", material, f"one of {', '.join(MATERIALS)}"))
     if not faults:
         light = LIGHTEST * 0.25 * math.pi * diameter_m**2
-        faults += [Fault("--thrust", "", f"{p.thrust_N:g} N", f"{light:.2g} N or more on this disk",
+        faults += [Fault("--thrust-N", "", f"{p.thrust_N:g} N", f"{light:.2g} N or more on this disk",
                          "Or a smaller diameter") for p in points if p.thrust_N < light]  # fmt: skip
         for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
             mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
             if mach > max_tip_mach and rpm is None:
                 hint = "The tip is faster still: raise --max-tip-mach"
                 expected = f"a Mach number up to {max_tip_mach:g}"
-                faults.append(Fault("--airspeed", "", f"{V:g} m/s, Mach {mach:.2f}", expected, hint))
+                faults.append(Fault("--airspeed-m-s", "", f"{V:g} m/s, Mach {mach:.2f}", expected, hint))
             elif mach > max_tip_mach:
                 top = (
                     60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)

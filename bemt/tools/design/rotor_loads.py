@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.lattice import SPEEDS
+from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from geometry.common import pchip
@@ -34,6 +36,8 @@ class RotorLoads:
     thrust_N: Array
     torque_Nm: Array
     a_sound: float  # [m/s]
+    # Thrust above which the blades are too narrow not to cavitate in water at 1 m of depth [N]
+    keller_N: float = math.inf
 
     def speed_for(self, thrust_N: Array) -> Array:
         """Speed that gives a thrust, NaN where none in the table does. [rev/min]"""
@@ -63,15 +67,31 @@ class LoadScatter:
     correlation: float
 
 
+FAN = "fan "
+"""A label of a ducted fan of which the diameter is known: ``fan 70 mm``."""
+PAIR_SPACING = 0.2
+"""Distance of the disks of a coaxial pair over the diameter: declared [1]."""
+
+
 @lru_cache(maxsize=512)
-def case_of_label(label: str) -> Case:
-    """Case of a label with its declared unknowns."""
-    return case_of(fresh.label_text(label), ends=False)
+def case_of_label(label: str, fluid: str = "air", coaxial: bool = False) -> Case:
+    """Case of a label, or of a fan, with its declared unknowns; in water; with a second one downstream."""
+    text = fresh.fan_text(size_in(label) * INCH) if label.startswith(FAN) else fresh.label_text(label)
+    case = case_of(text, ends=False)
+    changes: dict[str, Any] = {}
+    if fluid == "water":
+        kept = [a for a in case.written.get("assumptions", []) if not a["key"].startswith("air.")]
+        changes = {"air": {"fluid": "water"}, "assumptions": kept, "operating.rpm": 1000.0}
+    if coaxial:
+        changes |= {"second_rotor": {"z_over_D": PAIR_SPACING}}
+    return with_changes(case, changes) if changes else case
 
 
-def rotor_loads(label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None) -> RotorLoads | None:
-    """Solve a label over speed; None where too few speeds converge."""
-    return loads_of_case(label, case_of_label(label), rpm_max, airspeed_m_s, air)
+def rotor_loads(
+    label: str, rpm_max: float, airspeed_m_s: float, air: Air | None = None, fluid: str = "air", coaxial: bool = False
+) -> RotorLoads | None:
+    """Solve a label over speed; None where too few speeds converge. Of a coaxial pair each rotor has half."""
+    return loads_of_case(label, case_of_label(label, fluid, coaxial), rpm_max, airspeed_m_s, air)
 
 
 def loads_of_case(
@@ -80,30 +100,51 @@ def loads_of_case(
     """Solve a case over speed, in its own air unless told; None where too few speeds converge."""
     air = case.air() if air is None else air
     rpm = SPEEDS * rpm_max
-    points = prepare_case(case).at_speeds(rpm, airspeed_m_s, air).solve(rpm, airspeed_m_s, air)
-    T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
+    if case.paired:
+        pair = propagate(case, rpm, np.full(rpm.size, airspeed_m_s), bands=False).nominal
+        T, Q = (0.5 * np.asarray(pair[key]) for key in ("thrust_N", "torque_Nm"))
+    else:
+        points = prepare_case(case).at_speeds(rpm, airspeed_m_s, air).solve(rpm, airspeed_m_s, air)
+        T, Q = np.asarray(points.thrust_N), np.asarray(points.torque_Nm)
     good = np.isfinite(T) & np.isfinite(Q)
     if np.count_nonzero(good) < 4:
         return None
-    n = points.rpm[good]
+    n = rpm[good]
     fine = np.linspace(n[0], n[-1], FINE)
     thrust, torque = (pchip(n, v[good] / n**2, fine) * fine**2 for v in (T, Q))
-    pitch = case.stated_pitch_m
-    return RotorLoads(label, case.diameter_m, pitch, int(case.file.rotor.blades), fine, thrust, torque,
-                      float(air.a_sound))  # fmt: skip
+    pitch, blades = case.stated_pitch_m, int(case.file.rotor.blades)
+    keller = _keller_N(case) if float(air.rho) > WET else math.inf
+    return RotorLoads(label, case.diameter_m, pitch, blades, fine, thrust, torque, float(air.a_sound), keller)
 
 
-def scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
+WET = 500.0  # [kg/m3]
+ROOM_PA = 101_325.0 + 9_800.0 - 1_700.0
+"""Pressure at a depth of 1 m over that of vapour at 15 C [Pa]."""
+
+
+def _keller_N(case: Case) -> float:
+    """Largest thrust of the blade area: A_E/A_0 >= (1.3 + 0.3 Z) T / ((p - p_v) D^2) + K.
+
+    J. auf'm Keller, "Enige aspecten bij het ontwerpen van scheepsschroeven", Schip en Werf 24 (1966); K = 0, for a
+    screw without a hull before it, as in textbooks (not checked).
+    """
+    s = case.rotor().blade.midpoints(60)
+    D, B = case.diameter_m, int(case.file.rotor.blades)
+    ratio = B * float(np.sum(s.chord * s.dr)) / (0.25 * math.pi * D**2)
+    return ratio * ROOM_PA * D**2 / (1.3 + 0.3 * B)
+
+
+def scatter(label: str, rpm: float, airspeed_m_s: float, fluid: str = "air", coaxial: bool = False) -> LoadScatter:
     """Bands of a label near a speed, by `bemt.rotors.case.propagate`: declared unknowns, model and numerics.
 
     Relative bands hardly depend on the speed: it is taken to the next power of `SPEED_STEP`, and the band kept.
     """
-    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s)
+    return _scatter(label, SPEED_STEP ** round(math.log(rpm, SPEED_STEP)), airspeed_m_s, fluid, coaxial)
 
 
 @lru_cache(maxsize=512)
-def _scatter(label: str, rpm: float, airspeed_m_s: float) -> LoadScatter:
-    case = case_of_label(label)
+def _scatter(label: str, rpm: float, airspeed_m_s: float, fluid: str, coaxial: bool) -> LoadScatter:
+    case = case_of_label(label, fluid, coaxial)
     found = propagate(case, rpm, airspeed_m_s)
     T, Q = (float(found.nominal[key][0]) for key in ("thrust_N", "torque_Nm"))
     u = [float(found.points.u[key][0]) for key in ("thrust_N", "torque_Nm")]
@@ -123,5 +164,9 @@ def size_in(label: str) -> float:
 
     >>> size_in("9x4.5x3")
     9.0
+    >>> round(size_in("fan 70 mm"), 2)
+    2.76
     """
+    if label.startswith(FAN):
+        return float(label.split()[1]) / 25.4
     return float(fresh.read_label(label).diameter_in)

@@ -20,6 +20,7 @@ that the ranking is not noise: a rank-1 lattice (Korobov 1959), as even as Sobol
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Sequence
@@ -35,7 +36,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
-from bemt.tools.design import rotor_loads
+from bemt.tools.design import masses, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
 
@@ -50,11 +51,19 @@ SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
 SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
-LOADING = (15.0, 1200.0)
-"""Disk loading of the labels that are tried [N/m2]."""
+LOADING = {"air": (15.0, 1200.0), "water": (300.0, 60_000.0), "fan": (500.0, 12_000.0)}
+"""Disk loading of the sizes that are tried, in air, in water, of ducted fans [N/m2]."""
+WATER_DIAMETERS = (2, 2.5, *DIAMETERS[:21])
+FAN_MM = (30, 40, 50, 55, 64, 70, 80, 90, 105, 120)
+"""Ducted fans on sale [mm]."""
+TIP_IN_WATER = 40.0
+"""Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
+NEAR = 0.05
+"""The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
 LATTICE = 235
-"""Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4."""
+"""Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4.
+The seventh coordinate, of the masses, hardly moves any result."""
 SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 
@@ -71,6 +80,20 @@ class Target:
     # Battery capacity [A h]; time at `cruise_N` that is part of the target [min]
     capacity_Ah: float | None = None
     minutes: float | None = None
+    # Mass of the vehicle, and of it without motors, propellers, controllers and arms [kg]
+    mass_kg: float | None = None
+    rest_kg: float | None = None
+    fixed: bool = True  # Whether the thrust is asked for, not twice that of hover
+    fluid: str = "air"
+    coaxial: bool = False
+    fan: bool = False
+    arm_m: float | None = None  # Of the frame, which leaves room for the largest diameter [m]
+    max_diameter_in: float | None = None
+
+    @property
+    def arms(self) -> int:
+        """Arms that carry the rotors."""
+        return self.rotors // 2 if self.coaxial else self.rotors
 
     @property
     def voc(self) -> float:
@@ -87,17 +110,22 @@ def choose(
     thrust_N: float | None = None,
     cells: int | None = None,
     *,
-    kv: float | Sequence[float] = (100.0, 3000.0),
+    kv: float | Sequence[float] = (80.0, 8000.0),
     motors: Sequence[KnownMotor] | str | os.PathLike[str] = (),
     labels: str | Sequence[str] = (),
     blades: int | Sequence[int] = (2,),
     mass_kg: float | None = None,
+    rest_kg: float | None = None,
     rotors: int = 1,
     airspeed_m_s: float = 0.0,
     max_diameter_in: float | None = None,
+    arm_mm: float | None = None,
     max_tip_mach: float = 0.8,
     capacity_Ah: float | None = None,
     minutes: float | None = None,
+    fan: bool = False,
+    fluid: str = "air",
+    coaxial: bool = False,
     sure: float = 0.9,
 ) -> pd.DataFrame:
     """Rank propellers and motors for a thrust or a mass.
@@ -109,7 +137,7 @@ def choose(
     cells : int
         LiPo cells in series.
     kv : float or (low, high)
-        Speed constant, or the range of which 60 are tried. [rev/min/V]
+        Speed constant, or the range of which 72 are tried. [rev/min/V]
     motors : sequence of KnownMotor, or path
         Real motors instead of `kv`, or a CSV with ``name,kv,resistance_mohm,no_load_A``.
     labels : str or sequence of str
@@ -118,18 +146,32 @@ def choose(
         Of the standard sizes.
     mass_kg, rotors : optional
         Vehicle; power, current and time are then those of hover instead of those at `thrust_N`.
+    rest_kg : float, optional
+        Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
+        this and what it weighs itself (:mod:`bemt.tools.design.masses`). [kg]
     airspeed_m_s, max_diameter_in, max_tip_mach : optional
         Flight speed [m/s], limit on size [in] and on the helical tip Mach number at `thrust_N`.
+    arm_mm : float, optional
+        From the middle of the frame to a shaft, or from the only shaft to what is next to it: limits the diameter. [mm]
     capacity_Ah, minutes : optional
         Battery capacity; with it, time in hover that is part of the target [min].
+    fan : bool
+        Ducted fans on sale, 30 to 120 mm, instead of propellers.
+    fluid : {"air", "water"}
+        What the propeller turns in; in water a blade area too small for the thrust is refused (Keller's criterion).
+    coaxial : bool
+        Each propeller is one of a pair, one above the other; `rotors` counts both.
     sure : float
-        Pairs that meet the target with this probability come first, least power first; then the others, by probability.
+        Pairs that meet the target with this probability come first: the smallest within 5 % of the least power, the
+        one with the least power, then by power; at last the others, by probability.
 
     Returns
     -------
     pandas.DataFrame
-        A row per pair, best first: ``label, motor, kv, probability, power_W, u_power_W, current_A, peak_A, g_per_W,
-        minutes, rpm, tip_mach, full_thrust_N, why``; ``why`` says why it is not the first.
+        A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, at_N, why``; ``propulsion_g`` is the mass of one
+        rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
+        first.
 
     Raises
     ------
@@ -144,13 +186,17 @@ def choose(
     """
     import pandas as pd
 
-    target = _target(thrust_N, cells, mass_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah, minutes)
+    target = _target(thrust_N, cells, mass_kg, rest_kg, rotors, airspeed_m_s, max_tip_mach, capacity_Ah, minutes, fan,
+                     fluid, coaxial, arm_mm)  # fmt: skip
     ends, counts = _several(kv), _several(blades)
     _check(ends, max_diameter_in, sure, counts)
-    kvs = np.geomspace(min(ends), max(ends), 60) if min(ends) < max(ends) else np.array(ends[:1])
+    room = math.inf if target.arm_m is None else masses.diameter_on(target.arm_m, target.arms) / INCH
+    most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
+    target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
+    kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
     known = read_motors(motors) if isinstance(motors, (str, os.PathLike)) else tuple(motors)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
-    names = _several(labels) or _standard(target, max_diameter_in, counts)
+    names = _several(labels) or _standard(target, counts)
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
         raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
@@ -172,19 +218,33 @@ def _is_number(value: object) -> bool:
 
 
 def _target(
-    thrust_N: float | None, cells: int | None, mass_kg: float | None, rotors: int, airspeed_m_s: float,
-    max_tip_mach: float, capacity_Ah: float | None, minutes: float | None,
+    thrust_N: float | None, cells: int | None, mass_kg: float | None, rest_kg: float | None, rotors: int,
+    airspeed_m_s: float, max_tip_mach: float, capacity_Ah: float | None, minutes: float | None, fan: bool, fluid: str,
+    coaxial: bool, arm_mm: float | None,
 ) -> Target:  # fmt: skip
     faults = []
     if thrust_N is None and mass_kg is None:
-        faults.append(Fault("", "--thrust", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust 27 --cells 6"))
+        faults.append(
+            Fault("", "--thrust-N", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust-N 27 --cells 6")
+        )
     if cells is None:
-        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust 27 --cells 6"))
+        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust-N 27 --cells 6"))
     if minutes is not None and capacity_Ah is None:
-        faults.append(Fault("", "--capacity", "nothing", "the battery's capacity [A h], for the time"))
-    named = {"--thrust": thrust_N, "--mass": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed": airspeed_m_s,
-             "--max-tip-mach": max_tip_mach, "--capacity": capacity_Ah, "--hover-time": minutes}  # fmt: skip
+        faults.append(Fault("", "--capacity-Ah", "nothing", "the battery's capacity [A h], for the time"))
+    named = {"--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed-m-s": airspeed_m_s,
+             "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah, "--minutes": minutes,
+             "--rest-kg": rest_kg, "--arm-mm": arm_mm}  # fmt: skip
     faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
+    if fluid not in LOADING or fluid == "fan":
+        faults.append(Fault("", "--fluid", repr(fluid), "air or water"))
+    if fan and (coaxial or fluid == "water"):
+        faults.append(Fault("", "--fan", "with " + ("--coaxial" if coaxial else "--fluid water"), "a fan alone in air"))
+    if rest_kg is not None and mass_kg is None:
+        faults.append(Fault("", "--rest-kg", "given", "nothing without --mass-kg"))
+    if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
+        faults.append(
+            Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
+        )
     if faults:
         raise InputError(faults)
     faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
@@ -193,10 +253,12 @@ def _target(
     grams = "In grams? Divide by 1000" if mass_kg is not None and mass_kg > 1000.0 else ""
     fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
     for name, value, low, high, hint in (
-        ("--thrust", thrust_N, 0.01, 5000.0, ""), ("--mass", mass_kg, 0.005, 1000.0, grams),
-        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed", airspeed_m_s, 0.0, 150.0, fast),
+        ("--thrust-N", thrust_N, 0.01, 5000.0, ""), ("--mass-kg", mass_kg, 0.005, 1000.0, grams),
+        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed-m-s", airspeed_m_s, 0.0, 150.0, fast),
         ("--max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
-        ("--capacity", capacity_Ah, 0.01, 1000.0, mAh), ("--hover-time", minutes, 0.01, 1e4, ""),
+        ("--capacity-Ah", capacity_Ah, 0.01, 1000.0, mAh), ("--minutes", minutes, 0.01, 1e4, ""),
+        ("--rest-kg", rest_kg, 0.001, mass_kg or 1000.0, "Part of the mass"),
+        ("--arm-mm", arm_mm, 10.0, 5000.0, "In metres? Times 1000" if arm_mm is not None and arm_mm < 10.0 else ""),
     ):  # fmt: skip
         if value is not None and not low <= value <= high:
             faults.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
@@ -206,8 +268,10 @@ def _target(
     most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
     if hover is not None and most < hover:
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
-        raise InputError(Fault("", "--thrust", f"{most:g}", f"{hover:.4g} N or more", hint))
-    return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes)
+        raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
+    rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
+    return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
+                  thrust_N is not None, fluid, coaxial, fan, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
@@ -225,31 +289,36 @@ def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blad
         raise InputError(faults)
 
 
-def _standard(target: Target, max_in: float | None, blades: Sequence[int]) -> tuple[str, ...]:
+def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     """Standard sizes whose disk loading at the target can be expected to work."""
-    out = []
-    for D in DIAMETERS:
-        loading = target.thrust_N / (0.25 * math.pi * (D * INCH) ** 2)
-        if (max_in is not None and D > max_in) or not LOADING[0] <= loading <= LOADING[1]:
-            continue
-        pitches = dict.fromkeys(round(2.0 * D * ratio) / 2.0 for ratio in RATIOS)
-        out += [f"{D}x{P:g}" + (f"x{B}" if B != 2 else "") for P in pitches for B in blades]
-    if not out:
-        sizes = [D for D in DIAMETERS if max_in is None or max_in >= D] or list(DIAMETERS[:1])
-        least, most = (
-            x * 0.25 * math.pi * (D * INCH) ** 2 for x, D in zip(LOADING, (sizes[0], sizes[-1]), strict=True)
-        )
-        got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:g} in")
-        expected = f"{least:.2g} to {most:.3g} N, the load of standard sizes from {sizes[0]} to {sizes[-1]} in"
-        raise InputError(Fault("", "--thrust", got, expected, "Other sizes: name them with --labels"))
-    return tuple(out)
+    max_in = target.max_diameter_in
+    least, most = LOADING["fan" if target.fan else target.fluid]
+    sizes = (
+        [mm / 25.4 for mm in FAN_MM] if target.fan else list(WATER_DIAMETERS if target.fluid == "water" else DIAMETERS)
+    )
+    area = {D: 0.25 * math.pi * (D * INCH) ** 2 for D in sizes}
+    small = [D for D in sizes if max_in is None or max_in * (1.0 + 1e-9) >= D]
+    fit = [D for D in small if least <= target.thrust_N / area[D] <= most]
+    if not fit:
+        low, high = least * area[(small or sizes)[0]], most * area[(small or sizes[:1])[-1]]
+        got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:.3g} in")
+        what = "fans" if target.fan else "standard sizes"
+        expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {(small or sizes)[0]:.3g} to {(small or sizes[:1])[-1]:.3g} in"
+        hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
+        raise InputError(Fault("", "--thrust-N", got, expected, hint))
+    if target.fan:
+        return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
+    ratios = RATIOS if target.fluid == "air" else (*RATIOS, 0.9, 1.1)
+    pitches = {D: dict.fromkeys(max(round(2.0 * D * ratio) / 2.0, 0.5) for ratio in ratios) for D in fit}
+    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches[D] for B in blades)
 
 
 def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorLoads | None:
     D = rotor_loads.size_in(label) * INCH
-    sonic = 0.97 * 340.0 * 60.0 / (math.pi * D)
+    tip = TIP_IN_WATER if target.fluid == "water" else 0.97 * 340.0
     fastest = 1.05 * max(m.kv for m in machines) * target.voc
-    return rotor_loads.rotor_loads(label, min(sonic, fastest), target.airspeed_m_s)
+    return rotor_loads.rotor_loads(label, min(60.0 * tip / (math.pi * D), fastest), target.airspeed_m_s,
+                                   fluid=target.fluid, coaxial=target.coaxial)  # fmt: skip
 
 
 def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
@@ -261,7 +330,7 @@ def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
     for i in sorted(picked):
         rpm = float(order[i].speed_for(np.array([target.thrust_N]))[0])
         found = rotor_loads.scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]),
-                                    target.airspeed_m_s)  # fmt: skip
+                                    target.airspeed_m_s, target.fluid, target.coaxial)  # fmt: skip
         if np.isfinite([found.u_thrust, found.u_torque]).all():
             out.append(found)
     if not out:
@@ -276,13 +345,13 @@ def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
 
 @cache
 def _draws() -> tuple[Array, Array]:
-    """Standard normal (2, DRAWS + 1) for the rotor and quantiles (4, DRAWS + 1) of the shares; the first is nominal."""
+    """Standard normal (3, DRAWS + 1) for rotor and mass, quantiles (4, DRAWS + 1) of the shares; the first is nominal."""
     from scipy.special import ndtri
 
-    steps = np.array([pow(LATTICE, j, DRAWS) for j in range(6)])
+    steps = np.array([pow(LATTICE, j, DRAWS) for j in range(7)])
     u = (np.outer(steps, np.arange(DRAWS)) + 0.5) / DRAWS % 1.0
-    z = ndtri(u[:2])
-    return np.c_[np.zeros(2), z], np.c_[np.full(4, 0.5), u[2:]]
+    z = ndtri(u[[0, 1, 6]])
+    return np.c_[np.zeros(3), z], np.c_[np.full(4, 0.5), u[2:6]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,35 +407,71 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     thrust = np.exp(u.u_thrust * z[0])
     torque = np.exp(u.u_torque * (u.correlation * z[0] + math.sqrt(1.0 - u.correlation**2) * z[1]))
     chain = _chain(loads, machines, target)
-    n_full, n_at = (loads.speed_for(T / thrust) for T in (target.thrust_N, target.at_N))
+    own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
+    at_full = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
+    reach = np.isfinite(at_full[0])
+    last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
+    none = ~reach.any(axis=1)
+    most, Q_full, P_full = (
+        np.where(none, 0.0, v)
+        for v in (loads.thrust_N[last], loads.torque_Nm[last], at_full[2][np.arange(none.size), last])
+    )
+    at, asked = np.full((1, 1), target.at_N), np.full((1, 1), target.thrust_N)
+    for _ in range(4 if target.rest_kg else 1):  # a heavier motor lifts itself as well
+        n = loads.speed_for(asked[:, :1])
+        Q = np.where(np.isfinite(n), loads.torque_at(n), Q_full[:, None])
+        P = np.where(np.isfinite(n), own.at(n, Q)[2], P_full[:, None])
+        own_kg, u_kg = _propulsion(loads, target, Q[:, 0], P[:, 0], asked[:, 0])
+        if target.rest_kg:
+            heavier = np.exp(np.minimum(u_kg / own_kg, 1.0)[:, None] * z[2])
+            at = G0 * (target.rest_kg / target.rotors + own_kg[:, None] * heavier)
+            asked = asked if target.fixed else 2.0 * at
+    n_full, n_at = (loads.speed_for(T / thrust) for T in (asked, at))
     duty, peak, _ = chain.at(n_full, torque * loads.torque_at(n_full))
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
     mach = np.broadcast_to(loads.tip_mach(n_full, target.airspeed_m_s), duty.shape)
     met = np.isfinite(duty) & (mach <= target.max_tip_mach)
+    if target.fluid == "water":
+        met &= np.broadcast_to(asked <= loads.keller_N, met.shape)
     minutes = 60.0 * (1.0 - SOC_END) * (target.capacity_Ah or 1.0) / target.rotors / amps
     if target.minutes is not None:
         met &= minutes >= target.minutes
     chance = met[:, 1:].mean(axis=1)
-    own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
-    reach = np.isfinite(own.at(loads.rpm[None, :], loads.torque_Nm[None, :])[0])
-    last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
-    most = np.where(reach.any(axis=1), loads.thrust_N[last], 0.0)
     scatter = [float(np.std(p[np.isfinite(p)])) if np.isfinite(p).sum() > 9 else math.nan for p in power[:, 1:]]
+    at, asked, n_at = (np.broadcast_to(v, power.shape)[:, 0] for v in (at, asked, n_at))
     return [
-        {"label": loads.label, "motor": m.name, "kv": m.kv, "probability": float(chance[i]),
-         "power_W": float(power[i, 0]), "u_power_W": scatter[i], "current_A": float(amps[i, 0]),
-         "peak_A": float(peak[i, 0]), "g_per_W": 1e3 * target.at_N / G0 / float(power[i, 0]),
-         "minutes": float(minutes[i, 0]), "rpm": float(n_at[0]), "tip_mach": float(mach[i, 0]),
-         "full_thrust_N": float(most[i])}
+        {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
+         "probability": float(chance[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
+         "current_A": float(amps[i, 0]), "peak_A": float(peak[i, 0]),
+         "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]), "rpm": float(n_at[i]),
+         "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * float(own_kg[i]),
+         "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N}
         for i, m in enumerate(machines)
     ]  # fmt: skip
 
 
+def _propulsion(
+    loads: RotorLoads, target: Target, torque_Nm: Array, power_W: Array, thrust_N: Array
+) -> tuple[Array, Array]:
+    """Mass of one rotor's parts at the thrust asked for, and its standard uncertainty, (M,) each [kg]."""
+    arm = masses.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
+    parts = masses.masses(torque_Nm, power_W, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    shared = 0.5 if target.coaxial else 0.0  # two rotors on one arm
+    return parts.total - shared * parts.arm, parts.u
+
+
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:
+    """Sure pairs first: the smallest within `NEAR` of the least power, the least power, then by power."""
     lost = table.power_W.isna() | (table.probability < sure)
     power = table.power_W.where(~lost, math.inf)
     order = np.lexsort((-table.full_thrust_N, power, np.where(lost, -table.probability, 0.0), lost))
-    return table.iloc[order].reset_index(drop=True)
+    found = table.iloc[order].reset_index(drop=True)
+    good = found[: int((~lost).sum())]
+    if good.empty:
+        return found
+    near = good[good.power_W <= (1.0 + NEAR) * good.power_W.iloc[0]]
+    first = near[near.diameter_in <= near.diameter_in.min() * (1.0 + 1e-9)].index[0]
+    return found.loc[[first, *found.index.drop(first)]].reset_index(drop=True)
 
 
 def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
@@ -375,15 +480,18 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
     out = []
     for i, row in enumerate(table.itertuples()):
         words = []
-        if row.full_thrust_N < target.thrust_N:
-            words.append(f"full throttle gives {row.full_thrust_N:.3g} N")
+        if row.full_thrust_N < row.asked_N:
+            words.append(f"full throttle gives {row.full_thrust_N:.3g} N of {row.asked_N:.3g}")
         if row.tip_mach > target.max_tip_mach:
             words.append(f"tip Mach {row.tip_mach:.2f}")
+        if target.fluid == "water" and row.asked_N > row.keller_N:
+            words.append(f"cavitates above {row.keller_N:.3g} N")
         if target.minutes is not None and row.minutes < target.minutes:
             words.append(f"{row.minutes:.1f} min")
         if not words and row.probability < sure:
-            words.append(f"{row.full_thrust_N / target.thrust_N - 1.0:.0%} thrust in hand: too little for the bands")
+            words.append(f"{row.full_thrust_N / row.asked_N - 1.0:.0%} thrust in hand: too little for the bands")
         if not words and i:
-            words.append(f"{row.power_W / best.power_W - 1.0:+.1%} power")
+            more, size = row.power_W / best.power_W - 1.0, row.diameter_in - best.diameter_in
+            words.append(f"{more:+.1%} power" + (f", {size:+.3g} in" if more < 0.0 and size > 0.0 else ""))
         out.append(", ".join(words))
     return out

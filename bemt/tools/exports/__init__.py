@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["exports", "target_ids"]
 
-_SHARED = {"actions", "base", "blades", "folder", "hub", "manifest", "offers", "parts", "performance", "printing"}
+_SHARED = {
+    "actions", "answer", "base", "blades", "folder", "hub", "manifest", "motor", "offers", "parts", "performance",
+    "printing",
+}  # fmt: skip
 """Files of this folder that are no targets."""
 
 

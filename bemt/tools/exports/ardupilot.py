@@ -28,6 +28,7 @@ class ArdupilotExport(LoadsExport):
 
     def write(self, job: Job) -> Files:
         """Frame JSON and parameter lines."""
+        job = self.asked(job)
         t, name = job.performance, plain_name(job.case.name)
         e = thrust_factor(t.rpm, t.thrust_N[:, t.at_rest])
         area, v_max = _fit(job, e)

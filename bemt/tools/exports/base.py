@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -92,6 +92,8 @@ class Job:
         What a solid for a printer is to be; None is the rotor as its sections say.
     own : mapping
         Options of single targets by name, as :attr:`Export.options` declares them; what is missing is its default.
+    slow : bool
+        Whether tables start at a twentieth of the greatest speed, else at a quarter.
     """
 
     case: Case
@@ -102,6 +104,7 @@ class Job:
     solid: Options | None = None
     printed: Print | None = None
     own: Mapping[str, Any] = field(default_factory=dict)
+    slow: bool = True
 
     @property
     def rpm_top(self) -> float:
@@ -125,6 +128,12 @@ class Job:
         found: dict[str, Any] | None = plugins.part("drive", self.case)
         return found
 
+    @property
+    def rpm_full(self) -> float:
+        """Speed that a full command stands for: full throttle of the case's motor, else that of the case. [rev/min]"""
+        full = self.full_throttle if self.rpm is None else None
+        return float(full["rpm"]["value"]) if full else self.rpm_top
+
     @cached_property
     def shapes(self) -> list[Shape]:
         """Solids to write; meshed once. Raises geometry.common.GeometryError."""
@@ -134,9 +143,24 @@ class Job:
 
     @cached_property
     def performance(self) -> Performance:
-        """Thrust and torque over rpm and advance ratio, up to full throttle where the case has a motor; solved once."""
-        full = self.full_throttle if self.rpm is None else None
-        return performance_of(self.case, full["rpm"]["value"] if full else self.rpm_top)
+        """Thrust and torque over rpm and advance ratio, up to the case's speed and its full throttle; solved once."""
+        return performance_of(self.case, max(self.rpm_top, self.rpm_full), self.slow)
+
+    @cached_property
+    def flown(self) -> Job:
+        """Request from a quarter of full throttle up to it, for a target whose few numbers are fitted to flight."""
+        return replace(self, rpm=self.rpm_full, slow=False)
+
+    @property
+    def speeds_note(self) -> str | None:
+        """Why the speeds of tables, fits and disks differ; None where they do not."""
+        if self.rpm_full == self.rpm_top:
+            return None
+        return (
+            f"speeds: the case states {self.rpm_top:.6g} rev/min (disks and blades), its motor reaches "
+            f"{self.rpm_full:.6g} at full throttle (full command of a fit); tables go to "
+            f"{max(self.rpm_top, self.rpm_full):.6g}"
+        )
 
     @cached_property
     def hub(self) -> HubTable | None:
@@ -345,6 +369,10 @@ class LoadsExport(Export):
     kind = "loads"
     uses = frozenset({"rpm"})
 
+    def asked(self, job: Job) -> Job:
+        """Request as the target takes it: numbers without a table are fitted up to full throttle."""
+        return job if "reynolds" in self.features else job.flown
+
     @abstractmethod
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """The target's published formula, evaluated on the written files.
@@ -382,7 +410,7 @@ class LoadsExport(Export):
 
     def hub_checked(self, job: Job, files: Files) -> dict[str, Any] | None:
         """Errors of the hub's loads at oblique points that are no nodes of the table."""
-        table = job.performance
+        table = self.asked(job).performance
         rpm, J = table.check_points()
         keep = np.flatnonzero((J > 0.0) & (rpm >= 0.5 * table.rpm[-1]))[::3]
         angle = np.radians(np.resize(CHECK_ANGLES, keep.size))
@@ -404,7 +432,7 @@ class LoadsExport(Export):
 
     def checked(self, job: Job, files: Files) -> dict[str, Any]:
         """Errors at points that are no nodes of the table, at rest and over the flight range."""
-        table = job.performance
+        table = self.asked(job).performance
         rpm, J = table.check_points()
         V = J * rpm / 60.0 * table.diameter_m
         truth = solve_points(job.case, rpm, V)
@@ -447,7 +475,7 @@ class DiskExport(Export):
         """Refuse a point at rest where the target cannot hold it, and a rotor that is no propeller there."""
         out = super().faults(job)
         if not self.at_rest and not job.airspeed > 0.0:
-            got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed"
+            got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed-m-s"
             out.append(Fault(job.file, f"--format {self.id}", got, "a speed above 0", hint))
         return out
 
@@ -491,7 +519,8 @@ class SolidExport(Export):
             for s in job.shapes:
                 made = export(s.rotor, s.duct, out, [self.id], name=job.case.name + s.end, unit=job.unit,
                               options=s.options, model=s.model)  # fmt: skip
-                found = joined(found, made | {"name": job.case.name})
+                told = {} if s.printed is None else {"printed": dict(s.printed)}
+                found = joined(found, made | {"name": job.case.name} | told)
         except GeometryError as error:
             raise InputError([Fault(job.file, *fault) for fault in error.faults]) from error
         return found

@@ -16,7 +16,7 @@ from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
 from bemt.tools.exports.manifest import joined
-from bemt.tools.exports.printing import Print, faults_of
+from bemt.tools.exports.printing import Print, faults_of, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA
 from geometry.mesh import Options
@@ -163,7 +163,7 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 
 
 def export_cases(
-    what: str | Case,
+    path: str | Case,
     out: str,
     formats: Sequence[str],
     unit: str = "mm",
@@ -195,8 +195,9 @@ def export_cases(
         faults += [Fault("", *fault) for fault in error.faults]
     if faults:
         raise InputError(faults)
-    paths = find_cases([what]) if isinstance(what, str) else []
-    cases, refused, made = [] if isinstance(what, str) else [what], [], []
+    paths = [] if isinstance(path, Case) else find_cases([path])
+    cases = [path] if isinstance(path, Case) else []
+    refused, made = [], []
     for file in paths:
         try:
             cases.append(load_case(file))
@@ -332,6 +333,7 @@ def text(manifest: dict[str, Any], out: Path) -> str:
     else:
         words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
     lines.append(", ".join(words))
+    lines += printed_text(manifest["printed"]) if "printed" in manifest else []
     for word, part in _parts(manifest).items():
         if word in exports():
             lines += exports()[word].text(part)

@@ -26,6 +26,7 @@ class GazeboExport(LoadsExport):
 
     def write(self, job: Job) -> Files:
         """SDF model of a stand whose plugin is fitted at rest."""
+        job = self.asked(job)
         t, name = job.performance, plain_name(job.case.name)
         (kT, kQ), izz = static_fit(t), inertia_estimate(job)
         drag, roll = _fit_hub(job)

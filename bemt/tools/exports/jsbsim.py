@@ -10,11 +10,20 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.tools.exports.base import Files, Job, LoadsExport
 from bemt.tools.exports.hub import COEFFICIENTS, hub_loads
-from bemt.tools.exports.parts import header, inertia_estimate, plain_name, still_hub
+from bemt.tools.exports.motor import Motor, motor_of
+from bemt.tools.exports.parts import header, plain_name, still_hub
 from bemt.tools.exports.performance import table_loads
 
 SMALLEST_INERTIA = 1.4e-6
 """JSBSim raises what is smaller. [kg m2]"""
+STEP = 1.0 / 120.0
+"""JSBSim's own step, by explicit Euler for the speed of a propeller (FGPropeller.cpp, Calculate) [s]"""
+
+
+def _inertia(job: Job) -> tuple[float, float]:
+    """Inertia of rotor and motor that settles at JSBSim's own step, and as it is [kg m2]."""
+    m = motor_of(job)
+    return max(m.inertia_kg_m2 * max(STEP / m.largest_step_s(job), 1.0), SMALLEST_INERTIA), m.inertia_kg_m2
 
 
 class JsbsimExport(LoadsExport):
@@ -56,7 +65,7 @@ class JsbsimExport(LoadsExport):
         propeller = f"""<?xml version="1.0"?>
 {head}
 <propeller name="{name}" version="1.1">
- <ixx unit="KG*M2"> {max(inertia_estimate(job), SMALLEST_INERTIA):.6g} </ixx>
+ <ixx unit="KG*M2"> {_inertia(job)[0]:.6g} </ixx>
  <diameter unit="M"> {t.diameter_m:.9g} </diameter>
  <numblades> {t.blades} </numblades>
  <gearratio> 1 </gearratio>
@@ -68,11 +77,15 @@ class JsbsimExport(LoadsExport):
 {table("C_POWER", t.CP)}
 </propeller>
 """
-        watts = 1.3 * float(np.max(t.torque_Nm[-1] * t.rpm[-1] * np.pi / 30.0))
+        m = motor_of(job)
         motor = f"""<?xml version="1.0"?>
-<electric_engine name="{name}_motor">
- <power unit="WATTS"> {watts:.6g} </power>
-</electric_engine>
+{head}
+<brushless_dc_motor name="{name}_motor">
+ <maxvolts unit="VOLTS"> {m.volts:.9g} </maxvolts>
+ <velocityconstant> {m.kv_rpm_V:.9g} </velocityconstant>
+ <coilresistance unit="OHMS"> {m.ohm:.9g} </coilresistance>
+ <noloadcurrent unit="AMPERES"> {m.no_load_A:.9g} </noloadcurrent>
+</brushless_dc_motor>
 """
         system = f"""<?xml version="1.0"?>
 <system name="{name}_speed">
@@ -82,6 +95,7 @@ class JsbsimExport(LoadsExport):
    <output>propulsion/engine[0]/blade-angle</output>
   </fcs_function>
  </channel>
+{_motor_channel(m, name)}
 {_hub_channel(job, name)}
 </system>
 """
@@ -94,9 +108,17 @@ class JsbsimExport(LoadsExport):
 
     def notes(self, job: Job) -> list[str]:
         """What stands in for numbers that the case does not give."""
+        m, (used, own) = motor_of(job), _inertia(job)
+        step = m.largest_step_s(job) * used / m.inertia_kg_m2
+        whose = "is the case's drive, at the stated charge and 25 C" if m.known else (
+            f"stands in, for the case has no [drive]: it turns the rotor at {job.performance.rpm[-1]:.6g} rev/min at "
+            "full throttle and rest, and loses what motors lose in the median"
+        )  # fmt: skip
+        raised = "" if used <= own else f", raised from {own:.3g} so that JSBSim's own step of 1/120 s holds"
         return [
-            "ixx is an estimate from the blades' sections at 1400 kg/m3, hub and motor left out: replace it",
-            "the power of the motor is 1.3 times the greatest shaft power; it limits nothing below",
+            f"the motor {whose}; the system file takes the battery's resistance and the current limit off the throttle",
+            f"ixx is {used:.3g} kg m2 of blades and motor{raised}; steps up to {1e3 * step:.3g} ms settle without "
+            "overshoot from rest at full throttle",
             "the system file serves engine 0; repeat it for others",
             "sense stands in the thruster element of the aircraft file, where JSBSim reads it: take it into yours",
             "a stopped propeller (0 rev/min) has neither thrust nor drag in JSBSim",
@@ -143,24 +165,48 @@ _LBS, _LBSFT, _FT, _SLUGS = 4.4482216152605, 1.3558179483314, 0.3048, 515.378818
 _AXES = (("x", 0), ("y", 1), ("z", 2))
 
 
+def _function(name: str, word: str, body: str, output: str = "") -> str:
+    out = f"<output>{output}</output>" if output else ""
+    return f'  <fcs_function name="fcs/{name}-{word}"><function>\n{body}\n  </function>{out}</fcs_function>'
+
+
+def _value(number: float) -> str:
+    return f"<value>{number:.12g}</value>"
+
+
+def _product(*parts: str) -> str:
+    return f"<product>{''.join(parts)}</product>"
+
+
+def _sum(*parts: str) -> str:
+    return f"<sum>{''.join(parts)}</sum>"
+
+
+def _motor_channel(m: Motor, name: str) -> str:
+    """Channel of the system file: throttle with the battery's resistance and the current limit, see `motor`."""
+    emf = f"<quotient><property>propulsion/engine[0]/propeller-rpm</property>{_value(m.kv_rpm_V)}</quotient>"
+    duty = f"<pow><property>fcs/throttle-cmd-norm[0]</property>{_value(m.exponent)}</pow>"
+    if m.limit_A is not None:
+        rest = m.volts - m.limit_A * m.battery_ohm
+        root = f"<sqrt>{_sum(_product(emf, emf), _value(4.0 * rest * m.limit_A * m.ohm))}</sqrt>"
+        duty = f"<min>{duty}<quotient>{_sum(emf, root)}{_value(2.0 * rest)}</quotient></min>"
+    d = f"<property>fcs/{name}-duty</property>"
+    drop = f"<difference>{_product(_value(m.volts), d)}{emf}</difference>"
+    in_all = _sum(_value(m.ohm), _product(_value(m.battery_ohm), d, d))
+    used = _sum(emf, f"<quotient>{_product(_value(m.ohm), drop)}{in_all}</quotient>")
+    body = [
+        _function(name, "duty", duty),
+        _function(name, "motor-share", f"<quotient>{used}{_value(m.volts)}</quotient>", "fcs/throttle-pos-norm[0]"),
+    ]
+    return ' <channel name="Motor behind its battery">\n' + "\n".join(body) + "\n </channel>"
+
+
 def _hub_channel(job: Job, name: str) -> str:
     """Channel of the system file: what a wind across the shaft adds, in BODY axes, thrust along x."""
     t, hub = job.performance, job.hub or still_hub()
 
-    def function(word: str, body: str) -> str:
-        return f'  <fcs_function name="fcs/{name}-{word}"><function>\n{body}\n  </function></fcs_function>'
-
     def of(word: str) -> str:
         return f"<property>fcs/{name}-{word}</property>"
-
-    def value(number: float) -> str:
-        return f"<value>{number:.12g}</value>"
-
-    def product(*parts: str) -> str:
-        return f"<product>{''.join(parts)}</product>"
-
-    def total(*parts: str) -> str:
-        return f"<sum>{''.join(parts)}</sum>"
 
     def table(word: str, values: Array) -> str:
         blocks = []
@@ -177,36 +223,37 @@ def _hub_channel(job: Job, name: str) -> str:
         return f'<table name="{word}">{keys}\n' + "\n".join(blocks) + "\n</table>"
 
     u, v, w = (f"<property>velocities/{axis}-aero-fps</property>" for axis in "uvw")
-    rev = f"<max>{of('krpm')}{value(1e-6)}</max>"
+    rev = f"<max>{of('krpm')}{_value(1e-6)}</max>"
     per_speed = _FT * 60.0 / (1000.0 * t.diameter_m)  # advance ratio of 1 ft/s at 1000 rev/min
     rho = "<property>atmosphere/rho-slugs_ft3</property>"
     force = _SLUGS * (1000.0 / 60.0) ** 2 * t.diameter_m**4 / _LBS
-    across = f"<sqrt>{total(product(v, v), product(w, w))}</sqrt>"
+    across = f"<sqrt>{_sum(_product(v, v), _product(w, w))}</sqrt>"
     parts = [
-        function("J-axial", f"<quotient>{product(value(per_speed), u)}{rev}</quotient>"),
-        function("side-fps", across),
-        function("J-side", f"<quotient>{product(value(per_speed), of('side-fps'))}{rev}</quotient>"),
-        *(function(f"u{axis}", f"<quotient>{speed}<max>{of('side-fps')}{value(1e-9)}</max></quotient>")
+        _function(name, "J-axial", f"<quotient>{_product(_value(per_speed), u)}{rev}</quotient>"),
+        _function(name, "side-fps", across),
+        _function(name, "J-side", f"<quotient>{_product(_value(per_speed), of('side-fps'))}{rev}</quotient>"),
+        *(_function(name, f"u{axis}", f"<quotient>{speed}<max>{of('side-fps')}{_value(1e-9)}</max></quotient>")
           for axis, speed in (("y", v), ("z", w))),
-        function("force-scale", product(value(force), rho, of("krpm"), of("krpm"))),
-        *(function(word, table(word, values)) for word, values in zip(COEFFICIENTS, hub.values, strict=True)),
+        _function(name, "force-scale", _product(_value(force), rho, of("krpm"), of("krpm"))),
+        *(_function(name, word, table(word, values)) for word, values in zip(COEFFICIENTS, hub.values, strict=True)),
     ]  # fmt: skip
     D, s = t.diameter_m * _LBS / _LBSFT, float(t.sense)
     uy, uz = of("uy"), of("uz")
-    minus = value(-1.0)
+    minus = _value(-1.0)
     forces = {
         "x": of("dCT"),
-        "y": total(product(minus, of("CH"), uy), product(value(s), of("CY"), uz)),
-        "z": total(product(minus, of("CH"), uz), product(value(-s), of("CY"), uy)),
+        "y": _sum(_product(minus, of("CH"), uy), _product(_value(s), of("CY"), uz)),
+        "z": _sum(_product(minus, of("CH"), uz), _product(_value(-s), of("CY"), uy)),
     }
     moments = {
-        "x": product(value(-s / (2.0 * np.pi)), of("dCP")),
-        "y": total(product(value(-s), of("CMroll"), uy), product(of("CMpitch"), uz)),
-        "z": total(product(value(-s), of("CMroll"), uz), product(minus, of("CMpitch"), uy)),
+        "x": _product(_value(-s / (2.0 * np.pi)), of("dCP")),
+        "y": _sum(_product(_value(-s), of("CMroll"), uy), _product(of("CMpitch"), uz)),
+        "z": _sum(_product(_value(-s), of("CMroll"), uz), _product(minus, of("CMpitch"), uy)),
     }
-    parts += [function(f"force-{axis}-lbs", product(of("force-scale"), body)) for axis, body in forces.items()]
+    parts += [_function(name, f"force-{axis}-lbs", _product(of("force-scale"), body)) for axis, body in forces.items()]
     parts += [
-        function(f"moment-{axis}-lbsft", product(value(D), of("force-scale"), body)) for axis, body in moments.items()
+        _function(name, f"moment-{axis}-lbsft", _product(_value(D), of("force-scale"), body))
+        for axis, body in moments.items()
     ]
     body = "\n".join(parts)
     return f' <channel name="Loads of the hub with a wind across the shaft">\n{body}\n </channel>'

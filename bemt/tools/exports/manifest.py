@@ -58,7 +58,8 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
     found |= export.checked(job, files)
     if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
         found["full_throttle"] = job.full_throttle
-    found["notes"] = export.notes(job) + _lost(export, job)
+    speeds = [] if job.speeds_note is None or job.rpm is not None else [job.speeds_note]
+    found["notes"] = speeds + export.notes(job) + _lost(export, job)
     found["files"] = [
         {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from bemt.rotors.case import Case
 
 LOWEST = 0.25
-"""Lowest speed of a table over its greatest."""
+"""Speed over the greatest from which a table is whole."""
+SLOW = (0.05, 0.0625, 0.08, 0.1, 0.125, 0.16, 0.2)
+"""Slower ones, for small throttle: there where the whole flight range converges at their Reynolds numbers."""
 N_RPM = 16
 N_J = 25
 """Steps from J = 0 to the greatest J of zero thrust."""
@@ -192,7 +194,7 @@ def _nodes(J_zero: float, CT_rest: float, ducted: bool) -> Array:
     """
     step = J_zero / N_J
     near = step * np.arange(-BELOW, N_J + BEYOND + 1)
-    last = DIVE * J_zero / LOWEST
+    last = DIVE * J_zero / SLOW[0]
     far = np.geomspace(near[-1], last, 1 + int(np.ceil(np.log(last / near[-1]) / np.log(GROWTH))))[1:]
     J = np.concatenate([near, far])
     deepest = -2.0 * np.sqrt(2.0 * max(CT_rest, 0.0) / np.pi)
@@ -202,8 +204,8 @@ def _nodes(J_zero: float, CT_rest: float, ducted: bool) -> Array:
     return J
 
 
-def performance_of(case: Case, rpm_top: float) -> Performance:
-    """Tabulate a case from a quarter of a speed up to it, from descent to the windmill.
+def performance_of(case: Case, rpm_top: float, slow_too: bool = True) -> Performance:
+    """Tabulate a case from a twentieth (else a quarter) of a speed up to it, from descent to the windmill.
 
     Inside the flight range (`BELOW` steps under J = 0 to `BEYOND` steps over zero thrust) every point must converge.
     Outside, from the first point of a row that does not, or whose tip is sonic, the force of the point before goes on:
@@ -222,6 +224,11 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
     V = j * n / 60.0 * D
     step = greatest / N_J
     flight = (j > -(BELOW + 0.5) * step) & (j < (N_J + BEYOND + 0.5) * step)
+    slow = _slow(case, ready, rpm_top, J, flight[0]) if slow_too else np.empty(0)
+    if slow.size:
+        rpm, J_zero = np.r_[slow, rpm], np.r_[zero_thrust(case, slow), J_zero]
+        n, j = np.meshgrid(rpm, J, indexing="ij")
+        V, flight = j * n / 60.0 * D, np.broadcast_to(flight[0], n.shape)
     T, Q = np.full(n.shape, np.nan), np.full(n.shape, np.nan)
     inside = solve_points(case, n[flight], V[flight], ready=ready)
     T[flight], Q[flight] = inside.thrust_N, inside.torque_Nm
@@ -252,6 +259,17 @@ def performance_of(case: Case, rpm_top: float) -> Performance:
         blades=int(case.rotor().B),
         sense=int(case.rotor().rotation),
     )
+
+
+def _slow(case: Case, ready: Model, rpm_top: float, J: Array, flight: NDArray[np.bool_]) -> Array:
+    """Speeds of `SLOW`, down to the first whose flight range does not converge or has no zero of thrust [rev/min]."""
+    rpm, inside = rpm_top * np.array(SLOW), J[flight]
+    n = np.repeat(rpm, inside.size)
+    found = ready.solve(n, np.tile(inside, rpm.size) * n / 60.0 * ready.diameter_m, case.air())
+    good = found.converged.reshape(rpm.size, -1).all(axis=1)
+    CT = found.thrust_N.reshape(rpm.size, -1)
+    good &= np.isfinite([_crossing(inside, row) for row in CT])
+    return rpm[np.flatnonzero(~good).max(initial=-1) + 1 :]
 
 
 THINNER = 0.75

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from bemt.base.errors import Fault, InputError
+import numpy as np
+
+from bemt.base.errors import Fault
 from bemt.rotors.case import Case
 from geometry.common import GeometryError
 from geometry.duct import Duct
@@ -17,8 +19,13 @@ from geometry.rotor import Rotor
 OPEN_TIP, DUCTED_TIP = 0.5, 0.1
 """Length of the rounded tip over the chord there: in a duct a round tip would open the gap [1]."""
 SOLIDS = ("stl", "step", "3mf", "obj")
-THICKNESS_MM = 0.8
-"""Two lines of a 0.4 mm nozzle [mm]."""
+NOZZLE_MM, FINE_MM = 0.4, 0.25
+"""Nozzles that printers have, the usual one and a fine one [mm]."""
+LINES = 2.0
+"""Least thickness over the width of a line, which is that of the nozzle [1]."""
+TIP_CHORD = 6.0
+"""Chord to which a narrower tip is widened, over the least thickness: its round edges then leave a middle of that
+thickness. Of the blades tried, 5.5 was enough and 5 was not [1]."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,7 @@ class Print:
     """What is asked for, in the units of the command; None is a rule or nothing."""
 
     min_thickness_mm: float | None = None
+    nozzle_mm: float | None = None
     trailing_edge_mm: float | None = None
     tip_round: float | None = None  # over the chord at the tip [-]
     flare_mm: float | None = None
@@ -43,21 +51,14 @@ def asked(request: Print) -> list[str]:
     return [f"--{f.name.replace('_', '-')}" for f in fields(request) if getattr(request, f.name) is not None]
 
 
-def request_of(printable: bool, **given: Any) -> Print | None:
-    """What the options ask of a printer, None without ``printable``; InputError where one of its own comes alone."""
-    request = Print(**given)
-    if printable:
-        return request
-    alone = asked(replace(request, min_thickness_mm=None, flare_mm=None))  # those are options of any solid
-    if alone:
-        raise InputError([Fault("", name, "given", "nothing without --printable") for name in alone])
-    return None
-
-
 def faults_of(request: Print, formats: Sequence[str]) -> list[Fault]:
     """What the options alone say that cannot be printed."""
     wrong = [word for word in formats if word not in SOLIDS]
     found = [Fault("", "--printable", f"the format {word}", f"one of {', '.join(SOLIDS)}") for word in wrong]
+    if request.nozzle_mm is not None and not 0.05 <= request.nozzle_mm <= 2.0:
+        return [*found, Fault("", "--nozzle-mm", f"{request.nozzle_mm:g}", "a number from 0.05 to 2 mm")]
+    if request.nozzle_mm is not None and request.min_thickness_mm is not None:
+        found.append(Fault("", "--nozzle-mm", "given", "nothing with --min-thickness-mm", "It says the thickness"))
     if request.adapter is not None and request.adapter not in ADAPTERS:
         return [*found, Fault("", "--adapter", request.adapter, f"one of {', '.join(sorted(ADAPTERS))}")]
     try:
@@ -65,6 +66,17 @@ def faults_of(request: Print, formats: Sequence[str]) -> list[Fault]:
     except GeometryError as error:
         found += [Fault("", *fault) for fault in error.faults]
     return found
+
+
+def thickness_mm(request: Print) -> float:
+    """Least thickness: two lines of the nozzle unless told. [mm]
+
+    >>> thickness_mm(Print()), thickness_mm(Print(nozzle_mm=0.25)), thickness_mm(Print(min_thickness_mm=0.6))
+    (0.8, 0.5, 0.6)
+    """
+    if request.min_thickness_mm is not None:
+        return request.min_thickness_mm
+    return LINES * (NOZZLE_MM if request.nozzle_mm is None else request.nozzle_mm)
 
 
 def _printed(request: Print, ducted: bool) -> Printed:
@@ -75,9 +87,8 @@ def _printed(request: Print, ducted: bool) -> Printed:
         if pair is not None:
             holes = {key: value for key, value in holes.items() if key == "bore"}  # instead of the adapter's
             holes[name] = (pair[0] * 1e-3, pair[1] * 1e-3)
-    thickness = THICKNESS_MM if request.min_thickness_mm is None else request.min_thickness_mm
     return Printed(
-        thickness * 1e-3,
+        1e-3 * thickness_mm(request),
         None if request.trailing_edge_mm is None else request.trailing_edge_mm * 1e-3,
         (DUCTED_TIP if ducted else OPEN_TIP) if request.tip_round is None else request.tip_round,
         None if request.flare_mm is None else request.flare_mm * 1e-3,
@@ -94,10 +105,14 @@ class Shape:
     duct: Duct | None
     options: Options | None
     model: MeshModel
+    printed: Mapping[str, Any] | None = None  # least thickness, and what a wider tip changes
 
 
 def shapes(case: Case, options: Options | None, request: Print | None) -> list[Shape]:
-    """Solids of a case, as its sections say or for a printer; GeometryError where one cannot be made."""
+    """Solids of a case, as its sections say or for a printer; GeometryError where one cannot be made.
+
+    A tip too narrow for the least thickness is widened; the hint of a refusal names a nozzle that would do.
+    """
     rotor, duct = case.rotor(), case.duct()
     if request is None:
         return [Shape("", rotor, duct, options, build(rotor, duct, options))]
@@ -107,5 +122,74 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
         rotor = replace(rotor, hub_length=1e-3 * request.hub_height_mm)
     made = {"right": ("_right", replace(rotor, rotation=1)), "left": ("_left", replace(rotor, rotation=-1))}
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
-    options = Options(printed=_printed(request, duct is not None))
-    return [Shape(end, rotor, None, options, build(rotor, None, options)) for end, rotor in rotors]
+    options, out = Options(printed=_printed(request, duct is not None)), []
+    for end, rotor in rotors:
+        told: dict[str, Any] = {"least_thickness_mm": thickness_mm(request)}
+        try:
+            model = build(rotor, None, options)
+        except GeometryError as error:
+            if not any(fault[0] in ("thickness", "chord") for fault in error.faults):
+                raise
+            wider = widened(rotor, 1e-3 * thickness_mm(request))
+            try:
+                model = build(wider, None, options)
+            except GeometryError as still:
+                raise GeometryError([(*f[:3], _fine(rotor, case, request)) for f in still.faults]) from None
+            told |= _changes(case, rotor, wider)
+            rotor = wider
+        out.append(Shape(end, rotor, None, options, model, told))
+    return out
+
+
+def widened(rotor: Rotor, thickness_m: float) -> Rotor:
+    """The rotor with a chord of `TIP_CHORD` times a thickness where its tip is narrower; smooth, from r/R 0.6 on."""
+    blade, least = rotor.blade, TIP_CHORD * thickness_m
+    r = np.unique(np.r_[blade.r, np.linspace(0.6, 1.0, 41) * blade.R])
+    chord, beta, sweep, rake = blade._at(r).T
+    wide = np.where(r < 0.6 * blade.R, chord, (chord**12 + least**12) ** (1.0 / 12.0))
+    return replace(rotor, blade=replace(blade, r=r, chord=wide, beta=beta, sweep=sweep, rake=rake))
+
+
+def _fine(rotor: Rotor, case: Case, request: Print) -> str:
+    """Nozzle with which the rotor can be made, else what else to change."""
+    fine = replace(request, min_thickness_mm=LINES * FINE_MM, nozzle_mm=None)
+    if thickness_mm(fine) < thickness_mm(request):
+        for one in (rotor, widened(rotor, 1e-3 * thickness_mm(fine))):
+            try:
+                build(one, None, Options(printed=_printed(fine, case.duct() is not None)))
+            except GeometryError:
+                continue
+            return f"A {FINE_MM:g} mm nozzle does it: --nozzle-mm {FINE_MM:g}, {thickness_mm(fine):g} mm"
+    return "A wider blade, or a larger rotor"
+
+
+def _changes(case: Case, before: Rotor, after: Rotor) -> dict[str, Any]:
+    """What the wider tip is, and what it costs at the case's point, in per cent of thrust and torque."""
+    from bemt.rotors.case.prepare import prepare_case
+
+    R = before.blade.R
+    x = np.linspace(0.6, 1.0, 401)
+    old, new = (rotor.blade.at(x * R)[0] for rotor in (before, after))
+    where = float(x[int(np.argmax(new > 1.02 * old))])
+    model, own = prepare_case(case), case.rotor()
+    loads = []
+    for rotor in (own, replace(after, blade=replace(after.blade, Rhub=own.blade.Rhub), rotation=own.rotation)):
+        found = replace(model, rotor=rotor).solve(case.rpm, case.airspeed_m_s, case.air())
+        loads.append((float(found.thrust_N[0]), float(found.torque_Nm[0])))
+    thrust, torque = (100.0 * (b / a - 1.0) for a, b in zip(*loads, strict=True))
+    return {"tip_chord_mm": [1e3 * float(old[-1]), 1e3 * float(new[-1])], "wider_from_r_over_R": where,
+            "thrust_pct": thrust, "torque_pct": torque}  # fmt: skip
+
+
+def printed_text(printed: dict[str, Any]) -> list[str]:
+    """Lines for the terminal."""
+    lines = [f"printed with a least thickness of {printed['least_thickness_mm']:g} mm"]
+    if "tip_chord_mm" in printed:
+        old, new = printed["tip_chord_mm"]
+        finer = f". A finer nozzle keeps it: --nozzle-mm {FINE_MM:g}" if old >= TIP_CHORD * LINES * FINE_MM else ""
+        lines.append(
+            f"the tip was too narrow for that: its chord is {new:.2g} mm instead of {old:.2g}, wider from r/R "
+            f"{printed['wider_from_r_over_R']:.2f}; thrust {printed['thrust_pct']:+.1f} %, torque "
+            f"{printed['torque_pct']:+.1f} %{finer}"
+        )
+    return lines

@@ -25,6 +25,7 @@ class Px4Export(LoadsExport):
 
     def write(self, job: Job) -> Files:
         """Parameter lines as airframe scripts take them: one file for the simulator, one for the vehicle."""
+        job = self.asked(job)
         t, name = job.performance, plain_name(job.case.name)
         ct, cp = fits(job)
         T, Q = (float(loads[-1, t.at_rest]) for loads in (t.thrust_N, t.torque_Nm))  # at full speed, not of a fit

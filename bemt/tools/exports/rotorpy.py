@@ -27,6 +27,7 @@ class RotorpyExport(LoadsExport):
 
     def write(self, job: Job) -> Files:
         """Parameters from least squares of T and Q, from rest to zero thrust, each relative to the load at rest."""
+        job = self.asked(job)
         t = job.performance
         k_eta, k_z, k_m = _fit(job)
         k_d, k_h, k_flap = _fit_hub(job)
