@@ -115,10 +115,10 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(curves, "_grids", lambda *_: (np.array(rpm), np.array(V), 0))
         found = curves.case_curves(case)
-    at = found["over_rpm"]
+    at = found.over_rpm
     words = propagate(case, rpm, V, bands=False).points.flags
-    assert all(any(kind in told for told in found["flags"]) for f in words for kind in f) or len(words) > 1
-    return [(at["thrust_N"][i], at["u_thrust_N"][i], at["torque_Nm"][i], at["u_torque_Nm"][i], words[i])
+    assert all(any(kind in told for told in found.flags) for f in words for kind in f) or len(words) > 1
+    return [(at.thrust_N[i], at.u["thrust_N"][i], at.torque_Nm[i], at.u["torque_Nm"][i], words[i])
             for i in range(len(words))]  # fmt: skip
 
 
