@@ -48,7 +48,6 @@ if TYPE_CHECKING:
     from bemt.tools.drive.actions import thrusters as thrusters
     from bemt.tools.exports.actions import export as export
     from bemt.tools.flight.actions import fly as fly
-    from bemt.tools.exports.actions import export as export
 
 _OBJECTS = {
     "Answer": "bemt.judge.diagnose.ask", "Dataset": "bemt.physics.dataset", "InputError": "bemt.base.errors",

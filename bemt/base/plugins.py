@@ -68,7 +68,7 @@ def loaded(table: str) -> list[Any]:
 def part(table: str, case: Any) -> Any:
     """What a tool makes of a table of a case; None where the case has none or the tool is not here."""
     where = offered("CASE_PARTS").get(table)
-    return None if where is None or getattr(case.file, table) is None else load(where)(case)
+    return None if where is None or getattr(case.file, table, "") is None else load(where)(case)
 
 
 def absent() -> list[str]:

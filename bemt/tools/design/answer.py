@@ -65,8 +65,6 @@ class Choice:
         """Plain values, ``bemt.choose/1``."""
         return document(self.table)
 
-    to_dict = document
-
 
 def best_of_each(table: pd.DataFrame) -> pd.DataFrame:
     """The best motor of each label, in the order of the ranking."""

@@ -166,8 +166,6 @@ class Design:
 
         return document(self)
 
-    to_dict = document
-
     def __repr__(self) -> str:
         return self.text
 

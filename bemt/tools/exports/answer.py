@@ -58,8 +58,6 @@ class Exported:
         """Plain values, ``bemt.export/1``."""
         return {"schema": SCHEMA, "cases": [dict(one) for one in self.manifests]}
 
-    to_dict = document
-
     def __str__(self) -> str:
         return self.text
 
