@@ -814,15 +814,15 @@ def test_all_faults_of_the_options_are_told_at_once(
     command = ["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "o"), "--fillet-mm", "-1"]
     assert main([*command, "--format", "openfoam", "--rpm", "nan", "--airspeed-m-s", "1000", "--level", "12"]) == 2
     told = capsys.readouterr().err
-    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed-m-s", "--level", "fillet"]
+    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed-m-s", "--level", "--fillet-mm"]
     assert "from 10 to 300000 rev/min" in told and "from 0 to 300 m/s. Looks like km/h" in told
     assert main([*command, "--format", "stl", "obj", "--rpm", "9000", "--airspeed-m-s", "4", "--sideslip-deg", "5",
                  "--level", "5", "--domain", "pipe", "--sector", "full", "--turbulence", "realizableKE",
-                 "--incompressible"]) == 2  # fmt: skip
+                 "--solver", "incompressible"]) == 2  # fmt: skip
     told = capsys.readouterr().err
     assert [line.split(":")[0] for line in told.splitlines()] == [
         "--rpm", "--airspeed-m-s", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--solver",
-        "fillet"]  # fmt: skip
+        "--fillet-mm"]  # fmt: skip
     assert told.count("expected nothing with the format stl, obj. Formats that read it: ") == 8
     assert not (tmp_path / "o").exists()
 
