@@ -1,10 +1,11 @@
 """What the exports wrote, run in the programs that read them: ``python docs/read_back.py`` rewrites docs/exports.md.
 
 ``python docs/read_back.py throttles`` runs every shipped case and three labels from rest at five throttles, at each
-program's own step, into docs/throttles.csv. ``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it
-measured in docs/read_back.json with version and date; without a target, the page is written from there. A program runs
-the export of a right-handed and of a left-handed rotor at the same operating points as BEMT. Needs ``pip install
-'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev`` (Gazebo) and ``openfoam``.
+program's own step, into docs/throttles.csv. ``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in
+processes of their own, and keeps what it measured in docs/read_back.json with version and date; without a target, the
+page is written from there. A program runs the export of a right-handed and of a left-handed rotor at the same operating
+points as BEMT. Needs ``pip install 'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev``
+(Gazebo) and ``openfoam``.
 """
 
 from __future__ import annotations
@@ -137,8 +138,7 @@ def started_cases() -> list[Case]:
 
 
 def library_at(job: Job, throttle: float) -> tuple[float, float, float]:
-    """Speed [rev/min], thrust and torque at rest by the library: its drive, or for a case without one BEMT alone
-    on the motor that stands in."""
+    """Speed [rev/min], thrust and torque at rest by the library: its drive, else BEMT on the motor that stands in."""
     from scipy.optimize import brentq
 
     if job.case.file.drive is not None:
@@ -328,24 +328,27 @@ note in the manifest says what three quarters of that density would change.
 
 ### From rest, at the program's own step
 
-Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim with
-its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the library's
-drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at that throttle;
-the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot are not here: the formulas of their sources on the files
-that were written. All rows: [throttles.csv](throttles.csv).
+Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim
+with its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the
+library's drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at
+that throttle; the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot were not run: these are the formulas
+of their sources on the files that were written. All rows: [throttles.csv](throttles.csv).
 
 | case | jsbsim | mujoco | fmu | gazebo | px4 | ardupilot |
 |---|---|---|---|---|---|---|
 {_started_rows()}
 
-The last three have the limits of their formulas, whatever the file says: `gazebo` {FORMULA["gazebo"]}; `px4` (forward
-propeller) {FORMULA["px4"]}; `ardupilot` {FORMULA["ardupilot"]}.
+The last three have the limits of their formulas, whatever the file says:
 
-JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current limit
-taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates the speed
-by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a note says from
-what and up to which step the file holds. Tables reach the speed that the case states and the one that its motor reaches;
-where these differ a note says so.
+* `gazebo`: {FORMULA["gazebo"]};
+* `px4`, forward propeller: {FORMULA["px4"]};
+* `ardupilot`: {FORMULA["ardupilot"]}.
+
+JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current
+limit taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates
+the speed by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a
+note says from what and up to which step the file holds. Tables reach the speed that the case states and the one that
+its motor reaches; where these differ a note says so.
 
 Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
 `drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).

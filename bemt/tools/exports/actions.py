@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import action
 
@@ -128,7 +128,9 @@ def export(
     wanted, known = [format] if isinstance(format, str) else list(format), target_ids()
     faults = [Fault("", "format", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
     numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level}
-    given = {key: None if value is None else number(key, value, finite=False) for key, value in numbers.items()}
+    given: dict[str, Any] = {
+        key: None if value is None else number(key, value, finite=False) for key, value in numbers.items()
+    }
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}
     request = Print(
         None, nozzle_mm, trailing_edge_mm, tip_round, None, hub_diameter_mm, hub_height_mm, adapter, bore_mm,
