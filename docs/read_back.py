@@ -33,6 +33,7 @@ from bemt.tools.exports.motor import motor_of
 from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import qprop_equations
 from simulators import PROGRAMS, STARTED, installed
 
 DOCS = Path(__file__).resolve().parent
@@ -204,14 +205,25 @@ def _started_rows() -> str:
     return "\n".join(out)
 
 
+def _qprop_rows() -> str:
+    """Differences of QPROP's equations."""
+    return "\n".join(
+        f"| {name} | {rpm:.0f} | {V:.1f} | {T:+.1f} % | {Q:+.1f} % |" for name, rpm, V, T, Q in qprop_equations.compared()
+    )
+
+
 SEEN = {
-    "dfdc": ("DFDC 0.70, built from its source", "2026-11-23", "a file of 30 stations converges in 16 iterations; with "
-             "40 or 60 it is NaN. Loads were not compared: the file has neither stator nor tip gap, and its sections "
-             "were those of an earlier fit"),
+    "dfdc": ("DFDC 0.70, built from its source", "2026-11-26", "`ds30`: thrust +8 to +14 %, torque +23 to +28 % of "
+             "BEMT's, because the file has neither stator nor tip gap, and its sections are parabolas; like for like, "
+             "on three fans of its own samples, see [Ducts](duct.md). A file of 30 stations converges in 16 "
+             "iterations; with 40 or 60 it is NaN"),
     "openfoam": ("OpenFOAM 1912 of Debian", "2026-11-23", "10x5, 10,000 rev/min, at rest, level 5: Allrun ends with "
                  "11.4 N and 0.205 N m; BEMT 13.5 N and 0.200 N m; the grid is the coarsest and shows no convergence"),
-    "xrotor": ("XROTOR 7.55, built from its source", "2026-11-23", "10x5: thrust +1.5 to +2.9 %, torque +5 to +16 % of "
-               "BEMT's; at one speed XROTOR settled on a stalled root"),
+    "qprop": ("QPROP's own equations in docs/qprop_equations.py; QPROP 1.22, built from its source, agreed within +9 "
+              "to -1 %", "2026-11-26", "the four propellers of `cases/`, table below"),
+    "xrotor": ("XROTOR 7.55, built from its source", "2026-11-26", "10x5: thrust and torque within +3.9 to -0.5 % of "
+               "BEMT's; with an earlier fit of the sections torque was +5 to +16 %, and at one speed XROTOR settled on "
+               "a stalled root"),
 }  # fmt: skip
 """Runs by hand, of programs that neither Debian nor PyPI has, or that take long: program, date, what it said."""
 
@@ -220,7 +232,6 @@ TEXT = {
     "c81": "our reader",
     "flow360": "shapes and units",
     "px4": "formula of its source (sih.cpp), ranges of its parameters",
-    "qprop": "our reader",
     "simulink": "MAT file read by SciPy",
     "su2-bem": "layout of its test case",
     "su2-disk": "layout of its test case, integrals of the rows",
@@ -391,6 +402,16 @@ themselves at its operating point and has no Reynolds number dependence. These p
 so their loads are not those of BEMT. Runs by hand:
 
 {blades}
+
+The exported files in QPROP's equations, beside BEMT at the same point:
+
+| case | rev/min | m/s | thrust off | torque off |
+|---|---|---|---|---|
+{_qprop_rows()}
+
+At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it: thrust is high where
+the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference Reynolds
+number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
 `bemt stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
 

@@ -45,8 +45,11 @@ if TYPE_CHECKING:
 
 DIAMETERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 20, 22, 24, 26, 28, 30, 32, 36, 40)
 """Diameters on sale [in]."""
-RATIOS = (0.35, 0.45, 0.55, 0.7)
-"""Pitch over diameter of the labels that are tried; the pitch is rounded to half inches [1]."""
+RATIOS = ((5.6, (0.6, 0.75, 0.9)), (10.6, (0.47, 0.55, 0.7)), (math.inf, (0.36, 0.45, 0.55, 0.7)))
+"""Pitch over diameter of the labels that are tried, up to a diameter [in]: from the lowest tenth to the upper quarter of
+567 propellers on sale that Drive Calculator lists; small ones have more pitch [1]."""
+FLYING = (0.85, 1.0, 1.2)
+"""More pitches over the diameter where the target flies [1]."""
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
@@ -311,9 +314,18 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
         raise InputError(Fault("", "--thrust-N", got, expected, hint))
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
-    ratios = RATIOS if target.fluid == "air" else (*RATIOS, 0.9, 1.1)
-    pitches = {D: dict.fromkeys(max(round(2.0 * D * ratio) / 2.0, 0.5) for ratio in ratios) for D in fit}
-    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches[D] for B in blades)
+    flying = target.airspeed_m_s > 0.0 or target.fluid == "water"
+    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches_in(D, flying) for B in blades)
+
+
+def pitches_in(diameter_in: float, flying: bool) -> tuple[float, ...]:
+    """Pitches on sale in steps of half an inch [in].
+
+    >>> pitches_in(5, False), pitches_in(10, False)
+    ((3.0, 4.0, 4.5), (4.5, 5.5, 7.0))
+    """
+    ratios = next(few for most, few in RATIOS if diameter_in < most) + (FLYING if flying else ())
+    return tuple(dict.fromkeys(max(round(2.0 * diameter_in * ratio) / 2.0, 0.5) for ratio in ratios))
 
 
 def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorLoads | None:
