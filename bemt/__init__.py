@@ -40,10 +40,14 @@ if TYPE_CHECKING:
     from bemt.rotors.propeller import load as load
     from bemt.rotors.propeller import propeller as propeller
     from bemt.tools.cfd.actions import cfd as cfd
+    from bemt.tools.design.actions import choose as choose
+    from bemt.tools.design.actions import design as design
     from bemt.tools.drive.actions import drive as drive
     from bemt.tools.drive.actions import map as map
     from bemt.tools.drive.actions import motor as motor
     from bemt.tools.drive.actions import thrusters as thrusters
+    from bemt.tools.exports.actions import export as export
+    from bemt.tools.flight.actions import fly as fly
 
 _OBJECTS = {
     "Answer": "bemt.judge.diagnose.ask", "Dataset": "bemt.physics.dataset", "InputError": "bemt.base.errors",

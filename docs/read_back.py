@@ -24,8 +24,9 @@ import pandas as pd
 
 from bemt.base.tables import csv_text, write_atomic
 from bemt.rotors.case import Case, load_case
+from bemt.rotors.propeller import rotor_of
 from bemt.tools.drive import drive_result
-from bemt.tools.drive.drive_result import case_for
+from bemt.tools.drive.drive_result import with_drive
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job, LoadsExport
 from bemt.tools.exports.manifest import entry
@@ -135,7 +136,7 @@ ROWS = ("case", "target", "throttle", "rpm_library", "thrust_N_library", "torque
 def started_cases() -> list[Case]:
     """Every shipped case, and labels with a motor."""
     shipped = [load_case(path) for path in sorted(CASES.glob("*/case.toml"))]
-    return shipped + [case_for(label, kv=kv, cells=cells) for label, kv, cells in LABELS]
+    return shipped + [with_drive(rotor_of(label).case, kv=kv, cells=cells) for label, kv, cells in LABELS]
 
 
 def library_at(job: Job, throttle: float) -> tuple[float, float, float]:

@@ -9,6 +9,7 @@ import pytest
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.rotors.propeller import rotor_of
 from bemt.tools.design.answer import best_of_each, front
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.search import choose
@@ -24,7 +25,7 @@ def few():
 
 @pytest.mark.parametrize("label, kv, cells", [("10x4.5", 900.0, 3), ("15x5", 400.0, 6), ("6x4x3", 2300.0, 4)])
 def test_hover_and_full_throttle_are_those_of_drive(label: str, kv: float, cells: int) -> None:
-    case = drive_result.case_for(label, kv=kv, cells=cells)
+    case = drive_result.with_drive(rotor_of(label).case, kv=kv, cells=cells)
     full = drive_result.full_throttle(case, bands=False)["thrust_N"].value
     mass = 0.4 * full / 9.80665
     found = choose(0.9 * full, cells, labels=[label], kv=(kv, kv), mass_kg=mass).iloc[0]

@@ -514,3 +514,31 @@ def test_a_sweep_needs_no_solids_and_no_pictures(project: Path) -> None:
     assert {"bemt", "geometry", "numpy"} <= found
     assert not found & {"neuralfoil", "aerosandbox", "casadi"}  # the rule's sections are tabulated
     assert not found & {"OCP", "cadquery", "manifold3d", "pyvista", "trimesh", "vtk", "vtkmodules"}
+
+
+SWEEP_LINES = 22_000
+"""Most lines of the project that a sweep of a case without drive, duct, grid and CFD runs loads."""
+
+
+def test_a_sweep_loads_what_it_needs(project: Path) -> None:
+    """Lines of the modules in a fresh interpreter; with ``-n 0 -s`` they are printed."""
+    program = f"""
+import contextlib, io, runpy, sys
+sys.argv = ['bemt', 'sweep', 'cases/prop_8x5']
+with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+    runpy.run_module('bemt', run_name='__main__')
+root, total = {str(project)!r}, 0
+for module in list(sys.modules.values()):
+    file = getattr(module, '__file__', None) or ''
+    if file.endswith('.py') and file.startswith((root + '/bemt/', root + '/geometry/')):
+        total += sum(1 for _ in open(file, encoding='utf-8'))
+print(total, *sorted(name for name in sys.modules if name.startswith('bemt.')))
+"""
+    run = subprocess.run([sys.executable, "-c", program], cwd=project, capture_output=True, text=True, timeout=300,
+                         env={**os.environ, "PYTHONPATH": str(project)})  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    total, *modules = run.stdout.split()
+    print(total)
+    assert "bemt.physics.bem.solver" in modules and int(total) <= SWEEP_LINES
+    unused = ("bemt.data.recordings.load", "bemt.judge", "bemt.results.report", "bemt.tools.drive.drive_model")
+    assert not [name for name in modules if name.startswith(unused)]

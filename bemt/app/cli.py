@@ -42,7 +42,7 @@ def help_text(lab: bool = False) -> str:
     if not lab:
         rest = ", ".join(sorted(set(known) - set(shown)))
         lines += ["", f"  {LAB:<16}more commands: {rest}"]
-        lines += [f"  {'-':<16}{line}" for line in plugins.missing()]
+        lines += [f"  {'-':<16}{plugins.missing(tool)}" for tool in plugins.absent()]
     return "\n".join([*lines, "", f"{prog} COMMAND --help lists the options that people use. {CODES}", ""])
 
 
@@ -97,7 +97,8 @@ def _dispatch(argv: list[str]) -> int:
     if words[0] not in known:
         gone = plugins.tool_of(words[0])
         if gone:
-            raise InputError(Fault("", words[0], f"no tool {gone}", plugins.how_to_get(gone)))
+            complain(plugins.missing(gone))
+            return EXIT_INPUT
         names = [name for name in registry.ORDER if name in known]
         near = did_you_mean(words[0], known)
         what = f"bemt: error: COMMAND: got {words[0]}; expected one of {', '.join(names)}, {LAB}.{near}"

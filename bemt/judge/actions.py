@@ -360,5 +360,5 @@ def prove(
         taken.append(following.text(following.follow(File(out), cores, say)))
     if loop and out is not None:
         taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say)))
-    code = EXIT_OK if all(row["met"] is not False for row in found["score"]) else EXIT_UNCONVERGED
-    return Told(found, "\n\n".join([proof_text.text(found), *taken]), exit_code=code)
+    code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
+    return Told(found.document(), "\n\n".join([proof_text.text(found), *taken]), exit_code=code)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
-    from bemt.results.sweep.answer import Sweep
+    from bemt.results.sweep.answer import SweepAnswer
 
     Path = str | os.PathLike[str]
 
@@ -26,7 +26,7 @@ def sweep(
     tolerance_pct: float = 15.0, resume: bool = True, engine: Literal["local", "dask"] = "local",
     scheduler: str | None = None, grid_format: Literal["csv", "parquet"] = "csv",
     progress: Callable[[str], None] | None = None,
-) -> Sweep:  # fmt: skip
+) -> SweepAnswer:  # fmt: skip
     """Solve cases and compare them with recorded values.
 
     Parameters
@@ -54,7 +54,7 @@ def sweep(
 
     Returns
     -------
-    Sweep
+    SweepAnswer
         ``.text`` (one screen), ``.details`` (every case in full), ``.to_dict()`` (schema ``bemt.sweep/1``).
 
     Raises
@@ -143,12 +143,12 @@ def report(
     revision = checked_out(File(given[0])) if commit is None else commit
     about |= {"revision": f"commit {revision}"} if revision else {}
     book, files = write(given, path_text("out", out), progress or (lambda line: None), about, own)
-    count = len(book["cases"])
+    count = len(book.cases)
     size = f": {files[0].stat().st_size / 1e6:.2f} MB, {count} case{'s' * (count != 1)}"
     lines = [f"{file}{size if file.name == HTML_NAME else ''}" for file in files]
-    faults = tuple(str(fault) for page in book["cases"] for fault in page["result"]["faults"])
-    document = {"schema": "bemt.report/1", "files": [str(file) for file in files], "exit_code": book["exit_code"]}
-    return Told(document, "\n".join(lines), exit_code=int(book["exit_code"]), complaints=faults,
+    faults = tuple(str(fault) for page in book.cases for fault in page.result.faults)
+    document = {"schema": "bemt.report/1", "files": [str(file) for file in files], "exit_code": book.exit_code}
+    return Told(document, "\n".join(lines), exit_code=book.exit_code, complaints=faults,
                 files=tuple(files))  # fmt: skip
 
 

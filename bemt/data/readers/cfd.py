@@ -235,6 +235,11 @@ def numeric_table(
     return ExportTable(array, tuple(good), tuple(warnings))
 
 
+def _none(line: str) -> bool:
+    """No line is skipped."""
+    return False
+
+
 @dataclass(frozen=True)
 class Layout:
     """How one program writes a history; reading it is the same for all."""
@@ -244,7 +249,7 @@ class Layout:
     header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
     cells: Callable[[str], tuple[str, ...]]  # of a row
     column: Callable[[str], Column]  # of a name
-    skip: Callable[[str], bool] = lambda line: False  # lines that are neither headings nor rows
+    skip: Callable[[str], bool] = _none  # lines that are neither headings nor rows
     notes: tuple[str, ...] = ()
     commas: bool = True  # whether a decimal comma is possible
     hint: str = "Is the header damaged?"  # where a row comes before the headings

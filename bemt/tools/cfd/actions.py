@@ -66,9 +66,9 @@ def cfd(
         from bemt.tools.cfd.summary import summary, summary_text
 
         found = summary(name)
-        return Told(found, summary_text(found))
+        return Told(found.document(), summary_text(found))
     say = progress
     told = None if say is None else (lambda line: say(f"{line}\n"))
     record = campaigns.run(name, only, ranks, None if work is None else os.fspath(work), keep, told)
-    code = EXIT_OK if all(row["converged"] == 1 for row in record.rows) else EXIT_UNCONVERGED
+    code = EXIT_OK if all(row.settled for row in record.rows) else EXIT_UNCONVERGED
     return Told(campaigns.document(record), campaigns.text(record), exit_code=code)

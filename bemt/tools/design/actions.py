@@ -21,8 +21,7 @@ __all__ = ["choose", "design"]
 
 @action(
     "Drive", "choose --thrust-N 27 --cells 6 --max-diameter-in 18", shown=True,
-    common=("thrust_N", "cells", "mass_kg", "rotors", "airspeed_m_s", "max_diameter_in", "arm_mm", "kv", "motors",
-            "capacity_Ah", "fan", "fluid", "coaxial", "out"),
+    common=("thrust_N", "cells", "mass_kg", "rotors", "airspeed_m_s", "max_diameter_in", "kv", "out"),
 )  # fmt: skip
 def choose(
     thrust_N: float | None = None, cells: Count | None = None, *, kv: tuple[float, float] | float = (80.0, 8000.0),
@@ -110,8 +109,7 @@ def choose(
 
 @action(
     "Propellers and fans", "design --thrust-N 6 --airspeed-m-s 15 --rpm 7000 --diameter-in 10", shown=True,
-    common=("thrust_N", "diameter_in", "airspeed_m_s", "rpm", "blades", "static_thrust_N", "material",
-            "min_thickness_mm", "duct", "out"),
+    common=("thrust_N", "diameter_in", "airspeed_m_s", "rpm", "blades", "material", "duct", "out"),
 )  # fmt: skip
 def design(
     thrust_N: float | None = None, diameter_in: float | None = None, *, airspeed_m_s: float = 0.0,
@@ -215,7 +213,7 @@ def design(
     for i, point in enumerate(each):
         if isinstance(point, str):
             asked.append(point_of(point))
-        elif len(point) != 4:
+        elif len(tuple(point)) != 4:
             expected = "(thrust_N, airspeed_m_s, rpm or None, weight)"
             faults.append(Fault("", f"points[{i}]", repr(point), expected))
         else:

@@ -61,11 +61,9 @@ class Choice:
         """1 if no pair is sure to meet the target."""
         return EXIT_OK if (self.table.probability >= self.table.attrs["sure"]).any() else EXIT_UNCONVERGED
 
-    def document(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values, ``bemt.choose/1``."""
         return document(self.table)
-
-    to_dict = document
 
 
 def best_of_each(table: pd.DataFrame) -> pd.DataFrame:

@@ -160,13 +160,11 @@ class Design:
         """1 if the search did not converge."""
         return EXIT_OK if self.found.converged else EXIT_UNCONVERGED
 
-    def document(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values, ``bemt.design/1``."""
         from bemt.tools.design.design_answer import document
 
         return document(self)
-
-    to_dict = document
 
     def __repr__(self) -> str:
         return self.text

@@ -189,11 +189,9 @@ def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> 
     return {key.partition(".")[2]: band for key, band in found.items()}
 
 
-def full_document(case: Case) -> dict[str, Any] | None:
-    """Full throttle as plain values with its line of text, None for a case without a motor."""
-    if case.file.drive is None:
-        return None
-    full, t = full_throttle(case), case.file.drive
+def full_document(case: Case) -> dict[str, Any]:
+    """Full throttle of a case that has a motor, as plain values with its line of text."""
+    full, t = full_throttle(case), case_drive.drive_table(case)
     return {"kv": t.kv, "cells": t.cells, "soc": t.soc, "text": _line(case, full),
             **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
 

@@ -20,7 +20,7 @@ __all__ = ["export"]
 
 @action(
     "Solids and CFD", "export cases/prop_8x5 --out solids --format stl step", words=("case",), shown=True,
-    common=("out", "format", "rpm", "airspeed_m_s", "hold", "printable", "nozzle_mm", "adapter", "hand"),
+    common=("out", "format", "rpm", "airspeed_m_s", "hold", "printable", "nozzle_mm", "adapter"),
 )  # fmt: skip
 def export(
     case: Propeller | Path, out: Path, format: str | Sequence[str] = "stl", *,  # noqa: A002

@@ -54,11 +54,9 @@ class Exported:
         """Why, a line each."""
         return tuple(str(error) for error in self.refused)
 
-    def document(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values, ``bemt.export/1``."""
         return {"schema": SCHEMA, "cases": [dict(one) for one in self.manifests]}
-
-    to_dict = document
 
     def __str__(self) -> str:
         return self.text

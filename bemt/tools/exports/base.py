@@ -16,7 +16,7 @@ from bemt.base import plugins
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import plain, write_atomic
-from bemt.base.toml import Table, shown
+from bemt.base.toml import Table
 from bemt.rotors.case.schema import PointTable
 from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
 from bemt.tools.exports.performance import (
@@ -261,23 +261,6 @@ class Export(ABC):
                 os.chmod(path, 0o755)
         return {"schema": SCHEMA, "name": job.case.name, "files": [], "targets": [made]}
 
-    def option(self, key: str, value: Any) -> tuple[str, str]:
-        """Name on the command line of an option and how its value is shown.
-
-        Parameters
-        ----------
-        key : str
-            Field of `options`.
-        value : object
-            What was given.
-
-        Returns
-        -------
-        tuple of str
-            Name, value.
-        """
-        return f"--{key.replace('_', '-')}", shown(value).strip("'")
-
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """Lines for a terminal on its own part of the manifest.
 
@@ -492,7 +475,7 @@ class DiskExport(Export):
         """Refuse a point at rest where the target cannot hold it, and a rotor that is no propeller there."""
         out = super().faults(job)
         if not self.at_rest and not job.airspeed > 0.0:
-            got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed"
+            got, hint = f"an airspeed of {job.airspeed:g} m/s", f"{self.holds}; give --airspeed-m-s"
             out.append(Fault(job.file, f"--format {self.id}", got, "a speed above 0", hint))
         return out
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
-from bemt.base.toml import check_field
+from bemt.base.toml import check_field, shown
 from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
@@ -180,8 +181,13 @@ def export_cases(
     Returns manifests with their folders, and why cases or targets were refused. Faults of the options are raised before
     anything is written.
     """
+    known = exports()
+    unknown = [word for word in formats if word not in known]
+    faults = [Fault("", "--format", word, f"one of {', '.join(known)}", absent_target(word)) for word in unknown]
+    if faults:
+        raise InputError(faults)
     asked = {key: value for key, value in (given or {}).items() if value is not None}
-    faults = option_faults(asked) + _unused(asked, formats, hold)
+    faults += option_faults(asked) + _unused(asked, formats, hold)
     faults += faults_of(printed, formats) if printed is not None else []
     try:
         solid = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
@@ -215,7 +221,12 @@ def export_cases(
     return made, refused
 
 
-def option_faults(given: Mapping[str, Any], name: Callable[[str], str] | None = None) -> list[Fault]:
+def absent_target(word: str) -> str:
+    """Sentence on the absent tool that a target belongs to, or nothing."""
+    return missing(tool) if (tool := tool_of(word)) else ""
+
+
+def option_faults(given: Mapping[str, Any]) -> list[Fault]:
     """Find the options of targets that are out of range or unknown words.
 
     >>> for fault in option_faults({"rpm": float("nan")}): print(fault)
@@ -223,9 +234,13 @@ def option_faults(given: Mapping[str, Any], name: Callable[[str], str] | None = 
     """
     out = Collector("")
     for key, value in given.items():
-        target = next(target for target in exports().values() if key in target.options.named())
-        check_field(out, name(key) if name else target.option(key, value)[0], target.options, key, value)
+        for table in [target.options for target in exports().values() if key in target.options.named()][:1]:
+            check_field(out, _option(key), table, key, value)
     return out.faults
+
+
+def _option(key: str) -> str:
+    return f"--{key.replace('_', '-')}"
 
 
 def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, ...]) -> list[Fault]:
@@ -235,9 +250,9 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
     wanted = f"nothing with the format {', '.join(formats)}"
     for key, value in given.items():
         if key not in used:
-            readers = {name: target for name, target in exports().items() if key in target.uses}
-            option, got = next(iter(readers.values())).option(key, value)
-            faults.append(Fault("", option, got, wanted, f"Formats that read it: {', '.join(readers)}"))
+            readers = [name for name, target in exports().items() if key in target.uses]
+            hint = f"Formats that read it: {', '.join(readers) or 'none here'}"
+            faults.append(Fault("", _option(key), shown(value).strip("'"), wanted, hint))
     if hold and all(exports()[name].kind == "solid" for name in formats):
         faults.append(
             Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
+from bemt.base.plugins import missing_for
 from bemt.tools.exports.base import Export, Files, Job
 from bemt.tools.exports.performance import THINNER
 
@@ -21,6 +22,7 @@ def _lost(export: Export, job: Job) -> list[str]:
         out.append(f"the direction of rotation is not in the file: this rotor is {job.rotation}")
     if export.kind != "loads":
         return out
+    out += missing_for(job.case)
     if "hub" not in export.features:
         out.append("loads across the shaft are not in the file: no H force, no hub moments, thrust as in axial flow")
     elif job.case.ducted:

@@ -201,12 +201,12 @@ def fly(
     learnt, converged = "", True
     if out_case is not None:
         learnt, converged = _learn(answers, os.fspath(case or ""), os.fspath(out_case), mass_kg)
-    answer = FlightsAnswer(tuple(answers), tuple(refused), folder, learnt, converged, mass_kg)
+    out = FlightsAnswer(tuple(answers), tuple(refused), folder, learnt, converged, mass_kg)
     if picture is not None:
-        Path(picture).write_bytes(answer.figure())
+        Path(picture).write_bytes(out.figure())
     if out_csv is not None:
-        Path(out_csv).write_text(answer.csv(), encoding="utf-8")
-    return answer
+        Path(out_csv).write_text(out.csv(), encoding="utf-8")
+    return out
 
 
 _LOOSE = "files"  # session of healthy flights that are given one by one
@@ -345,9 +345,11 @@ def _aligned(rows: Sequence[dict[str, Any]]) -> str:
     cells = [heads]
     for r in rows:
         k = r["thrust_constant"]
-        constant = "" if k is None else f"{k:.4g} ± {100 * r['thrust_constant_half'] / k:.1f} % {r['thrust_constant_unit']}"
+        half = "" if k is None else f"{100 * r['thrust_constant_half'] / k:.1f} %"
+        constant = "" if k is None else f"{k:.4g} ± {half} {r['thrust_constant_unit']}"
         what = f"{r['verdict']}: {r['effects']}" if r["effects"] else r["verdict"]
         sensor = "" if not r["sensors"] else r["sensors"].removeprefix("The speed sensor of ")
-        cells.append((Path(r["file"]).name, str(r["rotors"] or ""), f"{r['flying_s'] or 0.0:.0f} s", what, constant, sensor))
+        seconds = f"{r['flying_s'] or 0.0:.0f} s"
+        cells.append((Path(r["file"]).name, str(r["rotors"] or ""), seconds, what, constant, sensor))
     width = [max(len(row[i]) for row in cells) for i in range(len(heads))]
     return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, width, strict=True)).rstrip() for row in cells)

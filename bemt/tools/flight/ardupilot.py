@@ -46,7 +46,8 @@ _WANTED: dict[str, tuple[str, ...]] = {
     "GPS": ("I", "GMS", "GWk"),
     "PARM": ("Name", "Value"),
 }
-_FIRST = {"IMU": ("I",), "VIBE": ("IMU",), "GPS": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("C",)}  # of these the first is read
+# Of these the first instance is read.
+_FIRST = {"IMU": ("I",), "VIBE": ("IMU",), "GPS": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("C",)}
 _FLIP = np.array([1.0, -1.0, -1.0])
 _IDLE = 0.5  # share of the hover throttle below which nothing flies [1]
 _FUNCTIONS = {**{33 + i: i for i in range(8)}, **{82 + i: 8 + i for i in range(4)}}

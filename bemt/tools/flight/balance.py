@@ -37,7 +37,9 @@ from bemt.base.arrays import Array
 from bemt.tools.flight.layout import effect_matrix
 from bemt.tools.flight.log import FlightLog
 
-__all__ = ["BLADE", "DAY", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight"]
+__all__ = [
+    "BLADE", "DAY", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight",
+]  # fmt: skip
 
 SCATTER, SCATTER_FREE = 0.0075, 4
 """Standard deviation of a reading between flights of one vehicle [1], and the degrees of freedom it counts as."""

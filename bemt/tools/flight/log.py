@@ -177,7 +177,7 @@ def joined(
     if raw is not None and raw[0].size > 1:
         at, v = _whole(raw[0], raw[1])
         fast = (at - t[0], v)
-    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)
+    return FlightLog(file, kind, t - t[0], raw=fast, join_s=halves, **columns, **more)  # type: ignore[arg-type]
 
 
 def _whole(t: Array, v: Array) -> Source:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 import zlib
@@ -16,6 +17,7 @@ MAX_BYTES = 1 << 29
 """Largest log that is unpacked. [bytes]"""
 _READERS = (crazyflie, px4, ardupilot, table)
 _BLOCK = 1 << 16
+_BETAFLIGHT = b"H Product:Blackbox"
 
 
 def read_log(path: str | os.PathLike[str]) -> FlightLog:
@@ -48,8 +50,26 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
         raise InputError(system_fault(error)) from error
 
 
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """Format of a file that only this tool reads (ULog, DataFlash, Betaflight's own, packed or not); empty for others.
+
+    So that whoever meets such a file can hand it over.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(1 << 16)
+    except OSError:
+        return ""
+    if head[:2] == b"\x1f\x8b":
+        with contextlib.suppress(zlib.error):
+            head = zlib.decompressobj(31).decompress(head, 4096)
+    if head.startswith(_BETAFLIGHT):
+        return "Betaflight blackbox"
+    return next((r.KIND for r in (px4, ardupilot) if r.sniff(head)), "")
+
+
 def _read(path: Path, head: bytes) -> FlightLog:
-    if head.startswith(b"H Product:Blackbox"):
+    if head.startswith(_BETAFLIGHT):
         hint = f"Decode it: blackbox_decode {path.name} (or Blackbox Explorer, Export CSV), then fly the CSV"
         raise InputError(Fault(str(path), "", "a Betaflight log as the flight controller packs it", "its CSV", hint))
     reader = next((r for r in _READERS if r.sniff(head)), None)
@@ -63,7 +83,7 @@ def _gunzip(raw: bytes, name: str) -> tuple[bytes, str]:
     """What can be unpacked, and what is damaged; InputError beyond the limit."""
     out, at, view = bytearray(), 0, memoryview(raw)
     try:
-        while at < len(raw) and (at == 0 or view[at : at + 2] == b"\x1f\x8b"):
+        while at < len(raw) and (at == 0 or bytes(view[at : at + 2]) == b"\x1f\x8b"):
             stream = zlib.decompressobj(31)
             while not stream.eof:
                 block = view[at : at + _BLOCK]

@@ -7,7 +7,7 @@ sound, k/m, and another number, and the evidence is
 
 * the speed over the square root of the command beside that of the rotors which are sound, in the rows where it reads;
 * the balance: with the thrusts that the reading implies, or those of the repaired one, roll, pitch and yaw are as far
-  from even as in healthy vehicles (:data:`bemt.tools.flight.balance.TRIM`);
+  from even as in healthy vehicles (:data:`bemt.tools.flight.balance.TRIM`), or as a damaged rotor leaves them;
 * the share of rows in which it reads nothing that could be a speed of its mode (zeros, counts that decay).
 
 The repaired speed is the mean of what these leave: the reading times m/k, the command, the balance. Rows without a
@@ -37,14 +37,15 @@ _SHARE = 0.1  # flights whose sensor of one given motor is at fault, beforehand:
 _OTHER = 0.02  # of these, readings that are no such fraction: a counter counts [1]
 _SICK, _SICK_SHARE = 0.35, 0.1  # range of log speed over drive that a fault of blade or motor reaches, and its share
 _STOPPED = 1e-3  # rotors that stand in flight, of those that read so: six rotors can fly on five [1]
-_LEVEL, _ALONE, _COUNT, _EXPONENT = 0.013, 0.03, 0.01, 0.2
+_LEVEL, _ALONE, _COUNT, _EXPONENT = 0.013, 0.03, 0.015, 0.2
 """Standard deviation of log speed over the root of the command between the motors of a sound vehicle (four motors of
 two Crazyflies 2.1: brushed 1.3 %, brushless 0.4 %); of the speed alone (half the trim of the thrusts, 6 %); of a count
 (an assumption); of the exponent, 1/2 (an assumption, as in :mod:`bemt.tools.flight.motor_speed`) [1]."""
 _MODE = 0.28  # log distance from its mode up to which a row reads: half the way to the next count
 _DROPS = 0.01  # share of lost rows from which a sensor drops out [1]
 _RANGE = float(np.log(30.0))  # of log readings that are no fraction
-_GRID = np.linspace(-0.4, 0.4, 401)  # log level of a repaired speed beside the others
+_GRID = np.linspace(-0.4, 0.4, 201)  # log level of a repaired speed beside the others
+_LOSSES = np.linspace(0.05, 0.7, 8)  # log losses of the thrust constant of a damaged rotor
 
 
 def checked(log: FlightLog) -> FlightLog:
@@ -98,8 +99,7 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
         grid = np.append(_GRID, max(x, -9.0))
         every = np.broadcast_to(shares, (grid.size, B)).copy()
         every[:, i] = np.exp(2.0 * grid) * thrust[i]
-        y = (every / every.mean(axis=1, keepdims=True) - 1.0) @ axes.T / trim
-        balance = -0.5 * (TRIM_FREE + len(axes)) * np.log1p(np.sum(y**2, axis=1) / TRIM_FREE)
+        balance = _balance(every, axes / trim[:, None])
         like_others = balance[:-1] + _log_normal(_GRID, u[i])
         sick = _SICK_SHARE / (2.0 * _SICK) if abs(x) < _SICK else _STOPPED * (x < -1.0)
         sound = (1.0 - _SHARE) * ((1.0 - _SICK_SHARE) * float(np.exp(_log_normal(x, u[i]))) + sick)
@@ -109,8 +109,8 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
             # Blades are missed more often than edges are doubled.
             share = _SHARE * (1.0 - _OTHER) * (0.8 / 4 if f < 1 else 0.2 / 3)
             over[f] = like_others + _log_normal(x - float(np.log(float(f))) - _GRID, _COUNT) + np.log(share)
-        for f, v in over.items():
-            logs[f] = float(v.max() + np.log(np.sum(np.exp(v - v.max())) * (_GRID[1] - _GRID[0])))
+        for count, v in over.items():
+            logs[count] = float(v.max() + np.log(np.sum(np.exp(v - v.max())) * (_GRID[1] - _GRID[0])))
         top = max(logs.values())
         evidence = top + float(np.log(sum(np.exp(v - top) for v in logs.values())))
         if np.exp(logs[Fraction(1)] - evidence) < 1.0 - NAMED:
@@ -127,13 +127,30 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
     for i in range(B):
         zeros = reading[:, i] <= 0.0
         if i in faults:
-            with np.errstate(divide="ignore"):
+            mode = _mode(reading[:, i], middle)
+            with np.errstate(divide="ignore", invalid="ignore"):
                 away = np.log(np.maximum(reading[:, i], 0.0) / middle)
-            lost[:, i] = ~(np.abs(away - _mode(reading[:, i], middle)) < _MODE)
-        elif zeros.mean() > _DROPS:
-            # A sound rotor that is flown hard leaves its mode, too; it does not read nothing.
+            lost[:, i] = ~(np.abs(away - mode) < _MODE) if np.isfinite(mode) else True
+        elif zeros.mean() > _DROPS and not (zeros[-1] and np.count_nonzero(np.diff(zeros)) < 2):
+            # A sound rotor that is flown hard leaves its mode, too; it does not read nothing. One that reads nothing
+            # to the end stands.
             faults[i], lost[:, i] = (Fraction(1), _mode(reading[:, i], middle), float(u[i])), zeros
     return _Reading(total, faults, lost, middle)
+
+
+def _balance(thrust: Array, rows: Array) -> Array:
+    """Log density (G,) of roll, pitch and yaw for thrusts (G, B), rows (k, B) of unit scatter.
+
+    One rotor may be damaged: then its thrust is less than its speed says.
+    """
+    B = thrust.shape[1]
+    lost = np.concatenate([np.ones((1, B)), *(1.0 - np.eye(B)[[j]] * (1.0 - np.exp(-_LOSSES[:, None])) for j in range(B))])
+    weight = np.log([1.0 - _SICK_SHARE, *np.full(len(lost) - 1, _SICK_SHARE / (len(lost) - 1))])
+    every = thrust[:, None, :] * lost
+    y = (every / every.mean(axis=2, keepdims=True) - 1.0) @ rows.T
+    density = weight - 0.5 * (TRIM_FREE + len(rows)) * np.log1p(np.sum(y**2, axis=2) / TRIM_FREE)
+    top = density.max(axis=1)
+    return np.asarray(top + np.log(np.exp(density - top[:, None]).sum(axis=1)), dtype=float)
 
 
 def _log_normal(x: Array | float, sd: float) -> Any:

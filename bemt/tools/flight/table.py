@@ -32,9 +32,11 @@ def sniff(head: bytes) -> bool:
 
 
 _CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time", "time_s", "timestamp")
-_USED = re.compile(r"t|t_s|time|time_s|timestamp|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate|controller)\..+|(vbat|amperage)(Latest)?"
+_USED = re.compile(r"t|t_s|time|time_s|timestamp|p|v|R|w|fa|pwm"
+                   r"|(motor|pwm|rpm|acc|gyro|pm|stateEstimate|controller)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
-_SPEED = re.compile(r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm", re.IGNORECASE)
+_SPEED = re.compile(r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?"
+                    r"|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm", re.IGNORECASE)
 """Headings of the speed of one rotor: rpm1, rpm_1, motor_1_rpm, esc.rpm[0]."""
 _CLOCK = r"\btime\b|\btime_s\b|\bt\b|\bt_s\b|loopIteration|\btimestamp\b"
 _HEAD_BYTES = 1 << 18  # within which the headings stand
@@ -87,7 +89,7 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
 
     kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
     pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
-                         usecols=lambda c: bool((_USED.fullmatch(n := _label(str(c))) or _SPEED.fullmatch(n))))  # fmt: skip
+                         usecols=lambda c: any(p.fullmatch(_label(str(c))) for p in (_USED, _SPEED)))  # fmt: skip
     for piece in pieces:
         piece.columns = [_label(str(c)) for c in piece.columns]
         for c in piece.columns:

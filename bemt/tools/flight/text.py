@@ -32,7 +32,7 @@ def text(a: FlightAnswer, details: bool = False) -> str:
     if log.ends:
         lines.append(f"  {log.ends}")
     if log.mixed:
-        lines.append(f"  No output of a motor was logged: commands are those of the mixer for the demands in {log.mixed}.")
+        lines.append(f"  No output of a motor was logged: its commands follow from the demands in {log.mixed}.")
     lines.append(f"  {headline(j)}: {j.said.why}.")
     if j.healthy:
         low, high = j.rate95
@@ -103,7 +103,8 @@ def _look(a: FlightAnswer) -> str:
         return "Nothing to look at: the motors share the work as in the healthy flights."
     if not said.effects:
         why = said.why[:1].upper() + said.why[1:]
-        return f"{why}: check arms, motor tilt and propellers." if said.verdict == "unknown" else f"No verdict: {said.why}."
+        known = said.verdict != "unknown"
+        return f"No verdict: {said.why}." if known else f"{why}: check arms, motor tilt and propellers."
     first, rest = said.effects[0], [i for i in said.effects[1:]]
     found = j.found.get(said.leading)
     motors = sorted({int(i.removeprefix(BLADE)) for i in said.effects if i.removeprefix(BLADE).isdigit()})
@@ -126,7 +127,7 @@ def _look(a: FlightAnswer) -> str:
         return f"Look at motors {names}: they work {size}or more harder than {others}. Damaged blades would do this."
     if first.startswith(BLADE):
         k = first.removeprefix(BLADE)
-        same = [f"a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
+        same = ["a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
         what = _alternatives(["a damaged blade", *same])
         return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
     where = first.removeprefix(WEIGHT)
@@ -153,7 +154,7 @@ def _level(shake: Vibration) -> str:
     total = float(np.linalg.norm(shake.rms))
     high = f"Vibration is high: {total:.2g} m/s2 above 20 Hz" if total > _HIGH else f"Vibration {total:.2g} m/s2"
     known = np.isfinite(shake.shaft_hz)
-    what = "once a turn" if known else "in the spectrum; no speed was logged, so that it is once a turn is likely, not known"
+    what = "once a turn" if known else "in the spectrum: likely once a turn; no speed was logged to know"
     return f"{high}, strongest at {shake.line_hz:.0f} Hz ({what})."
 
 
@@ -200,7 +201,8 @@ def _seen(answer: FlightAnswer) -> list[str]:
         lines += [f"  Vibration twice a turn: {', '.join(both)} {shake.unit}."] if both else []
     elif np.isfinite(shake.line):
         known = np.isfinite(shake.shaft_hz)
-        where = "once a turn" if known else f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
+        seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
+        where = "once a turn" if known else seen
         lines.append(f"  Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where}).")
         if np.isfinite(shake.twice):
             lines.append(f"  At twice that: {shake.twice:.2g} {shake.unit}.")

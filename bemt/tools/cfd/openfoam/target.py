@@ -28,10 +28,6 @@ class OpenfoamExport(SolidExport):
         run = Run(**{key: value for key, value in given.items() if key in self.uses and value is not None})
         return write_openfoam(job.case, out, run, job.solid)
 
-    def option(self, key: str, value: Any) -> tuple[str, str]:
-        """The solver's law is an option of its own on the command line."""
-        return (f"--{value}", "the option") if key == "solver" else super().option(key, value)
-
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """How the case is run."""
         words = f"{part['solver']}, {part['turbulence']}, {part['domain']}, {part['sector']}, level {part['level']:g}"
