@@ -1,10 +1,11 @@
 """What the exports wrote, run in the programs that read them: ``python docs/read_back.py`` rewrites docs/exports.md.
 
 ``python docs/read_back.py throttles`` runs every shipped case and three labels from rest at five throttles, at each
-program's own step, into docs/throttles.csv. ``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in processes of their own, and keeps what it
-measured in docs/read_back.json with version and date; without a target, the page is written from there. A program runs
-the export of a right-handed and of a left-handed rotor at the same operating points as BEMT. Needs ``pip install
-'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev`` (Gazebo) and ``openfoam``.
+program's own step, into docs/throttles.csv. ``python docs/read_back.py TARGET [TARGET ...]`` runs these targets, in
+processes of their own, and keeps what it measured in docs/read_back.json with version and date; without a target, the
+page is written from there. A program runs the export of a right-handed and of a left-handed rotor at the same operating
+points as BEMT. Needs ``pip install 'bemt[simulators]'``, and from Debian ``ignition-tools`` with ``libsdformat-dev``
+(Gazebo) and ``openfoam``.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from bemt.tools.exports.motor import motor_of
 from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import qprop_equations
 from simulators import PROGRAMS, STARTED, installed
 
 DOCS = Path(__file__).resolve().parent
@@ -138,9 +140,7 @@ def started_cases() -> list[Case]:
 
 
 def library_at(job: Job, throttle: float) -> tuple[float, float, float]:
-    """Speed [rev/min], thrust and torque at rest by the library: its drive, or for a case without one BEMT alone
-    on the motor that stands in.
-    """
+    """Speed [rev/min], thrust and torque at rest by the library: its drive, else BEMT on the motor that stands in."""
     from scipy.optimize import brentq
 
     if job.case.file.drive is not None:
@@ -206,14 +206,25 @@ def _started_rows() -> str:
     return "\n".join(out)
 
 
+def _qprop_rows() -> str:
+    """Differences of QPROP's equations."""
+    return "\n".join(
+        f"| {name} | {rpm:.0f} | {V:.1f} | {T:+.1f} % | {Q:+.1f} % |" for name, rpm, V, T, Q in qprop_equations.compared()
+    )
+
+
 SEEN = {
-    "dfdc": ("DFDC 0.70, built from its source", "2026-11-23", "a file of 30 stations converges in 16 iterations; with "
-             "40 or 60 it is NaN. Loads were not compared: the file has neither stator nor tip gap, and its sections "
-             "were those of an earlier fit"),
+    "dfdc": ("DFDC 0.70, built from its source", "2026-11-26", "`ds30`: thrust +8 to +14 %, torque +23 to +28 % of "
+             "BEMT's, because the file has neither stator nor tip gap, and its sections are parabolas; like for like, "
+             "on three fans of its own samples, see [Ducts](duct.md). A file of 30 stations converges in 16 "
+             "iterations; with 40 or 60 it is NaN"),
     "openfoam": ("OpenFOAM 1912 of Debian", "2026-11-23", "10x5, 10,000 rev/min, at rest, level 5: Allrun ends with "
                  "11.4 N and 0.205 N m; BEMT 13.5 N and 0.200 N m; the grid is the coarsest and shows no convergence"),
-    "xrotor": ("XROTOR 7.55, built from its source", "2026-11-23", "10x5: thrust +1.5 to +2.9 %, torque +5 to +16 % of "
-               "BEMT's; at one speed XROTOR settled on a stalled root"),
+    "qprop": ("QPROP's own equations in docs/qprop_equations.py; QPROP 1.22, built from its source, agreed within +9 "
+              "to -1 %", "2026-11-26", "the four propellers of `cases/`, table below"),
+    "xrotor": ("XROTOR 7.55, built from its source", "2026-11-26", "10x5: thrust and torque within +3.9 to -0.5 % of "
+               "BEMT's; with an earlier fit of the sections torque was +5 to +16 %, and at one speed XROTOR settled on "
+               "a stalled root"),
 }  # fmt: skip
 """Runs by hand, of programs that neither Debian nor PyPI has, or that take long: program, date, what it said."""
 
@@ -222,7 +233,6 @@ TEXT = {
     "c81": "our reader",
     "flow360": "shapes and units",
     "px4": "formula of its source (sih.cpp), ranges of its parameters",
-    "qprop": "our reader",
     "simulink": "MAT file read by SciPy",
     "su2-bem": "layout of its test case",
     "su2-disk": "layout of its test case, integrals of the rows",
@@ -330,24 +340,27 @@ note in the manifest says what three quarters of that density would change.
 
 ### From rest, at the program's own step
 
-Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim with
-its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the library's
-drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at that throttle;
-the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot are not here: the formulas of their sources on the files
-that were written. All rows: [throttles.csv](throttles.csv).
+Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim
+with its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the
+library's drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at
+that throttle; the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot were not run: these are the formulas
+of their sources on the files that were written. All rows: [throttles.csv](throttles.csv).
 
 | case | jsbsim | mujoco | fmu | gazebo | px4 | ardupilot |
 |---|---|---|---|---|---|---|
 {_started_rows()}
 
-The last three have the limits of their formulas, whatever the file says: `gazebo` {FORMULA["gazebo"]}; `px4` (forward
-propeller) {FORMULA["px4"]}; `ardupilot` {FORMULA["ardupilot"]}.
+The last three have the limits of their formulas, whatever the file says:
 
-JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current limit
-taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates the speed
-by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a note says from
-what and up to which step the file holds. Tables reach the speed that the case states and the one that its motor reaches;
-where these differ a note says so.
+* `gazebo`: {FORMULA["gazebo"]};
+* `px4`, forward propeller: {FORMULA["px4"]};
+* `ardupilot`: {FORMULA["ardupilot"]}.
+
+JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current
+limit taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates
+the speed by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a
+note says from what and up to which step the file holds. Tables reach the speed that the case states and the one that
+its motor reaches; where these differ a note says so.
 
 Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
 `drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
@@ -390,6 +403,16 @@ themselves at its operating point and has no Reynolds number dependence. These p
 so their loads are not those of BEMT. Runs by hand:
 
 {blades}
+
+The exported files in QPROP's equations, beside BEMT at the same point:
+
+| case | rev/min | m/s | thrust off | torque off |
+|---|---|---|---|---|
+{_qprop_rows()}
+
+At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it: thrust is high where
+the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference Reynolds
+number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
 `bemt stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
 

@@ -408,7 +408,7 @@ def flow360(job: Job, folder: Path) -> Ran:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A run from rest at one throttle: last speed, thrust and torque, and the most of speed and thrust over the last."""
+    """A run from rest at one throttle: last speed, thrust and torque, and the most of them over the last."""
 
     rpm: float
     thrust_N: float

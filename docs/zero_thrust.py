@@ -1,7 +1,7 @@
 """A JSBSim aircraft where BEMT says that the thrust of its 10x5 vanishes: ``python docs/zero_thrust.py``.
 
-JSBSim gets the airspeed, and the throttle at which the motor of the file holds BEMT's torque at that point; speed and thrust are its own answer. Needs
-``pip install 'bemt[simulators]'``.
+JSBSim gets the airspeed, and the throttle at which the motor of the file holds BEMT's torque at that point; speed and
+thrust are its own answer. Needs ``pip install 'bemt[simulators]'``.
 """
 
 from __future__ import annotations

@@ -167,10 +167,12 @@ def test_an_unreachable_target_names_the_nearest(capsys: pytest.CaptureFixture[s
         ({"mass_kg": 1.5, "cells": 3, "rotors": 0}, "rotors"), ({"thrust_N": 0.02, "cells": 3}, "thrust-N"),
         ({"thrust_N": 5.0, "cells": 3, "capacity_Ah": -1.0}, "capacity-Ah"),
         ({"thrust_N": 5.0, "cells": 3, "sure": 90.0}, "sure"),
-        ({"thrust_N": 5.0, "cells": 3, "motors": "none.csv"}, ""), ({"thrust_N": 5.0, "cells": 3, "fluid": "oil"}, "fluid"),
+        ({"thrust_N": 5.0, "cells": 3, "motors": "none.csv"}, ""),
+        ({"thrust_N": 5.0, "cells": 3, "fluid": "oil"}, "fluid"),
         ({"thrust_N": 5.0, "cells": 3, "fan": True, "fluid": "water"}, "fan"),
         ({"thrust_N": 5.0, "cells": 3, "coaxial": True, "rotors": 3}, "rotors"),
-        ({"thrust_N": 5.0, "cells": 3, "rest_kg": 1.0}, "rest-kg"), ({"thrust_N": 5.0, "cells": 3, "arm_mm": 0.2}, "arm-mm"),
+        ({"thrust_N": 5.0, "cells": 3, "rest_kg": 1.0}, "rest-kg"),
+        ({"thrust_N": 5.0, "cells": 3, "arm_mm": 0.2}, "arm-mm"),
     ],
 )  # fmt: skip
 def test_odd_requests_are_refused(request_, where: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import Count, action
 
@@ -201,7 +201,7 @@ def design(
     from bemt.tools.design.blade_design import design_blade
     from bemt.tools.design.requirement import DesignPoint, point_of
 
-    given = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
+    given: dict[str, Any] = {"thrust_N": thrust_N, "diameter_in": diameter_in, "airspeed_m_s": airspeed_m_s, "rpm": rpm,
              "hub_ratio": hub_ratio, "static_thrust_N": static_thrust_N, "static_rpm": static_rpm,
              "min_chord_mm": min_chord_mm, "min_thickness_mm": min_thickness_mm, "max_tip_mach": max_tip_mach,
              "stall_margin": stall_margin, "safety": safety, "density_kg_m3": density_kg_m3}  # fmt: skip
@@ -209,7 +209,8 @@ def design(
     if thrust_N is None and (rpm is not None or airspeed_m_s):
         faults.append(Fault("", "--thrust-N", "nothing", "a thrust [N] with --airspeed-m-s and --rpm"))
     asked = [] if thrust_N is None else [DesignPoint(thrust_N, airspeed_m_s, rpm)]
-    for i, point in enumerate([points] if isinstance(points, str) else points):
+    each: list[Any] = [points] if isinstance(points, str) else list(points)
+    for i, point in enumerate(each):
         if isinstance(point, str):
             asked.append(point_of(point))
         elif len(tuple(point)) != 4:

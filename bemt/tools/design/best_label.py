@@ -15,10 +15,8 @@ from bemt.rotors.case.load import with_changes
 from bemt.tools.design import rotor_loads
 from bemt.tools.design.requirement import Requirement
 from bemt.tools.design.rotor_loads import RotorLoads
-from bemt.tools.design.search import DIAMETERS, RATIOS
+from bemt.tools.design.search import DIAMETERS, pitches_in
 
-FLYING = (0.85, 1.0, 1.2)
-"""More pitches over the diameter where the target flies [1]."""
 SMALLEST = 0.6
 """Diameters tried, over that of the design, from here to 1 [1]."""
 FAN_RATIOS = (0.6, 0.8, 1.0, 1.2, 1.45, 1.7, 2.0)
@@ -41,10 +39,9 @@ def standard(need: Requirement) -> list[str]:
     """Labels on sale up to the diameter, and of the diameter itself; two blades, and as many as asked for."""
     D = 2.0 * need.R / INCH
     sizes = [float(d) for d in DIAMETERS if SMALLEST * D <= d < D * (1.0 - 1e-6)] + [round(D, 2)]
-    ratios = RATIOS + (FLYING if any(p.airspeed_m_s for p in need.points) else ())
+    flying = any(p.airspeed_m_s for p in need.points)
     blades = dict.fromkeys((2, min(max(need.blades, 2), 8)))
-    pitches = {d: dict.fromkeys(max(round(2.0 * d * ratio) / 2.0, 0.5) for ratio in ratios) for d in sizes}
-    return [f"{d:g}x{P:g}" + (f"x{B}" if B != 2 else "") for d in sizes for P in pitches[d] for B in blades]
+    return [f"{d:g}x{P:g}" + (f"x{B}" if B != 2 else "") for d in sizes for P in pitches_in(d, flying) for B in blades]
 
 
 def rivals(need: Requirement, ducted: Case | None) -> Iterator[tuple[str, Case]]:

@@ -234,8 +234,8 @@ def design_blade(
         bands = _bands(case, need, found.after.rpm)
     label_bands = () if label is None else _bands(label.case, need, label.rpm)
     breaks = () if label is None else _breaks(label, need)
-    return Design(need, thickness, found, files, start, label, same, breaks, *_ideal(need, model, found), bands, label_bands, over,
-                  duct is not None)  # fmt: skip
+    return Design(need, thickness, found, files, start, label, same, breaks, *_ideal(need, model, found), bands,
+                  label_bands, over, duct is not None)  # fmt: skip
 
 
 def _first_blade(

@@ -1,8 +1,9 @@
 """What a rotor's motor, propeller, controller and arm weigh: declared laws with their spread.
 
 * Motor from its greatest torque: 1341 direct-drive motors recorded by Drive Calculator with weight and three points or
-  more; torque (I - I_0)/K_v with the typical share of idle current. Scaling laws have an exponent of 3/3.5 (M. Budinger,
-  A. Reysset, A. Ochotorena, S. Delbecq, Aerospace Sci. Technol. 98 (2020) 105658, doi:10.1016/j.ast.2019.105658).
+  more; torque (I - I_0)/K_v with the typical share of idle current. Scaling laws have an exponent of 3/3.5
+  (M. Budinger, A. Reysset, A. Ochotorena, S. Delbecq, Aerospace Sci. Technol. 98 (2020) 105658,
+  doi:10.1016/j.ast.2019.105658).
 * Propeller from its diameter: 17 APC propellers of 8 to 14 in, weights in APC's PE0 files; beyond them extrapolated.
   Slow flyers weigh a half, glow-engine blades twice as much. More blades: 11x7 with three over that with two.
 * Controller from its input: 115 g at 3108 W (the reference of Budinger et al.; spread declared).

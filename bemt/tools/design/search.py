@@ -45,8 +45,11 @@ if TYPE_CHECKING:
 
 DIAMETERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 20, 22, 24, 26, 28, 30, 32, 36, 40)
 """Diameters on sale [in]."""
-RATIOS = (0.35, 0.45, 0.55, 0.7)
-"""Pitch over diameter of the labels that are tried; the pitch is rounded to half inches [1]."""
+RATIOS = ((5.6, (0.6, 0.75, 0.9)), (10.6, (0.47, 0.55, 0.7)), (math.inf, (0.36, 0.45, 0.55, 0.7)))
+"""Pitch over diameter of the labels that are tried, up to a diameter [in]: from the lowest tenth to the upper quarter of
+567 propellers on sale that Drive Calculator lists; small ones have more pitch [1]."""
+FLYING = (0.85, 1.0, 1.2)
+"""More pitches over the diameter where the target flies [1]."""
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
@@ -231,7 +234,8 @@ def _target(
         faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust-N 27 --cells 6"))
     if minutes is not None and capacity_Ah is None:
         faults.append(Fault("", "--capacity-Ah", "nothing", "the battery's capacity [A h], for the time"))
-    named = {"--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors, "--airspeed-m-s": airspeed_m_s,
+    named = {"--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors,
+             "--airspeed-m-s": airspeed_m_s,
              "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah, "--minutes": minutes,
              "--rest-kg": rest_kg, "--arm-mm": arm_mm}  # fmt: skip
     faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
@@ -254,7 +258,8 @@ def _target(
     fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
     for name, value, low, high, hint in (
         ("--thrust-N", thrust_N, 0.01, 5000.0, ""), ("--mass-kg", mass_kg, 0.005, 1000.0, grams),
-        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""), ("--airspeed-m-s", airspeed_m_s, 0.0, 150.0, fast),
+        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""),
+        ("--airspeed-m-s", airspeed_m_s, 0.0, 150.0, fast),
         ("--max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
         ("--capacity-Ah", capacity_Ah, 0.01, 1000.0, mAh), ("--minutes", minutes, 0.01, 1e4, ""),
         ("--rest-kg", rest_kg, 0.001, mass_kg or 1000.0, "Part of the mass"),
@@ -300,17 +305,27 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     small = [D for D in sizes if max_in is None or max_in * (1.0 + 1e-9) >= D]
     fit = [D for D in small if least <= target.thrust_N / area[D] <= most]
     if not fit:
-        low, high = least * area[(small or sizes)[0]], most * area[(small or sizes[:1])[-1]]
+        ends = (small or sizes)[0], (small or sizes[:1])[-1]
+        low, high = least * area[ends[0]], most * area[ends[1]]
         got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:.3g} in")
         what = "fans" if target.fan else "standard sizes"
-        expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {(small or sizes)[0]:.3g} to {(small or sizes[:1])[-1]:.3g} in"
+        expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {ends[0]:.3g} to {ends[1]:.3g} in"
         hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
         raise InputError(Fault("", "--thrust-N", got, expected, hint))
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
-    ratios = RATIOS if target.fluid == "air" else (*RATIOS, 0.9, 1.1)
-    pitches = {D: dict.fromkeys(max(round(2.0 * D * ratio) / 2.0, 0.5) for ratio in ratios) for D in fit}
-    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches[D] for B in blades)
+    flying = target.airspeed_m_s > 0.0 or target.fluid == "water"
+    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches_in(D, flying) for B in blades)
+
+
+def pitches_in(diameter_in: float, flying: bool) -> tuple[float, ...]:
+    """Pitches on sale in steps of half an inch [in].
+
+    >>> pitches_in(5, False), pitches_in(10, False)
+    ((3.0, 4.0, 4.5), (4.5, 5.5, 7.0))
+    """
+    ratios = next(few for most, few in RATIOS if diameter_in < most) + (FLYING if flying else ())
+    return tuple(dict.fromkeys(max(round(2.0 * diameter_in * ratio) / 2.0, 0.5) for ratio in ratios))
 
 
 def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorLoads | None:
@@ -345,7 +360,7 @@ def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
 
 @cache
 def _draws() -> tuple[Array, Array]:
-    """Standard normal (3, DRAWS + 1) for rotor and mass, quantiles (4, DRAWS + 1) of the shares; the first is nominal."""
+    """Standard normal (3, DRAWS + 1) for rotor and mass, quantiles (4, DRAWS + 1) of shares; the first is nominal."""
     from scipy.special import ndtri
 
     steps = np.array([pow(LATTICE, j, DRAWS) for j in range(7)])
@@ -443,7 +458,8 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
          "probability": float(chance[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
          "current_A": float(amps[i, 0]), "peak_A": float(peak[i, 0]),
-         "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]), "rpm": float(n_at[i]),
+         "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
+         "rpm": float(n_at[i]),
          "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * float(own_kg[i]),
          "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N}
         for i, m in enumerate(machines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ class QpropExport(BladeExport):
     holds = "stations; per station: clipped linear lift, two parabolas of drag, one exponent of Reynolds number"
     features = frozenset({"torque", "airspeed", "windmill", "reynolds", "density", "rest", "sections"})
     conventions = "metres and degrees (factors 1), R on the second line in metres; slope per radian"
-    source = "QPROP 1.22 qprop.f (read), cdfun.f (drag)"
+    source = "QPROP 1.22 qprop.f (read), gvcalc.f, tqcalc.f (loads), cdfun.f (drag)"
 
     def write(self, job: Job) -> Files:
         """The file; sections between anchors are interpolated in their numbers."""
@@ -66,7 +67,14 @@ class QpropExport(BladeExport):
 
 
 def _sections(job: Job) -> Anchors:
-    return [(x, fit_qprop(polar, Re)) for x, polar, Re in anchors_of(job)]
+    """Sections with one reference Reynolds number: QPROP takes that of the first station for all (tqcalc.f, CDFUN)."""
+    found = [(x, fit_qprop(polar, Re)) for x, polar, Re in anchors_of(job)]
+    common = found[0][1].reref
+    out = []
+    for x, s in found:
+        scale = (common / s.reref) ** s.reexp
+        out.append((x, replace(s, cd0=s.cd0 * scale, cd2u=s.cd2u * scale, cd2l=s.cd2l * scale, reref=common)))
+    return out
 
 
 def _between(found: Anchors, x: float) -> list[float]:
