@@ -331,7 +331,7 @@ def _exports(run: Path) -> list[Path]:
     from bemt.data.readers.cfd_run import read
 
     try:
-        return [run.parent / name for name in read(run).run.files]
+        return [run.parent / name for name in read(run).files]
     except InputError:
         return []
 
