@@ -36,7 +36,8 @@ _WORDS: dict[str, str] = {
     "power": r"power|leistung",
     "duct_thrust": r"duct|shroud|nozzle",
     "airspeed": r"inlet[-_ ]?(velocity|speed)|advance[-_ ](speed|velocity)|flight[-_ ]speed",
-    "cells": r"^((number|no\.?)[-_ ]of[-_ ]|n[-_ ]?|mesh[-_ ]|grid[-_ ])*(cells|elements)$|^(cell|element)s?[-_ ]count$",
+    "cells": r"^((number|no\.?)[-_ ]of[-_ ]|n[-_ ]?|mesh[-_ ]|grid[-_ ])*(cells|elements)$"
+    r"|^(cell|element)s?[-_ ]count$",
 }
 """Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
@@ -261,7 +262,7 @@ class OpenRun:
 def _means(word: str, unit: Unit | None, quantity: str) -> bool:
     """Whether a heading means a quantity in the words of any recording; without a unit only what nothing else is."""
     if unit is not None:
-        name = usual(word, unit.suffix)
+        name = usual(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
         return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
     return quantity in ("airspeed", "density") and quantity in meanings(word)
 

@@ -260,7 +260,9 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
     apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if "cells" not in state and state else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
-    work.notes.insert(0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is")
+    work.notes.insert(
+        0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
+    )
 
 
 def _coefficients(work: OpenRun, values: dict[str, Array], u: dict[str, Array], over: dict[str, str]) -> None:

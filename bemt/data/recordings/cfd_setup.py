@@ -64,8 +64,7 @@ def _flies(d: Dataset) -> NDArray[np.bool_]:
 def with_grid_floor(
     d: Dataset, u_grid: float | Mapping[str, NDArray[np.float64]] = math.nan, notes: tuple[str, ...] = ()
 ) -> Dataset:
-    """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say it.
-    """
+    """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say."""
     random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
     numerics: dict[str, Any] = {}
     flies = _flies(d)

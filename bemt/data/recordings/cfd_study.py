@@ -108,7 +108,9 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
 
 def _state(d: Dataset, row: int) -> str:
     words = {"rpm": "rev/min", "airspeed_m_s": "m/s", "J": "J"}
-    return ", ".join(f"{d[k][row]:g} {w}" for k, w in words.items() if k in d and math.isfinite(d[k][row])) or "one speed"
+    return (
+        ", ".join(f"{d[k][row]:g} {w}" for k, w in words.items() if k in d and math.isfinite(d[k][row])) or "one speed"
+    )
 
 
 def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> dict[str, Any] | None:
@@ -120,7 +122,10 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> dict
     counts = [float(cells[i]) for i in fine]
     found = grid_study([float(d[channel][i]) for i in fine], ratios(counts))
     state = {k: float(d[k][order[0]]) for k in _SAME if k in d}
-    flags = [*found.flags, *([f"{len(order)} grids: the order is that of the finest {MOST}"] if len(order) > MOST else [])]
+    flags = [
+        *found.flags,
+        *([f"{len(order)} grids: the order is that of the finest {MOST}"] if len(order) > MOST else []),
+    ]
     return {
         "channel": channel, **state, "cells": [float(cells[i]) for i in order],
         "values": [float(d[channel][i]) for i in order], "ratios": list(found.ratios), "order": found.order,
@@ -192,7 +197,15 @@ def together(parts: Sequence[Dataset], cells: Sequence[float] | None = None, nam
     about = {**about, "file": name or " + ".join(d.name for d in parts), "files": files, "sha256": sha256}
     about.pop("means", None)
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
-    whole = Dataset("cfd", name or f"{parts[first].name} and {len(parts) - 1} coarser", join("values"), join("u"), (), about, notes=notes)
+    whole = Dataset(
+        "cfd",
+        name or f"{parts[first].name} and {len(parts) - 1} coarser",
+        join("values"),
+        join("u"),
+        (),
+        about,
+        notes=notes,
+    )
     return by_grid(whole, n)
 
 

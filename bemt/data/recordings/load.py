@@ -37,8 +37,8 @@ from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import adapt, damaged_export, recognised
-from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.choice import Choice, averaged
 from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.data.recordings.reduce import reduction
@@ -360,7 +360,11 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
     if wrote or found["runs"]:
         name = "" if wrote else str(found["runs"][0]["name"])
         study = bool(found["runs"][0]["studies"])
-        usable = name.endswith(".toml") or any(f["path"] == name and f["format"] == RUN for f in found["files"])
+        usable = (
+            Path(name).is_file()
+            and name.endswith(".toml")
+            or any(f["path"] == name and f["format"] == RUN for f in found["files"])
+        )
         file = wrote or ("study.toml" if study and not usable else name if usable else "run.toml")
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
         step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"

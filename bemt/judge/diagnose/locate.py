@@ -40,7 +40,9 @@ class Location:
     z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
     ties: tuple[str, ...]  # Other variables that explain it as well in this plan
     shared: float = field(default=0.0, compare=False)  # Standard uncertainty that all readings share, as stated [1]
-    mismatch: Array = field(repr=False, compare=False, default_factory=lambda: np.empty(0))  # (M,) Of every reading, in its unit; what `size` is the mean of
+    mismatch: Array = field(
+        repr=False, compare=False, default_factory=lambda: np.empty(0)
+    )  # (M,) Of every reading, in its unit; what `size` is the mean of
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -16,8 +16,9 @@ from typing import Any
 from bemt.base.page import Cell, num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import CfdFacts, audit, audit_document
+from bemt.data.recordings.cfd_study import LOADS, study_text
 from bemt.results.report.found_files import read_json, safe_files
-from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
+from bemt.results.report.plot import COLOURS, DASHES, SERIES, SHAPES, Plot, Trace, figure
 from bemt.results.report.values import Part, Section, picture, sections
 from bemt.results.sweep.comparison import Comparison
 from bemt.rotors.validity import serious
@@ -281,6 +282,26 @@ COLUMNS = (("rpm", "rpm", 6), ("airspeed_m_s", "V [m/s]", 4), ("J", "J", 3), ("t
            ("u_thrust_N", "u [N]", 2), ("torque_Nm", "Q [N m]", 4), ("wall_distance_m", "plate [m]", 3),
            ("tip_gap_mm", "gap [mm]", 3), ("sideslip_deg", "skew [deg]", 3), ("pitch_offset_deg", "dβ [deg]", 3),
            ("cells", "cells", 6), ("yplus_avg", "y+", 3), ("drift_thrust", "drift", 2))  # fmt: skip
+
+
+def study_parts(studies: Sequence[Mapping[str, Any]]) -> list[Part]:
+    """Grid studies: a sentence and a picture each, values over the size of the cells down to zero."""
+    figures = []
+    for s in studies:
+        h = [(s["cells"][0] / n) ** (1.0 / 3.0) for n in s["cells"]]
+        unit = f" [{LOADS[s['channel']]}]" if LOADS[s["channel"]] else ""
+        word = s["channel"].rsplit("_", 1)[0].replace("_", " ")
+        words = [f"{n:,.0f} cells" for n in s["cells"]]
+        u = [s["u_relative"] * abs(s["values"][0]), *[math.nan] * (len(h) - 1)]
+        traces = [Trace("grids; on the finest its u", h, s["values"], u, COLOURS["cfd"], points=True, labels=words)]
+        if s["order"] is not None:
+            x = [k * max(h) / 40 for k in range(41)]
+            y = [s["extrapolated"] + (s["values"][0] - s["extrapolated"]) * v ** s["order"] for v in x]
+            traces.append(Trace(f"order {s['order']:.3g}", x, y, dash=DASHES[1]))
+        plot = Plot(f"Grid study: {word} at {s.get('rpm', math.nan):g} rev/min", "cell size over the finest grid's",
+                    word + unit, traces, note=f"{study_text(s)}.", zero=False, x_zero=True)  # fmt: skip
+        figures.append(figure(plot))
+    return [("figures", figures)] if figures else []
 
 
 def _plots(item: Mapping[str, Any]) -> list[dict[str, Any] | None]:

@@ -19,6 +19,7 @@ from bemt.base.arrays import Array
 from bemt.data.readers import references as reference_file
 from bemt.data.recordings import audit_remarks
 from bemt.data.recordings.cfd_setup import references_of
+from bemt.data.recordings.cfd_study import merged
 from bemt.data.recordings.load import import_file
 from bemt.physics import effects
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
@@ -45,12 +46,18 @@ def _points(case: Case, refs: Sequence[reference_file.Reference]) -> list[tuple[
     return list(dict.fromkeys([own, *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]))
 
 
-def _references(case: Case) -> list[reference_file.Reference]:
+def _runs(case: Case) -> list[tuple[str, Dataset]]:
+    """CFD runs of a case; those of one condition on several grids as one study."""
+    found = [import_file(path) for path in case.run_paths]
+    return [(str(d.provenance["file"]), d) for d in merged(found)]
+
+
+def _references(case: Case, runs: Sequence[tuple[str, Dataset]]) -> list[reference_file.Reference]:
     """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
     read = [] if case.references_path is None else reference_file.read(case.references_path)
-    for path in case.run_paths:
-        read += references_of(import_file(path), str(path))
+    for path, run in runs:
+        read += references_of(run, path)
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
 
@@ -105,7 +112,8 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
 
 def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str], None] | None = None) -> dict[str, Any]:
     """Solve one case at its operating points and put everything recorded beside it."""
-    refs = _references(case)
+    computed = _runs(case)
+    refs = _references(case, computed)
     points = _points(case, refs)
     at = Points.of(case, *np.array(points).T)
     found = propagate(case, at.rpm, at.airspeed_m_s, at.density_kg_m3, threads=threads, progress=progress)
@@ -160,6 +168,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         "other_rows": [r for r in recorded if r["source"] not in ROW_SOURCES],
         "comparisons": comparisons,
         "audit": audit_remarks.audit_rows(recorded, ready.diameter_m, ready.pitch_m, case.ducted),
+        "grid_studies": [s for _, d in computed for s in d.provenance.get("studies", ())],
         "conditions": _description(case, ready, case.file.model.stations),
         "assumptions": [_assumption(moved) for moved in found.moved],
         "references": [{"quantity": r.quantity, "kind": r.kind, "printed": r.printed, "value": r.value, "u": r.u,
@@ -181,7 +190,7 @@ def _recorded_rows(
 ) -> list[dict[str, Any]]:
     """Rows of all recorded values, coefficients derived."""
     rows = []
-    printed = {r.where: r.printed for r in refs}
+    printed = {r.where: r.printed for r in reversed(refs)}  # thrust comes first
     for group in reference_file.to_series(refs, case.name):
         full = group.derive(diameter)
         for i in range(len(full)):
