@@ -116,8 +116,8 @@ vehicle.rotors = 4
 `drive`, `sweep`, `report` and `export` take the greatest speed and thrust from it, at the charge `soc`. An unknown of
 the drive is declared like any other: `[[assumptions]]` with `key = "drive.battery.resistance_mohm"`."""
 
-STUDY = """One condition on two grids or more is a study: `bemt import COARSE MEDIUM FINE --out study.toml` writes it, and
-every command takes it as a run. The three are run.toml files that state their `cells`, or exports with `--setup
+STUDY = """One condition on two grids or more is a study: `bemt import COARSE MEDIUM FINE --out study.toml` writes it,
+and every command takes it as a run. The three are run.toml files that state their `cells`, or exports with `--setup
 cells=0.5e6,1.7e6,5.8e6`, one number a file. A table whose rows differ in a column of cells is a study without
 more.
 

@@ -155,8 +155,8 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
         turned = 0.0 if vanes is None else math.radians(rotor.rotation * vanes.angle_deg)  # their tails with the swirl
         stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3, beta=0.5 * math.pi + turned)
         return around(
-            rotor, duct.length_mm * 1e-3, gap, (duct.lip_radius_mm or 0.0) * 1e-3, exit_area_ratio=ratio, exit_hub_radius=hub,
-             rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+            rotor, duct.length_mm * 1e-3, gap, (duct.lip_radius_mm or 0.0) * 1e-3, exit_area_ratio=ratio,
+            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
         )  # fmt: skip
 
     return _as_input(path.as_posix(), "", make)

@@ -297,7 +297,10 @@ def propagate(
             for u, times in zip(widths, (1.0, 2.0), strict=True)
         )
         if model.duct is not None:
-            narrow = narrow | {"duct_share": share_error(model.duct, found, narrow["thrust_N"])}
+            narrow, wide = (
+                one | {"duct_share": share_error(model.duct, found, one["thrust_N"], k)}
+                for k, one in ((1.0, narrow), (2.0, wide))
+            )
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
@@ -384,12 +387,12 @@ SHARE = 0.02
 """Standard deviation of the duct's share at one thrust: nozzle 19A at rest, five pitches, by 3.6 to -1.6 points [1]."""
 
 
-def share_error(duct: DuctFlow, points: Dataset, u_thrust: Array) -> Array:
-    """Standard uncertainty of the duct's share, (P,): that of the balance, and what the error of the thrust moves."""
+def share_error(duct: DuctFlow, points: Dataset, u_thrust: Array, times: float = 1.0) -> Array:
+    """Uncertainty of the duct's share, (P,): so many deviations of the balance, and what that of the thrust moves."""
     T, more = points.thrust_N / points.density_kg_m3, np.log1p(u_thrust / np.abs(points.thrust_N))
     at = np.array([duct.share_at(T * np.exp(k * more), points.airspeed_m_s) for k in (-1.0, 0.0, 1.0)])
     moved = np.fmax(np.abs(at[0] - at[1]), np.abs(at[2] - at[1]))
-    return np.where(np.isnan(moved), np.abs(points.duct_share), np.hypot(SHARE, moved))
+    return np.where(np.isnan(moved), np.abs(points.duct_share), np.hypot(times * SHARE, moved))
 
 
 def loads_of(points: Dataset, D: float, u: Array, J_axial: Array | None = None) -> dict[str, Array]:
