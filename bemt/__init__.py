@@ -14,46 +14,68 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.3.0"
 
 if TYPE_CHECKING:
-    from bemt.app.library import Answer as Answer
-    from bemt.app.library import Propeller as Propeller
-    from bemt.app.library import calibrate_rotor as calibrate_rotor
-    from bemt.app.library import cite as cite
-    from bemt.app.library import compare as compare
-    from bemt.app.library import design as design
-    from bemt.app.library import diagnose as diagnose
-    from bemt.app.library import drive as drive
-    from bemt.app.library import estimate as estimate
-    from bemt.app.library import export as export
-    from bemt.app.library import load as load
-    from bemt.app.library import plan as plan
-    from bemt.app.library import propeller as propeller
-    from bemt.app.library import read as read
-    from bemt.app.library import report as report
-    from bemt.app.library import validate as validate
-    from bemt.app.library.choices import choose as choose
+    from bemt.app.actions import completion as completion
+    from bemt.app.actions import ui as ui
     from bemt.base.errors import InputError as InputError
+    from bemt.data.actions import fetch as fetch
+    from bemt.data.actions import read as read
+    from bemt.judge.actions import calibrate_rotor as calibrate_rotor
+    from bemt.judge.actions import compare as compare
+    from bemt.judge.actions import diagnose as diagnose
+    from bemt.judge.actions import plan as plan
+    from bemt.judge.actions import prove as prove
+    from bemt.judge.diagnose.ask import Answer as Answer
+    from bemt.judge.import_files import import_ as import_
     from bemt.physics.dataset import Dataset as Dataset
+    from bemt.results.actions import effects as effects
+    from bemt.results.actions import report as report
+    from bemt.results.actions import sweep as sweep
+    from bemt.rotors.actions import calibrate as calibrate
+    from bemt.rotors.actions import cite as cite
+    from bemt.rotors.actions import estimate as estimate
+    from bemt.rotors.actions import new as new
+    from bemt.rotors.actions import stations as stations
+    from bemt.rotors.actions import validate as validate
+    from bemt.rotors.propeller import Propeller as Propeller
+    from bemt.rotors.propeller import load as load
+    from bemt.rotors.propeller import propeller as propeller
+    from bemt.tools.cfd.actions import cfd as cfd
+    from bemt.tools.drive.actions import drive as drive
+    from bemt.tools.drive.actions import map as map
+    from bemt.tools.drive.actions import motor as motor
+    from bemt.tools.drive.actions import thrusters as thrusters
+    from bemt.tools.exports.actions import export as export
 
-_HOMES = {"InputError": "bemt.base.errors", "Dataset": "bemt.physics.dataset", "choose": "bemt.app.library.choices"}
-_NAMES = (
-    "Answer", "Dataset", "InputError", "Propeller", "calibrate_rotor", "choose", "cite", "compare", "design",
-    "diagnose", "drive", "estimate", "export", "load", "plan", "propeller", "read", "report", "validate",
-)  # fmt: skip
-__all__ = ["__version__", *_NAMES]
+_OBJECTS = {
+    "Answer": "bemt.judge.diagnose.ask", "Dataset": "bemt.physics.dataset", "InputError": "bemt.base.errors",
+    "Propeller": "bemt.rotors.propeller", "load": "bemt.rotors.propeller", "propeller": "bemt.rotors.propeller",
+    "read": "bemt.data.actions",
+}  # fmt: skip
+"""Classes, and what makes them; every other name is an action, which is a command, too."""
+
+
+def _homes() -> dict[str, str]:
+    """Where each public name is, ``module:name``."""
+    from bemt.app import registry
+
+    actions = {registry.python_name(command): where for command, where in registry.homes().items()}
+    return actions | {name: f"{module}:{name}" for name, module in _OBJECTS.items()}
 
 
 def __getattr__(name: str) -> Any:
     """Load a name of the public API on first use."""
-    if name == "library":  # the home of most names, as their help says
-        import bemt.app.library
+    if name.startswith("__"):
+        raise AttributeError(name)
+    found = _homes()
+    if name not in found:
+        from bemt.base.action import did_you_mean
 
-        return bemt.app.library
-    if name not in _NAMES:
-        raise AttributeError(f"module 'bemt' has no attribute {name!r}; it offers {', '.join(_NAMES)}")
-    import importlib
+        near = did_you_mean(name, found) or f" It offers {', '.join(sorted(found))}."
+        raise AttributeError(f"module 'bemt' has no attribute {name!r}.{near}")
+    from bemt.base.plugins import load
 
-    return getattr(importlib.import_module(_HOMES.get(name, "bemt.app.library")), name)
+    return load(found[name])
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(["__version__", *_homes()])

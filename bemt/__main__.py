@@ -2,7 +2,7 @@
 
 import sys
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

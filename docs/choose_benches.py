@@ -20,9 +20,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from bemt.base.units import G0, INCH
-from bemt.data.readers._uiuc_names import class_of, parse_file_name
-from bemt.tools.design import choose
+from bemt.data.readers.uiuc_names import class_of, parse_file_name
 from bemt.tools.design.motors_file import KnownMotor
+from bemt.tools.design.search import choose
 
 Array = NDArray[np.float64]
 LBF = 4.4482216

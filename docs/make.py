@@ -39,13 +39,30 @@ def numbers(text: str) -> str:
     """Fill in the constants of the tables under "The numbers"."""
 
     def now(row: re.Match[str]) -> str:
-        value = getattr(importlib.import_module(f"bemt.diagnose.{row[1]}"), row[2])
+        value = getattr(importlib.import_module(f"bemt.judge.diagnose.{row[1]}"), row[2])
         return f"| `{row[1]}.{row[2]}` | `{value!r}` |"
 
     rows = "".join(f"| {name} | {value:g} |\n" for name, value in PRIORS.items())
     head = "| nuisance | standard deviation |\n|---|---|\n"
     text = re.sub(re.escape(head) + r"(\|.*\n)*", lambda _: head + rows, text)
     return re.sub(r"^\| `(\w+)\.(\w+)` \| `[^`]+` \|", now, text, flags=re.M)
+
+
+def commands(text: str) -> str:
+    """Fill in the table of the commands, from their declarations."""
+    from bemt.app import registry
+    from bemt.app.face import described, parameters
+    from bemt.base.action import about
+
+    known = registry.homes()
+    names = [name for name in registry.ORDER if name in known]
+    rows = ["| type | it does | options that people use |", "|---|---|---|"]
+    for name in [*names, *sorted(set(known) - set(names))]:
+        function = registry.find(name)
+        told, lab = about(function), "" if name in names else "lab "
+        options = [f"`{p.option}`" for p in parameters(function) if p.name in told.common and p.name not in told.words]
+        rows.append(f"| `bemt {lab}{told.example}` | {described(function)[0].rstrip('.')} | {' '.join(options)} |")
+    return re.sub(r"(?<=\n)\| type \|.*?\n(?=\n)", lambda _: "\n".join(rows) + "\n", text, count=1, flags=re.S)
 
 
 def shipped() -> list[Case]:
@@ -252,6 +269,8 @@ def main() -> None:
 
     page = DOCS / "diagnosis.md"
     page.write_text(numbers(page.read_text(encoding="utf-8")), encoding="utf-8")
+    page = DOCS / "command_line.md"
+    page.write_text(commands(page.read_text(encoding="utf-8")), encoding="utf-8")
     (DOCS / "reference_files.md").write_text(files(), encoding="utf-8")
     (DOCS / "effects.md").write_text(effects_list.markdown(), encoding="utf-8")
     cases = shipped()

@@ -51,7 +51,7 @@ def answer(name: str) -> str:
     """One row of the table."""
     from test_mistakes import RUNS
 
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
 
     make, _, words = RUNS[name]
     typed = make(put)

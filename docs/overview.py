@@ -46,24 +46,24 @@ LIMITS = (0.7, 1.5)
 def thrusts(ax: Any) -> dict[str, float]:
     """Thrust of the five cases, each as a ratio to its recorded CFD value; returns ours in newtons."""
     order = ["ds30", "prop_14x8", "prop_12x6", "prop_10x5", "prop_8x5"]
-    cases = {c["name"]: c for c in sweep([ROOT / "cases" / name for name in order])["cases"]}
+    cases = {c.name: c for c in sweep([ROOT / "cases" / name for name in order]).cases}
     ours = {}
     for y, name in enumerate(order):
         rows: dict[str, Any] = {}
-        for row in cases[name]["rows"]:
-            rows.setdefault(row["source"], row)
-        base = rows["cfd"]["thrust_N"]
-        ours[name] = rows["bemt"]["thrust_N"]
+        for row in cases[name].rows:
+            rows.setdefault(row.source, row)
+        base = rows["cfd"].thrust_N
+        ours[name] = rows["bemt"].thrust_N
         for source in ("cfd", "vendor", "bench", "k1k2", "bemt"):
             if source not in rows:
                 continue
-            at, u, look = rows[source]["thrust_N"] / base, rows[source].get("u"), LOOK[source]
+            at, u, look = rows[source].thrust_N / base, rows[source].u, LOOK[source]
             lane = y + LANE.get(source, 0.0)
             if at < LIMITS[0]:  # stands at the edge with its value: one outlier does not flatten the rest
                 ax.plot(LIMITS[0] + 0.015, lane, ls="none", **{**look, "marker": "<"})
                 ax.text(LIMITS[0] + 0.035, lane, f"{at:.2f}", va="center", fontsize=8)
                 continue
-            if isinstance(u, float):
+            if np.isfinite(u):
                 ax.plot([at - u / base, at + u / base], [lane, lane], lw=6, alpha=0.3, color=look["color"],
                         solid_capstyle="butt")  # fmt: skip
             ax.plot(at, lane, ls="none", **look)

@@ -20,23 +20,28 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 LINK = re.compile(r"(?<=\]\()([^)\s#]+)(#[^)\s]*)?(?=\))")
 PLACES = {"README.md": "index.md"}  # other files keep their path; those of docs/ are at the top
+
+
+def actions() -> tuple[str, ...]:
+    """Dotted names of all actions."""
+    from bemt.app import registry
+
+    return tuple(where.replace(":", ".") for where in registry.homes().values())
+
+
 API = {  # page: title, introduction, names
     "api_propeller.md": ("Propellers", "`import bemt` loads nothing else until it is used.", (
-        "bemt.app.library.rotors.propeller", "bemt.app.library.rotors.load", "bemt.app.library.rotors.Propeller")),
-    "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on.", (
-        *(f"bemt.app.library.answers.{n}" for n in ("read", "diagnose", "Answer", "compare", "drive", "validate")),
-        *(f"bemt.app.library.actions.{n}" for n in ("estimate", "plan", "TestPlan", "calibrate_rotor",
-         "CalibratedRotor",
-                                                "export", "ExportedCase", "report", "cite")),
-        "bemt.app.library.blades.design", "bemt.tools.design.blade_design.Design",
-        "bemt.rotors.case.sources.Source",
-        "bemt.judge.diagnose.contrast.Contrast", "bemt.tools.drive.drive_result.DriveResult",
-        "bemt.tools.drive.drive_result.DriveBand")),
+        "bemt.rotors.propeller.propeller", "bemt.rotors.propeller.load", "bemt.rotors.propeller.Propeller")),
+    "api_answers.md": ("Questions", "Each is `bemt.read`, `bemt.diagnose` and so on, and a command of that name.", (
+        "bemt.data.actions.read", *actions(), "bemt.judge.diagnose.ask.Answer",
+        "bemt.judge.diagnose.rotor_calibration.CalibratedRotor", "bemt.judge.diagnose.contrast.Contrast",
+        "bemt.tools.drive.drive_result.DriveResult", "bemt.tools.drive.drive_result.DriveBand",
+        "bemt.tools.design.blade_design.Design", "bemt.rotors.case.sources.Source")),
     "api_dataset.md": ("Dataset", "What every source gives and every question takes.", (
         "bemt.physics.dataset.points", "bemt.physics.dataset.make", "bemt.base.errors.InputError",
         "bemt.base.errors.Fault")),
     "api_contracts.md": ("Plug-in contracts", "One file each, found by scanning; [examples](adding.md).", (
-        "bemt.physics.effects.base", "bemt.data.readers", "bemt.tools.exports.base", "bemt.app.commands")),
+        "bemt.physics.effects.base", "bemt.data.readers", "bemt.tools.exports.base", "bemt.base.action")),
 }  # fmt: skip
 PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Start": ("index.md", "quickstart.md", "people.md", "gallery.md"),
@@ -108,19 +113,21 @@ def relinked(text: str, source: Path) -> str:
 
 
 def commands() -> str:
-    """Page of all commands, from their parsers."""
-    from bemt.app.commands.cli import GROUPS, build_parser
+    """Page of all commands, from their declarations."""
+    from bemt.app import registry
+    from bemt.app.face import described, parser_of
+    from bemt.base.action import about
 
-    parser = build_parser()
-    groups: dict[str, list[str]] = {name: [] for name in GROUPS}
-    for name, module in parser.found.items():
-        one = parser.parsers[name]
-        rows = [f"## {name}", "", f"{one.description}", "", "```sh", f"bemt {module.EXAMPLE}", "```", ""]
-        table = [row for action in one._actions if (row := option(action))]
-        rows += ["| argument | does |", "|---|---|", *table, ""] if table else []
-        groups.setdefault(module.GROUP, []).extend(rows)
+    groups: dict[str, list[str]] = {}
+    for name in sorted(registry.homes()):
+        function = registry.find(name)
+        told, prog = about(function), "bemt" if name in registry.ORDER else "bemt lab"
+        rows = [f"## {name}", "", described(function)[0], "", "```sh", f"{prog} {told.example}", "```", ""]
+        table = [row for action in parser_of(function, everything=True)._actions if (row := option(action))]
+        groups.setdefault(told.group, []).extend([*rows, "| argument | does |", "|---|---|", *table, ""])
     lines = ["# Commands", "", "`bemt COMMAND`, or `python -m bemt COMMAND`. Exit codes: 0 fine, 1 out of tolerance or "
-             "unconverged, 2 usage or input, 3 internal.", ""]  # fmt: skip
+             "unconverged, 2 usage or input, 3 internal. The library has each of them, with the same words.",
+             ""]  # fmt: skip
     for title, rows in groups.items():
         lines += [f"**{title}**: " + ", ".join(f"[{r[3:]}](#{r[3:]})" for r in rows if r.startswith("## ")), ""]
     return "\n".join([*lines, *(row for rows in groups.values() for row in rows)])

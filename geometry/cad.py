@@ -312,7 +312,7 @@ def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
     vane = _one(vane.intersect(between), "stator")
     out = [("stator", "centre_body", body)]
     for k in range(plan.stator.B):
-        turned = vane.rotate(cq.Vector(), cq.Vector(0, 0, 1), 360.0 * k / plan.stator.B)  # no shared faces: each has a name
+        turned = vane.rotate(cq.Vector(), cq.Vector(0, 0, 1), 360.0 * k / plan.stator.B)  # copied: faces have names
         out.append(("stator", f"vane_{k + 1}", turned))
     return out
 

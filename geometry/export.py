@@ -293,7 +293,8 @@ def _flow(
     _write_step(whole, path, unit)
     back = cq.importers.importStep(str(path)).solids().vals()
     if len(back) != 1 or not back[0].isValid() or abs(back[0].Volume() / air.Volume() - 1.0) > 1e-4:
-        raise GeometryError([(path.name, f"{len(back)} solids when read back", "one valid solid of the same volume", "")])
+        got = f"{len(back)} solids when read back"
+        raise GeometryError([(path.name, got, "one valid solid of the same volume", "")])
     return {"path": path.name, "format": "flow", "unit": unit, "watertight": True,
             "surfaces": [{"name": "flow", "volume_m3": air.Volume() * 1e-9}], "solids": ["flow"],
             "faces": sorted({word for _, word in faces})}  # fmt: skip

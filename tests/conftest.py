@@ -84,7 +84,7 @@ _SOLIDS: dict[object, MeshModel] = {}
 def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Mesh a rotor that is bit for bit one that was meshed before no second time; a command reads its case anew."""
     from bemt.tools.cfd.openfoam import write
-    from geometry import export
+    from bemt.tools.exports import printing
     from geometry.mesh import build
 
     def once(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
@@ -94,7 +94,7 @@ def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return _SOLIDS[key]
 
     monkeypatch.setattr(write, "build", once)
-    monkeypatch.setattr(export, "build", once)
+    monkeypatch.setattr(printing, "build", once)
 
 
 @pytest.fixture(scope="session")

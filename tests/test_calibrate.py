@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.physics import coefficients as co
 from bemt.rotors import k1k2_calibration as calibrate

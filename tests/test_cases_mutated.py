@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,14 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.cfd_setup import GRID_FLOOR
 from bemt.tools.cfd.balance import BALANCE_LIMIT, balance_of
 from bemt.tools.cfd.campaign import run_campaign
 from bemt.tools.cfd.openfoam.write import settings_of
-from bemt.tools.cfd.record import COLUMNS, CampaignRecord, grid_studies, grid_uncertainty
+from bemt.tools.cfd.record import CampaignRecord, grid_studies, grid_uncertainty
+from bemt.tools.cfd.rows import COLUMNS, RunRow, run_of
 from bemt.tools.cfd.schema import load_campaign
 from bemt.tools.cfd.start import StartField, splice
 from bemt.tools.cfd.summary import _Bemt, summary
@@ -407,15 +409,15 @@ def test_a_run_that_drifts_is_nan_flagged_and_its_history_kept(project: Path, tm
     path = write(tmp_path / "c", project, TWO)
     record = run_campaign(load_campaign(path), tmp_path / "w", only=1, ranks=1)
     (row,) = record.rows
-    assert row["converged"] == 0 and math.isnan(row["thrust_N"]) and math.isnan(row["u_thrust_N"])
-    assert row["drift_thrust"] == pytest.approx(0.18, abs=0.02)
+    assert row.converged == 0 and math.isnan(row.thrust_N) and math.isnan(row.u_thrust_N)
+    assert row.drift_thrust == pytest.approx(0.18, abs=0.02)
     (history,) = (path.parent / "histories").iterdir()
     assert len(history.read_text().splitlines()) == 31
     manifest = json.loads((path.parent / "manifest.json").read_text())
-    assert [item["run"] for item in manifest["not_converged"]] == [row["run"]]
+    assert [item["run"] for item in manifest["not_converged"]] == [row.run]
     solver.write_text("#!/bin/sh\necho 'FOAM FATAL ERROR: negative' ; exit 1\n")
     record = run_campaign(load_campaign(path), tmp_path / "w2", only=2, ranks=1)
-    assert [r["converged"] for r in record.rows] == [0, 0] and len(record.rows) == 2
+    assert [r.converged for r in record.rows] == [0, 0] and len(record.rows) == 2
 
 
 def test_a_run_that_leaks_is_nan_flagged_and_says_where(project: Path, tmp_path: Path, programs: Path) -> None:
@@ -458,26 +460,20 @@ def test_a_run_that_a_campaign_beside_has_is_taken_over(project: Path, tmp_path:
     second = load_campaign(write(tmp_path / "all" / "b", project, TWO.replace("[6000, 9000]", "[9000]")))
     run_campaign(first, tmp_path / "w", ranks=1)
     record = run_campaign(second, tmp_path / "w", ranks=1)
-    assert calls(programs, "simpleFoam") == 2 and [row["rpm"] for row in record.rows] == [9000]
-    found = record.rows[0]["balance_mass"]
+    assert calls(programs, "simpleFoam") == 2 and [row.rpm for row in record.rows] == [9000]
+    found = record.rows[0].balance_mass
     path = first.path.parent / "recording.csv"  # as if it had been made before the balance was checked
     path.write_text(path.read_text().replace(f",{float(found):.7g},", ",,"))
     (second.path.parent / "recording.csv").unlink()
-    assert any(math.isnan(old["balance_mass"]) for old in CampaignRecord(first).rows)
+    assert any(math.isnan(old.balance_mass) for old in CampaignRecord(first).rows)
     run_campaign(second, tmp_path / "w", ranks=1)
     assert calls(programs, "simpleFoam") == 3, "it does not count as evidence: it is run"
 
 
-def row(level: float, thrust: float, **more: Any) -> dict[str, Any]:
+def row(level: float, thrust: float, **more: Any) -> RunRow:
     base = {"rpm": 9000.0, "airspeed_m_s": 0.0, "solver": "incompressible", "gas": "", "converged": 1.0}
-    return {
-        **base,
-        "level": level,
-        "cells": 1e4 * 8 ** (level - 5),
-        "thrust_N": thrust,
-        "torque_Nm": 0.02 * thrust,
-        **more,
-    }
+    cells = 1e4 * 8 ** (level - 5)
+    return RunRow(**{**base, "level": level, "cells": cells, "thrust_N": thrust, "torque_Nm": 0.02 * thrust, **more})
 
 
 def test_three_levels_make_a_grid_study() -> None:
@@ -485,13 +481,13 @@ def test_three_levels_make_a_grid_study() -> None:
     sizes = {level: 2.0 ** (-(level - 5)) for level in (4.5, 5.0, 5.5, 6.0)}
     rows = [row(level, 20.0 + 2.0 * h**2) for level, h in sizes.items()] + [row(5.0, 30.0, airspeed_m_s=9.0)]
     (study,) = grid_studies(rows)
-    found = study["thrust_N"]
-    assert study["levels"] == [6.0, 5.5, 5.0] and study["ratios"] == pytest.approx([math.sqrt(2)] * 2)
-    assert found["order"] == pytest.approx(2.0) and found["extrapolated"] == pytest.approx(20.0) and not found["flags"]
-    assert len(found["values"]) == 3
+    found = study.thrust_N
+    assert study.levels == (6.0, 5.5, 5.0) and study.ratios == pytest.approx([math.sqrt(2)] * 2)
+    assert found.order == pytest.approx(2.0) and found.extrapolated == pytest.approx(20.0) and not found.flags
+    assert len(found.values) == 3
     for level, h in sizes.items():
-        assert found["u_relative"][f"{level:g}"] >= 2.0 * h**2 / (20.0 + 2.0 * h**2), "covers the distance to the limit"
-    assert grid_uncertainty([study], row(5.0, 7.0))["thrust_N"] == found["u_relative"]["5"]
+        assert found.u_relative[f"{level:g}"] >= 2.0 * h**2 / (20.0 + 2.0 * h**2), "covers the distance to the limit"
+    assert grid_uncertainty([study], row(5.0, 7.0))["thrust_N"] == found.u_relative["5"]
     assert grid_uncertainty([study], row(4.0, 7.0)) == {}
 
 
@@ -645,9 +641,9 @@ def test_beside_a_run_stands_the_rotor_of_that_run(project: Path, tmp_path: Path
     """Gap as in the grid; vanes only where the sector holds them."""
     for name in ("ds30_spinner", "ds30_vanes"):
         shutil.copytree(project / "reports" / "cfd" / name, tmp_path / name)
-    bare, vaned = (c["rows"] for c in summary(tmp_path)["campaigns"])
+    bare, vaned = (c.rows for c in summary(tmp_path).campaigns)
     thrust = {
-        (name, float(row["tip_gap_mm"]) > 0.1): row["bemt_thrust_N"]
+        (name, row.run.tip_gap_mm > 0.1): row.bemt_thrust_N
         for name, rows in (("bare", bare), ("vaned", vaned))
         for row in rows
     }
@@ -662,6 +658,7 @@ def test_beside_a_run_in_oblique_wind_stands_the_rotor_in_that_wind(project: Pat
     campaign = load_campaign(project / "reports" / "cfd" / "prop_8x5_skew")
     with (campaign.path.parent / "recording.csv").open(encoding="utf-8") as file:
         row = next(r for r in csv.DictReader(file) if r["sideslip_deg"] == "60")
-    along = row | {"sideslip_deg": "0", "airspeed_m_s": str(0.5 * float(row["airspeed_m_s"]))}
+    oblique = run_of(row)
+    along = replace(oblique, sideslip_deg=0.0, airspeed_m_s=0.5 * oblique.airspeed_m_s)
     bemt = _Bemt()
-    assert bemt.solve(campaign, row).T[0] > 1.02 * bemt.solve(campaign, along).T[0]
+    assert bemt.solve(campaign, oblique).T[0] > 1.02 * bemt.solve(campaign, along).T[0]

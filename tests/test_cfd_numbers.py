@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,10 @@ from hypothesis import strategies as st
 
 from bemt.base.averaging import keep_last, relation, revolution_average, steady_average, time_steps
 from bemt.base.errors import InputError
+from bemt.base.tables import json_text
 from bemt.data.recordings import audit as au
-from bemt.data.recordings.audit import STATUSES, AuditLine, CfdFacts, audit, combined
-from bemt.data.recordings.audit_remarks import audit_rows, facts_from_remark
+from bemt.data.recordings.audit import STATUSES, Audit, AuditLine, CfdFacts, audit, combined
+from bemt.data.recordings.audit_remarks import facts_from_remark
 from bemt.data.recordings.grid_study import grid_study, ratios
 
 
@@ -446,16 +448,9 @@ def test_other_words_say_nothing() -> None:
     assert facts_from_remark("a nice picture; ran on Tuesday; the propeller is 8 in") == replace(CfdFacts())
 
 
-def test_rows_of_a_sweep_are_audited_by_their_remarks() -> None:
-    row = {
-        "source": "cfd",
-        "label": "cfd 2.6 kgf",
-        "rpm": 20000.0,
-        "airspeed_m_s": 0.0,
-        "CT": 0.11,
-        "M_tip": 0.63,
-        "remark": THESIS,
-    }
-    found = audit_rows([row, {**row, "source": "bench"}, {**row, "label": "b", "CT": None}], 0.2032, 0.127, False)
-    assert [item["reference"] for item in found] == ["cfd 2.6 kgf", "b"]
-    assert [entry["topic"] for entry in found[0]["lines"]] == TOPICS
+@pytest.mark.parametrize("CT", [0.11, math.nan])
+def test_a_recorded_value_is_audited_by_its_remark(CT: float) -> None:
+    known = CfdFacts(M_tip=0.63, J=0.0, pitch_over_D=0.625, CT=CT, ducted=False)
+    found = Audit.of("cfd 2.6 kgf", facts_from_remark(THESIS, known))
+    assert found.reference == "cfd 2.6 kgf" and [line.topic for line in found.lines] == TOPICS
+    assert Audit.from_document(json.loads(json_text(found.document()))).lines[0].status == found.lines[0].status

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.readers.cfd_run import RunToml, toml_text
 from bemt.data.recordings.cfd_run import assemble
@@ -182,7 +182,7 @@ def test_every_program_becomes_the_same_run(
     name: str, put: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make, options = RUNS[name]
-    assert main(["import", *make(put), *options, "--airspeed", "0", "--out", "out/run.toml", "--json"]) == 0
+    assert main(["import", *make(put), *options, "--airspeed-m-s", "0", "--out", "out/run.toml", "--json"]) == 0
     (run,) = json.loads(capsys.readouterr().out)["runs"]
     last = run["points"][-1]
     duct = "report" in name
@@ -482,7 +482,7 @@ def ds30(put: Callable[..., Path], folder: str = "") -> list[str]:
     return [f"{folder}thrust-rfile.out", f"{folder}torque-rfile.out"]
 
 
-DS30 = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m", "--zones", "rotor,duct", "--airspeed", "0"]
+DS30 = ["--rpm", "55000", "--unit", "thrust=N", "--unit", "torque=N m", "--zones", "rotor,duct", "--airspeed-m-s", "0"]
 
 
 def test_one_point_stands_beside_bemt_on_one_screen(
@@ -577,10 +577,10 @@ def test_the_shared_exports_become_runs(shared_data: Path) -> None:
 
 def test_a_run_is_replaced_and_no_other_file(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
     files = fluent(put)
-    args = ["import", *files, "--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m", "--airspeed", "0"]
+    args = ["import", *files, "--rpm", "8000", "--unit", "thrust=N", "--unit", "torque=N m", "--airspeed-m-s", "0"]
     assert main([*args, "--out", "run.toml"]) == 0
     first = Path("run.toml").read_text()
-    assert main([*args, "--density", "1.1", "--out", "run.toml"]) == 0 and Path("run.toml").read_text() != first
+    assert main([*args, "--density-kg-m3", "1.1", "--out", "run.toml"]) == 0 and Path("run.toml").read_text() != first
     case = put("case.toml", 'schema = "bemt.case/1"\n')
     assert main([*args, "--out", "case.toml"]) == 2 and "no run" in capsys.readouterr().err
     assert case.read_text() == 'schema = "bemt.case/1"\n'

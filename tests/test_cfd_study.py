@@ -146,9 +146,9 @@ def runs(tmp_path: Path) -> list[str]:
 
 def is_the_study(found: Dataset) -> None:
     assert len(found) == 1
-    thrust = next(s for s in found.provenance["studies"] if s["channel"] == "thrust_N")
-    assert thrust["order"] == pytest.approx(2.22, abs=0.005)
-    assert thrust["extrapolated"] == pytest.approx(7.671, abs=0.001)
+    thrust = next(s for s in found.provenance["studies"] if s.channel == "thrust_N")
+    assert thrust.order == pytest.approx(2.22, abs=0.005)
+    assert thrust.extrapolated == pytest.approx(7.671, abs=0.001)
     assert found["thrust_N"][0] == pytest.approx(7.57, rel=1e-4)
     assert found.u["thrust_N"][0] / 7.57 == pytest.approx(0.0146, abs=0.0003)
     assert not any("no grid study" in note for note in found.notes)
@@ -206,8 +206,8 @@ def test_the_order_and_the_limit_of_a_power_law_come_back(order: float) -> None:
     cells = np.array([0.4e6, 1.5e6, 7e6])
     d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": 7.0 * (1.0 - 30.0 * cells ** (-order / 3.0))})
     (study,) = by_grid(d, cells).provenance["studies"]
-    assert study["order"] == pytest.approx(order, rel=1e-6)
-    assert study["extrapolated"] == pytest.approx(7.0, rel=1e-6)
+    assert study.order == pytest.approx(order, rel=1e-6)
+    assert study.extrapolated == pytest.approx(7.0, rel=1e-6)
 
 
 def test_one_grid_keeps_the_floor_and_runs_of_unlike_conditions_are_no_study(tmp_path: Path, runs: list[str]) -> None:
@@ -232,5 +232,5 @@ def test_what_is_neither_a_run_nor_grids_is_refused(tmp_path: Path, wrong: str) 
 def test_numbers_that_no_grid_gives_are_no_study() -> None:
     d = Dataset("cfd", "a", {"rpm": [6e3] * 2, "thrust_N": [0.0, 7.5], "torque_Nm": [0.1, math.nan]})
     found = by_grid(d, np.array([1e6, 8e6]))
-    assert found.provenance["studies"] == []
+    assert found.provenance["studies"] == ()
     assert found.u["thrust_N"][0] == pytest.approx(7.5 * grid_floor("thrust_N", False))

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.tools.design import choose
 from bemt.tools.design.answer import best_of_each, front
 from bemt.tools.design.motors_file import KnownMotor, read_motors
+from bemt.tools.design.search import choose
 from bemt.tools.drive import drive_result
 
 FEW = ("9x6", "10x4.5", "11x5.5", "10x7")
@@ -95,7 +95,7 @@ def test_the_stated_probability_is_met_by_makers_not_calibrated_on(shared_data, 
 
 
 def test_an_unreachable_target_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["choose", "--thrust", "60", "--cells", "3", "--kv", "900", "--labels", "10x4.5", "9x6"]
+    words = ["choose", "--thrust-N", "60", "--cells", "3", "--kv", "900", "--labels", "10x4.5", "9x6"]
     assert main(words) == 1
     assert "none meets it" in capsys.readouterr().out
 
@@ -186,7 +186,7 @@ def test_the_nominal_thrust_is_met_as_often_as_not(motor: KnownMotor) -> None:
 def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     words = [
         "choose",
-        "--thrust",
+        "--thrust-N",
         "6",
         "--cells",
         "3",

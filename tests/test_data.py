@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base import cache, folders
 from bemt.base.errors import InputError
 from bemt.data.recordings import archive as data_archive
@@ -121,7 +121,7 @@ def left(folder: Path) -> set[str]:
 
 def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
     assert folders.find_data("uiuc") is None
-    assert cli.main(["data", "uiuc", "--url", url(server), "--json"]) == 0
+    assert cli.main(["fetch", "uiuc", "--url", url(server), "--json"]) == 0
     doc = json.loads(capsys.readouterr().out)
     folder = no_cache_but / "data" / "uiuc"
     assert doc["schema"] == "bemt.data/1" and doc["propellers"] == 2 and doc["files"] == 4
@@ -186,9 +186,9 @@ def test_after_a_change_the_rest_is_not_glued_to_the_old_part(server, tmp_path):
 
 def test_an_address_that_does_not_answer_is_an_input_error(server, tmp_path, capsys):
     where = url(server).replace("UIUC-propDB", "elsewhere")
-    assert cli.main(["data", "uiuc", "--dir", str(tmp_path / "uiuc"), "--url", where]) == 2
+    assert cli.main(["fetch", "uiuc", "--out", str(tmp_path / "uiuc"), "--url", where]) == 2
     error = capsys.readouterr().err
-    assert "404" in error and "--from FILE.zip" in error and "Traceback" not in error
+    assert "404" in error and "--source FILE.zip" in error and "Traceback" not in error
     assert not (tmp_path / "uiuc").exists()
 
 
@@ -206,7 +206,7 @@ def test_too_much_is_refused(server, tmp_path, monkeypatch):
 def test_a_local_archive(tmp_path, capsys):
     archive = tmp_path / "mine.zip"
     archive.write_bytes(zipped(FILES))
-    assert cli.main(["data", "uiuc", "--from", str(archive), "--dir", str(tmp_path / "uiuc")]) == 0
+    assert cli.main(["fetch", "uiuc", "--source", str(archive), "--out", str(tmp_path / "uiuc")]) == 0
     out = capsys.readouterr().out
     assert "2 propellers, 4 files" in out and "first use" in out and "please cite" in out
     assert archive.exists() and left(tmp_path) == {"mine.zip", "uiuc"}
@@ -284,7 +284,7 @@ def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
     mine = folder / "volume-1" / "mine" / "notes.txt"
     mine.parent.mkdir()
     mine.write_text("days of work")
-    refused("files added or changed since (1): volume-1/mine/notes.txt", "--dir")
+    refused("files added or changed since (1): volume-1/mine/notes.txt", "--out")
     refused("notes.txt", source=None, url=url(server), refresh=True)
     assert not server.ranges and left(tmp_path) == {"a.zip", "uiuc"}  # told before anything is fetched
     assert "names" not in data.get("uiuc", folder)  # only looked at: nothing to refuse
@@ -308,14 +308,14 @@ def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
 def test_a_mirror_beside_a_local_archive_is_refused(tmp_path, capsys):
     archive = tmp_path / "a.zip"
     archive.write_bytes(zipped(FILES))
-    words = ["data", "uiuc", "--from", str(archive), "--url", "http://localhost/a.zip", "--dir", str(tmp_path / "d")]
+    words = ["fetch", "uiuc", "--source", str(archive), "--url", "http://localhost/a.zip", "--out", str(tmp_path / "d")]
     assert cli.main(words) == 2
-    assert "--url: got http://localhost/a.zip; expected none with --from" in capsys.readouterr().err
+    assert "--url: got http://localhost/a.zip; expected none with --source" in capsys.readouterr().err
     assert left(tmp_path) == {"a.zip"}
 
 
 def test_without_a_cache_a_folder_must_be_named(monkeypatch, capsys):
     monkeypatch.setenv("BEMT_CACHE", "off")
     assert cache.cache_dir() is None
-    assert cli.main(["data", "uiuc"]) == 2
-    assert "--dir DIR" in capsys.readouterr().err
+    assert cli.main(["fetch", "uiuc"]) == 2
+    assert "--out DIR" in capsys.readouterr().err

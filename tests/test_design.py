@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemt
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
@@ -170,10 +170,10 @@ def test_odd_requests_are_refused(change, where: str) -> None:
 
 
 def test_all_faults_come_at_once(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["design", "--thrust", "0", "--diameter-in", "254", "--blades", "200", "--material", "gold"]
+    words = ["design", "--thrust-N", "0", "--diameter-in", "254", "--blades", "200", "--material", "gold"]
     assert main(words) == 2
     said = capsys.readouterr().err
-    assert all(name in said for name in ("--thrust", "--diameter-in", "--blades", "--material"))
+    assert all(name in said for name in ("--thrust-N", "--diameter-in", "--blades", "--material"))
 
 
 @pytest.mark.parametrize("text", ["thrust=6,airspeed", "thrust=6,thrust=7", "airspeed=5", "speed=3", "thrust=six", ""])
@@ -185,5 +185,5 @@ def test_points_are_read_or_refused(text: str) -> None:
 
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a").write_text("x")
-    words = ["design", "--thrust", "6", "--diameter-in", "10", "--out", str(tmp_path)]
+    words = ["design", "--thrust-N", "6", "--diameter-in", "10", "--out", str(tmp_path)]
     assert main(words) == 2 and "already exists" in capsys.readouterr().err

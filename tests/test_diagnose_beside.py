@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
-from bemt.app.commands.cli import build_parser, main
+from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
 from bemt.judge.diagnose import assemble, chain, document, record
 from bemt.judge.diagnose.load import load
@@ -130,12 +130,10 @@ def test_a_case_of_the_users_own_is_not_replaced(tmp_path: Path, capsys: pytest.
 
 def test_an_option_of_several_words_may_be_given_again() -> None:
     """`--case A --case B` took the last one only, and said so nowhere."""
-    parse = build_parser().parse_args
     for words in (["--case", "a", "b", "--reference", "q"], ["--case", "a", "--case", "b", "--reference", "q"]):
-        args = parse(["diagnose", "x.csv", "y.csv", *words])
-        assert (args.case, args.reference, args.recordings) == (["a", "b"], ["q"], ["x.csv", "y.csv"])
-    assert parse(["export", "c", "--out", "o", "--format", "stl", "--format", "step"]).format == ["stl", "step"]
-    assert parse(["diagnose", "x.csv", "--case", "a"]).reference == []
+        given = parsed(["diagnose", "x.csv", "y.csv", *words])[1]
+        assert given == {"recordings": ["x.csv", "y.csv"], "case": ["a", "b"], "reference": ["q"]}
+    assert "reference" not in parsed(["diagnose", "x.csv", "--case", "a"])[1]
 
 
 def _table(path: Path, columns: dict[str, object]) -> str:
@@ -545,7 +543,7 @@ def test_force_files_of_cfd_go_straight_in(tmp_path: Path, capsys: pytest.Captur
     base = ["diagnose", *files, "--case", str(CASES / "prop_8x5"), "--json", "--quiet"]
     assert main(base) == 2
     assert "--rpm" in capsys.readouterr().err
-    assert main([*base, "--rpm", *(f"{n:g}" for n in rpm), "--airspeed", "0"]) == 0
+    assert main([*base, "--rpm", *(f"{n:g}" for n in rpm), "--airspeed-m-s", "0"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["verdict"], said["readings"]) == ("none", 6)
     assert max(abs(s["before"] / said["fit"][c]["mean"]) for c, s in said["fit"].items()) < 0.01

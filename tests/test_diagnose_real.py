@@ -14,7 +14,7 @@ import pytest
 from diagnosing import left_out
 from duct_fans import DUCT_76, FAN_76
 
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.diagnose import chain, document, record
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset
@@ -144,7 +144,7 @@ def test_the_density_of_four_kilometres_is_first_a_rotor_that_is_not_the_case_s(
 
     monkeypatch.setenv("BEMT_DATA", str(shared_data))
     items = draw_real(np.random.default_rng(0))
-    item = next(i for i in items if (i.entry["set"], i.entry["rig"]) == ("real null", "tmotor_28"))
+    item = next(i for i in items if (i.entry.set, i.entry.rig) == ("real null", "tmotor_28"))
     for name, text in item.files.items():
         (tmp_path / name).write_text(text.replace("density_kg_m3 = 1.225", f"density_kg_m3 = {density}"))
     case = load_case(tmp_path / "case.toml")

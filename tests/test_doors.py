@@ -96,10 +96,10 @@ def _sweep(case: Case, rpm: Any, V: Any) -> Answer:
     if load_case(case.path).references_path is None:
         case.path.write_text(case.path.read_text().replace("\nname =", '\nreferences = "references.csv"\nname =', 1))
     found = solve_case(load_case(case.path))
-    at = {(r["rpm"], r["airspeed_m_s"]): r for r in found["rows"] if r["source"] == "bemt"}
+    at = {(r.rpm, r.airspeed_m_s): r for r in found.of("bemt")}
     rows_of = [at[n, v] for n, v in zip(rpm, V, strict=True)]
     # its rows have no band of the torque; the comparisons have, where one was recorded
-    return [(r["thrust_N"], r["u"], r["torque_Nm"], np.nan, tuple(r["flags"])) for r in rows_of]
+    return [(r.thrust_N, r.u, r.torque_Nm, np.nan, r.flags) for r in rows_of]
 
 
 def _export(case: Case, rpm: Any, V: Any) -> Answer:
@@ -115,10 +115,10 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(curves, "_grids", lambda *_: (np.array(rpm), np.array(V), 0))
         found = curves.case_curves(case)
-    at = found["over_rpm"]
+    at = found.over_rpm
     words = propagate(case, rpm, V, bands=False).points.flags
-    assert all(any(kind in told for told in found["flags"]) for f in words for kind in f) or len(words) > 1
-    return [(at["thrust_N"][i], at["u_thrust_N"][i], at["torque_Nm"][i], at["u_torque_Nm"][i], words[i])
+    assert all(any(kind in told for told in found.flags) for f in words for kind in f) or len(words) > 1
+    return [(at["thrust_N"][i], at.u["thrust_N"][i], at["torque_Nm"][i], at.u["torque_Nm"][i], words[i])
             for i in range(len(words))]  # fmt: skip
 
 
@@ -360,7 +360,7 @@ def test_a_duct_is_said_at_every_door(tmp_path: Path) -> None:
     fan = bemt.load(path)
     words = fan.solve(55000.0, 0.0, bands=False).flags
     assert "a duct" in " ".join(words[0])
-    assert tuple(solve_case(load_case(path))["rows"][0]["flags"]) == words[0]
+    assert solve_case(load_case(path)).rows[0].flags == words[0]
     assert band_of(load_case(path), 55000.0, (0.0, 0.0)).flags == words[0]
 
 

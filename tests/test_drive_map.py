@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
@@ -131,7 +131,7 @@ def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
 
 def test_command_writes_tables_that_agree(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = log(tmp_path), tmp_path / "out"
-    assert main(["map", str(path), "--out", str(out), "--json", "--thrust", "10", "--name", "my drive"]) == 0
+    assert main(["map", str(path), "--out", str(out), "--json", "--thrust-N", "10", "--name", "my drive"]) == 0
     doc = json.loads(capsys.readouterr().out)
     assert doc["schema"] == "bemt.map/1" and doc == json.loads((out / "my drive.map.json").read_text())
     assert doc["steady_points"] == 11 and doc["held_out"]["worst_of_full_thrust"] < 0.02
@@ -236,17 +236,17 @@ def test_recordings_without_a_map_in_them_are_refused(shared_data: Path, capsys:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--thrust", "nan"), "--thrust: got nan; expected a finite number of 0 or more [N]."),
-        (("--thrust", "inf"), "--thrust: got inf"),
-        (("--thrust=-5",), "--thrust: got -5; expected a finite number of 0 or more [N]. --sign -1"),
+        (("--thrust-N", "nan"), "--thrust-N: got nan; expected a finite number of 0 or more [N]."),
+        (("--thrust-N", "inf"), "--thrust-N: got inf"),
+        (("--thrust-N=-5",), "--thrust-N: got -5; expected a finite number of 0 or more [N]. --sign -1"),
         (("--nodes", "1"), "--nodes: got 1; expected 2 or more"),
         (("--name", "../evil"), "--name: got '../evil'"),
         (("--name", ".."), "--name: got '..'"),
         (("--name", ""), "--name: got ''"),
         (("--name", "a\\b"), "--name: got"),
-        (("--voltage", "12"), "--voltage: got 12; expected none without --thrust"),
-        (("--thrust", "5", "--voltage", "-3"), "--voltage: got -3; expected a finite number above 0 [V]."),
-        (("--thrust", "5", "--voltage", "nan"), "--voltage: got nan"),
+        (("--voltage-V", "12"), "--voltage-V: got 12; expected none without --thrust-N"),
+        (("--thrust-N", "5", "--voltage-V", "-3"), "--voltage-V: got -3; expected a finite number above 0 [V]."),
+        (("--thrust-N", "5", "--voltage-V", "nan"), "--voltage-V: got nan"),
     ],
 )
 def test_bad_options_are_refused_and_nothing_is_written(
@@ -263,12 +263,12 @@ def test_bad_options_are_refused_and_nothing_is_written(
 
 def test_thrust_out_of_reach_is_told_by_the_exit_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(log(tmp_path))
-    assert main(["map", path, "--thrust", "1e9"]) == 1
+    assert main(["map", path, "--thrust-N", "1e9"]) == 1
     assert "1e+09 N: pulse width more than this drive can give" in capsys.readouterr().out
-    assert main(["map", path, "--thrust", "1e9", "--json", "--out", str(tmp_path / "out")]) == 1
+    assert main(["map", path, "--thrust-N", "1e9", "--json", "--out", str(tmp_path / "out")]) == 1
     doc = json.loads(capsys.readouterr().out)
     assert doc["answer"]["pulse_us"] is None and doc == json.loads((tmp_path / "out" / "log.map.json").read_text())
-    assert main(["map", path, "--thrust", "0", "--nodes", "2"]) == 0
+    assert main(["map", path, "--thrust-N", "0", "--nodes", "2"]) == 0
 
 
 def test_a_recording_counts_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

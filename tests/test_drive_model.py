@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.physics import effects
 from bemt.rotors.case import load_case
@@ -347,9 +347,9 @@ def test_an_airspeed_that_nothing_flies_at_is_refused_with_all_other_faults(
     project: Path, tmp_path: Path, airspeed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case, out = str(project / "cases" / "ds30"), tmp_path / "out"
-    assert main(["drive", case, f"--airspeed={airspeed}", "--off", "wind", "--out", str(out)]) == 2
+    assert main(["drive", case, f"--airspeed-m-s={airspeed}", "--off", "wind", "--out", str(out)]) == 2
     words = capsys.readouterr().err
-    assert f"--airspeed: got {airspeed}; expected a number from -100 to 300 m/s" in words
+    assert f"--airspeed-m-s: got {airspeed}; expected a number from -100 to 300 m/s" in words
     assert ("km/h?" in words) == (airspeed == "300.1")
     assert "--off: got 'wind'" in words and not out.exists()
 
@@ -457,7 +457,7 @@ def test_command(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     at = next(row for row in doc["mounting"] if abs(row["distance_m"] - 0.2) < 1e-9)
     assert at["moment_one_Nm"] == pytest.approx(5.4) and at["moment_one_kgf_m"] == pytest.approx(0.5506, abs=1e-4)
     assert {p.name for p in tmp_path.iterdir()} == {"thrusters.json", "mounting.csv", "thrusters.png"}
-    assert main(["thrusters", case, "--force", "58.8"]) == 1  # 6 kgf are beyond two of 27 N
+    assert main(["thrusters", case, "--force-N", "58.8"]) == 1  # 6 kgf are beyond two of 27 N
     assert "beyond the thrusters" in capsys.readouterr().out
 
 
@@ -467,10 +467,10 @@ def test_faults_come_all_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["thrusters", str(path)]) == 2
     words = capsys.readouterr().err
     assert all(w in words for w in ("body.nam", "thruster[0].y", "thruster[0].thrust_max_N"))
-    assert main(["thrusters", str(path), "--force=nan", "--moment=-1e300"]) == 2
+    assert main(["thrusters", str(path), "--force-N=nan", "--moment-Nm=-1e300"]) == 2
     words = capsys.readouterr().err
     limits = "expected a number from -1e+06 to 1e+06"
-    assert f"--force: got nan; {limits} N." in words and f"--moment: got -1e+300; {limits} N m." in words
+    assert f"--force-N: got nan; {limits} N." in words and f"--moment-Nm: got -1e+300; {limits} N m." in words
     assert "thruster[0].thrust_max_N" in words
     with pytest.raises(InputError, match="moment or force"):
         allocate(PAIR, 1.0, 0.0, "both")

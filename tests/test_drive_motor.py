@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.tools.drive import motor_constant as mc
 from bemt.tools.drive import motor_errors, motor_file, motor_generate, picture

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.physics import effects
 from bemt.physics.air import Air

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import bemt
-from bemt.app.commands import cli
+from bemt.app import cli
 from bemt.base.units import INCH
 from bemt.physics import k1k2
 from bemt.physics.air import Air
@@ -20,7 +20,7 @@ def told(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
 
 
 def test_the_document_is_the_library_s_answer_with_k1k2_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
-    doc = told(capsys, "10x4.7x3", "--rpm", "5000", "100", "--airspeed", "0", "30")
+    doc = told(capsys, "10x4.7x3", "--rpm", "5000", "100", "--airspeed-m-s", "0", "30")
     assert doc["schema"] == "bemt.estimate/2" and doc["given"]["blades"] == 3
     rows = doc["rows"]
     assert [(r["rpm"], r["airspeed_m_s"]) for r in rows] == [(5000, 0), (5000, 30), (100, 0), (100, 30)]
@@ -60,15 +60,18 @@ def test_labels_of_one_propeller_give_one_answer(capsys: pytest.CaptureFixture[s
         assert a["rows"] == b["rows"]
 
 
+WRONG = ("8x5x3", "--blades", "2", "--density-kg-m3", "1225")
+
+
 @pytest.mark.parametrize(("words", "message"), [
     (("10x100", "--rpm", "5000"), "Meant 10x10?"),
-    (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
-    (("8x5x3", "--blades", "2", "--density", "1225", "--rpm", "1"), "--density: got 1225; expected 0.01 to 10 kg/m3"),
+    ((*WRONG, "--rpm", "1"), "--blades: got 2; expected 3, as in 8x5x3."),
+    ((*WRONG, "--rpm", "1"), "--density-kg-m3: got 1225; expected 0.01 to 10 kg/m3"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--chord-mm: got 300; expected 0.02 to 0.4 diameters, 2.54 to 50.8"),
     (("5x3", "--rpm", "-1", "--chord-mm", "300"), "--rpm: got -1"),
     (("5x3", "--rpm", "9000", "--series", "nobody"), "--series: got 'nobody'"),
-    (("5x3", "--rpm", "1e9", "--airspeed=-300"), "--rpm: got 1e+09; expected 10 to 300000 rev/min"),
-    (("5x3", "--rpm", "1e9", "--airspeed=-300"), "--airspeed: got -300; expected -100 to 300 m/s"),
+    (("5x3", "--rpm", "1e9", "--airspeed-m-s=-300"), "--rpm: got 1e+09; expected 10 to 300000 rev/min"),
+    (("5x3", "--rpm", "1e9", "--airspeed-m-s=-300"), "--airspeed-m-s: got -300; expected -100 to 300 m/s"),
 ])  # fmt: skip
 def test_bad_input_is_refused_all_at_once(
     words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
@@ -95,15 +98,15 @@ def test_a_length_in_another_unit_is_refused_with_the_unit_that_fits(
 
 
 def test_numbers_that_are_none_come_all_at_once(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["8x5", "--rpm", "5000", "nan", "--airspeed", "inf", "--density", "nan", "--chord-mm", "nan",
+    words = ["8x5", "--rpm", "5000", "nan", "--airspeed-m-s", "inf", "--density-kg-m3", "nan", "--chord-mm", "nan",
              "--measured-pitch-in", "inf", "--series", "nobody"]  # fmt: skip
     assert cli.main(["estimate", *words]) == 2
     said = capsys.readouterr().err.splitlines()
-    heads = ["--density: got nan", "--chord-mm: got nan", "--measured-pitch-in: got inf", "--series: got 'nobody'",
-             "--rpm: got nan", "--airspeed: got inf"]  # fmt: skip
+    heads = ["--density-kg-m3: got nan", "--chord-mm: got nan", "--measured-pitch-in: got inf",
+             "--series: got 'nobody'", "--rpm: got nan", "--airspeed-m-s: got inf"]  # fmt: skip
     assert len(said) == len(heads) and all(any(line.startswith(head) for line in said) for head in heads)
-    words[words.index("--density") + 1] = "19"
+    words[words.index("--density-kg-m3") + 1] = "19"
     assert cli.main(["estimate", "8by5", *words[1:-2]]) == 2  # an unreadable label hides nothing
     said = capsys.readouterr().err.splitlines()
-    assert any(line.startswith("LABEL") for line in said) and any("--density: got 19" in line for line in said)
+    assert any(line.startswith("label") for line in said) and any("--density-kg-m3: got 19" in line for line in said)
     assert len(said) == 6

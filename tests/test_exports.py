@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
 from bemt.rotors.case import Case, load_case
@@ -170,7 +170,7 @@ def test_a_target_that_cannot_hold_what_is_asked_is_refused(
         (["xrotor", "--hold", "rotation"], ("xrotor", "direction of rotation")),
         (["su2-disk"], ("su2-disk", "ADV_RATIO")),
         (["dfdc"], ("dfdc", "open rotor")),
-        (["jsbsim", "--airspeed", "3"], ("--airspeed", "jsbsim")),
+        (["jsbsim", "--airspeed-m-s", "3"], ("--airspeed-m-s", "jsbsim")),
         (["stl", "--hold", "torque"], ("--hold", "Solids")),
         (["table", "--hold", "lift"], ("--hold", "lift")),
     ):
@@ -674,7 +674,7 @@ def test_a_scan_becomes_a_new_case_with_its_unknowns(
         str(tmp_path / "found.stl"),
         "--rpm",
         "7000",
-        "--airspeed",
+        "--airspeed-m-s",
         "4",
         "--out",
         str(out),
@@ -788,7 +788,7 @@ def test_cases_of_one_name_are_refused_before_anything_is_written(
 
 
 BAD = [("--rpm", "nan"), ("--rpm", "inf"), ("--rpm", "0"), ("--rpm", "-5"), ("--rpm", "1e6"), ("--rpm", "1e308"),
-       ("--airspeed", "1e4"), ("--airspeed", "-1"), ("--airspeed", "nan"), ("--airspeed", "1e308"),
+       ("--airspeed-m-s", "1e4"), ("--airspeed-m-s", "-1"), ("--airspeed-m-s", "nan"), ("--airspeed-m-s", "1e308"),
        ("--level", "nan"), ("--level", "3.9"), ("--sideslip-deg", "nan"), ("--sideslip-deg", "91")]  # fmt: skip
 
 
@@ -803,7 +803,7 @@ def test_numbers_of_the_flow_are_checked_as_those_of_a_case(
     told = capsys.readouterr().err
     assert told.startswith(f"{option}: got ") and "expected a number from " in told and len(told.splitlines()) == 1
     assert not out.exists()
-    key = {"--rpm": "rpm", "--airspeed": "airspeed_m_s", "--level": "level", "--sideslip-deg": "sideslip_deg"}[option]
+    key = option.removeprefix("--").replace("-", "_")
     with pytest.raises(InputError, match=f"case.toml: {key}: got "):
         settings_of(load_case(project / "cases" / "prop_8x5"), Run(**{key: float(value)}))
 
@@ -812,16 +812,16 @@ def test_all_faults_of_the_options_are_told_at_once(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     command = ["export", str(project / "cases/prop_8x5"), "--out", str(tmp_path / "o"), "--fillet-mm", "-1"]
-    assert main([*command, "--format", "openfoam", "--rpm", "nan", "--airspeed", "1000", "--level", "12"]) == 2
+    assert main([*command, "--format", "openfoam", "--rpm", "nan", "--airspeed-m-s", "1000", "--level", "12"]) == 2
     told = capsys.readouterr().err
-    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed", "--level", "fillet"]
+    assert [line.split(":")[0] for line in told.splitlines()] == ["--rpm", "--airspeed-m-s", "--level", "fillet"]
     assert "from 10 to 300000 rev/min" in told and "from 0 to 300 m/s. Looks like km/h" in told
-    assert main([*command, "--format", "stl", "obj", "--rpm", "9000", "--airspeed", "4", "--sideslip-deg", "5",
+    assert main([*command, "--format", "stl", "obj", "--rpm", "9000", "--airspeed-m-s", "4", "--sideslip-deg", "5",
                  "--level", "5", "--domain", "pipe", "--sector", "full", "--turbulence", "realizableKE",
                  "--incompressible"]) == 2  # fmt: skip
     told = capsys.readouterr().err
     assert [line.split(":")[0] for line in told.splitlines()] == [
-        "--rpm", "--airspeed", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--incompressible",
+        "--rpm", "--airspeed-m-s", "--sideslip-deg", "--level", "--domain", "--sector", "--turbulence", "--solver",
         "fillet"]  # fmt: skip
     assert told.count("expected nothing with the format stl, obj. Formats that read it: ") == 8
     assert not (tmp_path / "o").exists()
@@ -833,7 +833,7 @@ def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, 
 
     def now(formats: list[str], unit: str = "mm", solver: str | None = None) -> set[str]:
         """What is in the folder after an export, the owner's own files aside, which are as they were."""
-        export_case(case, tmp_path, formats, unit, COARSE, Run(solver=solver))
+        export_case(Job(case, unit=unit, solid=COARSE, own={"solver": solver}), tmp_path, formats)
         there = files(tmp_path)
         assert {name: there.pop(name) for name in mine} == mine
         manifest = json.loads(there.pop("manifest.json"))
@@ -858,7 +858,7 @@ def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, 
     assert {p.name for p in tmp_path.iterdir() if p.is_dir()} == {"constant"}, "no empty folders"
     edited = tmp_path / "prop_8x5.obj"
     edited.write_text("my own edit")
-    export_case(case, tmp_path, ["stl"], "mm", COARSE)
+    export_case(Job(case, solid=COARSE), tmp_path, ["stl"])
     assert edited.read_text() == "my own edit", "not what the manifest lists any more"
 
 
@@ -878,10 +878,10 @@ def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, sch
     listed = [{"path": path, "sha256": digest} for path in paths]
     (out / "manifest.json").write_text(json.dumps({"schema": schema, "files": listed}))
     before = files(tmp_path)
-    export_case(case, out, ["stl"], "mm", COARSE)
+    export_case(Job(case, solid=COARSE), out, ["stl"])
     after = files(tmp_path)
     gone = {"out/d"} if schema == "geometry.export/1" else set()
     assert {name for name in before if after.get(name) != before[name]} == {"out/manifest.json", *gone}
     for text in ("", "[]", "{}", '{"schema": "geometry.export/1", "files": [1]}', "[" * 100_000, "\xff"):
         (out / "manifest.json").write_bytes(text.encode("latin-1"))
-        export_case(case, out, ["stl"], "mm", COARSE)
+        export_case(Job(case, solid=COARSE), out, ["stl"])

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from flight_files import broken_copies
 
-from bemt.app.commands.cli import main
-from bemt.app.library.rotors import rotor_of
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.judge.diagnose.rule import decide
 from bemt.rotors.case import load_case
+from bemt.rotors.propeller import rotor_of
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import axes_of, blade, features
 from bemt.tools.flight.change import change_in
@@ -97,7 +97,7 @@ def test_rotor_of_a_flight_becomes_a_case(
     """It solves and sweeps as any case, with a narrower band that holds the truth; without mass nothing is written."""
     out, call = tmp_path / "known", ["fly", str(flights / "before_1.usdlog"), "--out-case", str(tmp_path / "known")]
     assert main(call) == 2 and main([*call, "--case", "1.8x1.2"]) == 2 and not out.exists()
-    assert main([*call, "--case", "1.8x1.2", "--mass", str(script["MASS"])]) == 0
+    assert main([*call, "--case", "1.8x1.2", "--mass-kg", str(script["MASS"])]) == 0
     wide, known = rotor_of("1.8x1.2"), rotor_of(str(out))
     rpm = identify(read_log(flights / "before_1.usdlog")).rotors["mean rpm"][0]
     a, b = (r.solve(rpm=rpm, airspeed_m_s=0.0) for r in (wide, known))
@@ -116,7 +116,7 @@ def test_mass_follows_from_healthy_flights(script: dict[str, Any], flights: Path
 def test_cut_blade_is_found_whatever_the_name(flights: Path, tmp_path: Path) -> None:
     """Content decides, and the right motor is named."""
     (tmp_path / "normal.txt").write_bytes((flights / "after.usdlog").read_bytes())
-    got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights)).judged
+    got = answer_on(read_log(tmp_path / "normal.txt"), healthy(flights), day="same").judged
     assert (got.said.verdict, got.said.effects) == ("named", ("damaged blade, motor 3",))
     assert got.accused == 0 and got.healthy == 6 and 0.0 <= got.rate95[0] < got.rate95[1] < 1.0
 
@@ -272,7 +272,7 @@ def test_betaflight_headings_of_each_tool(quote: str, tmp_path: Path) -> None:
 def test_command_prints_and_writes(flights: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Text, JSON, picture, exit codes."""
     before = [str(p) for p in sorted(flights.glob("before_*"))]
-    call = ["fly", str(flights / "after.usdlog"), "--mass", "0.035", "--healthy", *before]
+    call = ["fly", str(flights / "after.usdlog"), "--mass-kg", "0.035", "--healthy-day", "same", "--healthy", *before]
     assert main([*call, "--json", "--out", str(tmp_path / "a.png")]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["schema"] == "bemt.flight/1" and said["decision"]["effects"] == ["damaged blade, motor 3"]
@@ -443,7 +443,7 @@ def test_picture_of_a_log_without_motors() -> None:
 @pytest.mark.parametrize(("mass", "refused"), [(0.02, False), (0.2, False), (20.0, True), (1500.0, True), (0.0, True)])
 def test_a_mass_that_the_battery_cannot_lift_is_refused(mass: float, refused: bool, flights: Path) -> None:
     """A small quadrotor on one cell: 20 kg would take kilowatts; 200 g is odd, but not impossible."""
-    assert bool(mass_faults(read_log(flights / "before_1.usdlog"), mass, "--mass")) is refused
+    assert bool(mass_faults(read_log(flights / "before_1.usdlog"), mass, "--mass-kg")) is refused
 
 
 @pytest.mark.parametrize("amps", [10.0, 40.0])
@@ -453,12 +453,12 @@ def test_the_mass_that_is_just_refused_takes_the_power_that_the_log_allows(amps:
     log = FlightLog("x", "x", t, rpm=3000.0 * np.ones((1000, 4)), voltage=22.0 * ones, battery_current=amps * ones)
     area = 4 * np.pi / 4 * (170.0 / (np.pi * 50.0)) ** 2
     lifted = (2.0 * 1.225 * area * (2.0 * 22.0 * amps) ** 2) ** (1 / 3) / 9.80665
-    assert mass_faults(log, 1.01 * lifted, "--mass") and not mass_faults(log, 0.99 * lifted, "--mass")
+    assert mass_faults(log, 1.01 * lifted, "--mass-kg") and not mass_faults(log, 0.99 * lifted, "--mass-kg")
 
 
 def test_a_case_from_flights_is_solved_at_the_speed_flown(flights: Path, tmp_path: Path) -> None:
     out = tmp_path / "known"
-    words = [str(flights / "before_1.usdlog"), "--mass", "0.035", "--case", "1.8x1", "--out-case", str(out)]
+    words = [str(flights / "before_1.usdlog"), "--mass-kg", "0.035", "--case", "1.8x1", "--out-case", str(out)]
     main(["fly", *words, "--quiet"])
     log = read_log(flights / "before_1.usdlog")
     assert log.rpm is not None

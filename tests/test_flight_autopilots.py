@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flight_files import Hover, broken_copies, dataflash, ulog
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.tools.flight import log as flight_log
 from bemt.tools.flight import px4
@@ -40,7 +40,7 @@ def read(folder: Path, kind: str, flight: Hover, **more: object) -> FlightLog:
 def answered(folder: Path, kind: str, layout: str, loss: tuple[tuple[int, float], ...]) -> FlightAnswer:
     """A flight with losses beside five healthy ones."""
     calm = [read(folder, kind, Hover(layout, seconds=12.0, seed=k)) for k in range(5)]
-    return answer_on(read(folder, kind, Hover(layout, seconds=12.0, seed=9, loss=loss)), calm, 1.5)
+    return answer_on(read(folder, kind, Hover(layout, seconds=12.0, seed=9, loss=loss)), calm, 1.5, day="same")
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from test_sweep import make_case, read_grid, tree
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
 from bemt.results.sweep import sweep
@@ -68,8 +68,8 @@ def test_a_cluster_gives_the_bytes_of_this_machine(tmp_path: Path, cluster: Any,
     here = sweep([tmp_path / "cases"], tmp_path / "here", grid_format=form)
     there = sweep([tmp_path / "cases"], tmp_path / "there", grid_format=form, engine="dask",
                   scheduler=cluster.scheduler_address)  # fmt: skip
-    assert here["cases"][0]["grid"]["file"] == f"a/grid.{form}" and here["exit_code"] == 0
-    assert json_text(here) == json_text(there)
+    assert here.cases[0].grid.file == f"a/grid.{form}" and here.exit_code == 0
+    assert json_text(here.document()) == json_text(there.document())
     assert tree(tmp_path / "here") == tree(tmp_path / "there")
 
 
@@ -77,8 +77,8 @@ def test_a_cluster_gives_the_bytes_of_this_machine(tmp_path: Path, cluster: Any,
 def test_without_a_folder_only_statistics_travel(tmp_path: Path, cluster: Any, small: None) -> None:
     path = make_case(tmp_path, extra=GRID)
     there = sweep([path], engine="dask", scheduler=cluster.scheduler_address)
-    assert there["cases"][0]["grid"]["points"] == 2400
-    assert json_text(there) == json_text(sweep([path]))
+    assert there.cases[0].grid.points == 2400
+    assert json_text(there.document()) == json_text(sweep([path]).document())
 
 
 @needs_dask
@@ -111,8 +111,8 @@ def test_a_worker_killed_in_the_middle_costs_only_time(
         after = set(client.run(os.getpid).values())
     assert victim not in after and len(after) == 2
     here = sweep([path], tmp_path / "here")
-    assert there["cases"][0]["grid"]["points"] == points
-    assert json_text(here) == json_text(there)
+    assert there.cases[0].grid.points == points
+    assert json_text(here.document()) == json_text(there.document())
     assert tree(tmp_path / "here") == tree(tmp_path / "there")
 
 
@@ -152,9 +152,9 @@ def test_a_worker_that_gives_other_bits_is_refused(
 ) -> None:
     path = make_case(tmp_path / "cases", extra=GRID)
     monkeypatch.setattr(f"bemt.results.sweep.grid.dask_engine.{what}", lambda *_: "0123456789abcdef")
-    found = sweep([path], tmp_path / "out", engine="dask", scheduler=cluster.scheduler_address)["cases"][0]
-    assert found["exit_code"] == 2 and len(found["faults"]) == 1
-    assert found["faults"][0].startswith("worker tcp://") and f": {words}: got other bits" in found["faults"][0]
+    found = sweep([path], tmp_path / "out", engine="dask", scheduler=cluster.scheduler_address).cases[0]
+    assert found.exit_code == 2 and len(found.faults) == 1
+    assert found.faults[0].startswith("worker tcp://") and f": {words}: got other bits" in found.faults[0]
     assert not [p for p in (tmp_path / "out" / "one").rglob("*") if p.is_file()]
 
 
@@ -216,11 +216,11 @@ def test_small_chunks_are_put_together_and_one_grid_is_kept(tmp_path: Path, smal
 
     path = make_case(tmp_path / "cases", extra=GRID)
     first = sweep([path], tmp_path / "out")
-    assert sweep([path], tmp_path / "out", grid_format="parquet")["cases"][0]["grid"]["file"] == "one/grid.parquet"
+    assert sweep([path], tmp_path / "out", grid_format="parquet").cases[0].grid.file == "one/grid.parquet"
     assert [p.name for p in (tmp_path / "out" / "one").glob("grid*")] == ["grid.parquet"]
     found = pq.ParquetFile(tmp_path / "out" / "one" / "grid.parquet").metadata
     assert (found.num_rows, found.num_row_groups) == (2400, 1)  # of six chunks
-    assert json_text(sweep([path], tmp_path / "out")) == json_text(first)
+    assert json_text(sweep([path], tmp_path / "out").document()) == json_text(first.document())
     assert [p.name for p in (tmp_path / "out" / "one").glob("grid*")] == ["grid.csv"]
 
 

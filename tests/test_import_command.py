@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.data.recordings.choice import Choice
 from bemt.data.recordings.load import document, import_file
 
@@ -61,11 +61,11 @@ def test_schema(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) ->
 
 def test_period_and_revolutions(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
     path = put("q.out", history())
-    _, one = call(capsys, path, "--period", "0.5", "--revolutions", "1")
+    _, one = call(capsys, path, "--period-s", "0.5", "--revolutions", "1")
     assert one["files"][0]["channels"]["torque"]["averaged_over"].startswith("last 1 revolution (2.5 to 3 s, 50 rows")
-    _, many = call(capsys, path, "--period", "0.5", "--revolutions", "6")
+    _, many = call(capsys, path, "--period-s", "0.5", "--revolutions", "6")
     assert many["files"][0]["channels"]["torque"]["mean"] == pytest.approx(-0.2 - 3 * 5.0 / 300)  # start-up and all
-    _, more = call(capsys, path, "--period", "0.5", "--revolutions", "7")
+    _, more = call(capsys, path, "--period-s", "0.5", "--revolutions", "7")
     assert more["files"][0]["channels"]["torque"]["mean"] is None
     assert any("6 revolutions recorded, 7 wanted" in w for w in more["files"][0]["warnings"])
 
@@ -73,7 +73,7 @@ def test_period_and_revolutions(put: Callable[..., Path], capsys: pytest.Capture
 def test_without_a_speed_the_mean_says_that_it_holds_the_start_up(put: Callable[..., Path]) -> None:
     (file,) = document([put("q.out", history())])["files"]
     assert file["channels"]["torque"]["averaged_over"] == "all 300 rows, start-up included"
-    assert any("give --rpm or --period" in w for w in file["warnings"])
+    assert any("give --rpm or --period-s" in w for w in file["warnings"])
     assert any(w.startswith("not settled") and "torque" in w for w in file["warnings"])
 
 
@@ -126,7 +126,7 @@ def test_a_refused_file_is_2_and_the_others_are_shown(
     [
         (["--rpm", "0"], "--rpm: got 0"),
         (["--rpm", "nan"], "--rpm: got nan"),
-        (["--period", "-1"], "--period: got -1"),
+        (["--period-s", "-1"], "--period-s: got -1"),
         (["--revolutions", "2"], "--revolutions: got no speed"),
         (["--format", "nonsense"], "--format: got 'nonsense'; expected one of"),
         (["--sector", "1000"], "--sector: got 1000"),

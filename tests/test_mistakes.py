@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 
 TABLE = "rpm,thrust_N,torque_Nm\n4000,1.1,0.016\n6000,2.4,0.034\n8000,4.3,0.061\n"
 Put = Callable[[str, str], str]
@@ -56,7 +56,7 @@ def twice() -> list[str]:
 RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
     "wrong path": (lambda put: ["sweep", "mime"], 2, ("mime", "no such file or folder", "Check the path")),
     "typo in a command": (lambda put: ["swep", "mine"], 2, ("swep", "Did you mean sweep?")),
-    "typo in an option": (lambda put: ["sweep", "mine", "--tolerence", "3"], 2, ("Did you mean --tolerance?",)),
+    "typo in an option": (lambda put: ["sweep", "mine", "--tolerence", "3"], 2, ("Did you mean --tolerance-pct?",)),
     "typo in a key": (lambda put: ["sweep", changed(("pitch_in", "pich_in"))], 2,
                       ("other/case.toml", "blade.pich_in", "Did you mean pitch_in?")),
     "typo in an effect": (lambda put: ["diagnose", put("l.csv", TABLE), "--case", "mine", "--only", "tip_los"], 2,

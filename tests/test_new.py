@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bemt
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.rotors.case import case_of, fresh, load_case
 from bemt.rotors.case.unknowns import section_of
 
@@ -33,7 +33,7 @@ def test_a_folder_that_exists_is_said_to(tmp_path: Path, capsys: pytest.CaptureF
     ("words", "name"),
     [
         (["10x5"], "prop_10x5"),
-        (["8x4.5x3", "--rpm", "9000", "--airspeed", "5"], "prop_8x4.5x3"),
+        (["8x4.5x3", "--rpm", "9000", "--airspeed-m-s", "5"], "prop_8x4.5x3"),
         (["10x4.5", "--kv", "900", "--cells", "3"], "prop_10x4.5"),
         (["70mm", "--fan"], "fan_70"),
         (["--stations", "blade.csv", "--diameter-mm", "254"], "blade"),
@@ -136,8 +136,8 @@ def test_what_a_short_case_states_is_no_assumption(here: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["10by5"], "LABEL"),
-        ([], "LABEL, --stations"),
+        (["10by5"], "label"),
+        ([], "label, --stations"),
         (["10x5", "--kv", "900"], "--cells together"),
         (["--stations", "blade.csv"], "--diameter-mm"),
         (["--stations", "absent.csv", "--diameter-mm", "254"], "absent"),
@@ -165,7 +165,8 @@ def test_nobody_loses_a_case(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "1.4", "--rotors", "4", "--capacity", "3"]
+    motor = ["--kv", "900", "--cells", "3", "--mass-kg", "1.4", "--rotors", "4", "--capacity-Ah", "3"]
+    words = ["drive", "10x4.5", *motor]
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("thrust", "current", "gf/W", "throttle", "flight time", "motor's sheet", "±"))
@@ -173,7 +174,7 @@ def test_a_label_with_its_motor_needs_no_file(capsys: pytest.CaptureFixture[str]
     assert main([*words, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["schema"] == "bemt.drive.result/2" and found["hover"]["minutes"]["u"] > 0
-    assert main(["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass", "30"]) == 1
+    assert main(["drive", "10x4.5", "--kv", "900", "--cells", "3", "--mass-kg", "30"]) == 1
     assert "no hover" in capsys.readouterr().out
 
 

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.tools.cfd.openfoam import Body, Settings, Sweep, case_files
@@ -383,7 +383,7 @@ def test_vanes_of_a_sector_stand_still_and_turn_their_tails_with_the_swirl(proje
 def test_export_command_writes_a_case_beside_other_formats(project: Path, tmp_path: Path) -> None:
     out = tmp_path / "o"
     code = main(["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "stl", "openfoam", "--level",
-                 "5", "--rpm", "9000", "--airspeed", "4", "--domain", "pipe"])  # fmt: skip
+                 "5", "--rpm", "9000", "--airspeed-m-s", "4", "--domain", "pipe"])  # fmt: skip
     assert code == 0
     assert (out / "Allrun").stat().st_mode & 0o111 and (out / "prop_8x5.stl").is_file()
     assert parse((out / "0.orig" / "U").read_text())["boundaryField"]["inlet"]["type"] == "fixedValue"

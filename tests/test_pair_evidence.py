@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.judge.diagnose import form, pair_evidence
+from bemt.judge.diagnose import pair_evidence
 from bemt.judge.diagnose.explanation import NONE, Explanation
 from bemt.judge.diagnose.state import State
+from bemt.physics.effects.base import FORM
 
 PAIR = Explanation.of("ground_effect", "untwist")
 
@@ -53,10 +54,10 @@ def test_the_error_of_both_laws_is_that_of_the_whole_covariance(seed: int, mixed
             extra, k, m = s.mixed[PAIR]
             share = s.S[:, A.start + i] @ s.S[:, k] * (s.S[:, B.start + j] @ s.S[:, m]) / (4 * s.half[k] * s.half[m])
             d = d - share * extra
-        prior = sum(np.log(form.FORM[f]) for f in sizes) + log_w[A.start + i] + log_w[B.start + j]
+        prior = sum(np.log(FORM[f]) for f in sizes) + log_w[A.start + i] + log_w[B.start + j]
         return float(0.5 * s.r @ s.r - 0.5 * d @ np.linalg.solve(C, d) - 0.5 * np.linalg.slogdet(C)[1] + prior)
 
-    sizes = max(product(form.FORM, repeat=2), key=lambda f: direct(*at, f))
+    sizes = max(product(FORM, repeat=2), key=lambda f: direct(*at, f))
     expected = [[direct(i, j, sizes) for j in range(4)] for i in range(5)]
     np.testing.assert_allclose(found, expected, atol=1e-9)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = sorted((ROOT / "docs" / "people").glob("*.py"))

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.rotors.case import load_case
 from bemt.rotors.case.propagate import propagate
 from geometry.airfoil import naca4

@@ -35,6 +35,7 @@ from bemt.judge.proof import (
     truth_world,
 )
 from bemt.judge.proof.items import Bench, Item
+from bemt.judge.proof.rows import Answer, Entry, Estimate, Key, Ranked, Step
 from bemt.judge.proof.stand import Stand, covariance, full_scales, record
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
@@ -289,27 +290,27 @@ def sealed(patched: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     return out, prove.conceal(out, "tiny", 7)
 
 
-def entries(folder: Path) -> list[dict[str, Any]]:
-    return list(json.loads((folder / seal.KEY).read_text(encoding="utf-8"))["items"])
+def entries(folder: Path) -> list[Entry]:
+    return list(Key.from_document(json.loads((folder / seal.KEY).read_text(encoding="utf-8"))).items)
 
 
-def _shown(entry: dict[str, Any]) -> set[str]:
-    return {"recording.csv", "case.toml", "stations.csv"} | ({"reference.csv"} if entry["referenced"] else set())
+def _shown(entry: Entry) -> set[str]:
+    return {"recording.csv", "case.toml", "stations.csv"} | ({"reference.csv"} if entry.referenced else set())
 
 
 def test_items_are_sound_and_say_nothing_of_their_cause(sealed: tuple[Path, str]) -> None:
     out, _ = sealed
     for entry in entries(out):
-        folder = out / "items" / entry["folder"]
+        folder = out / "items" / entry.folder
         assert {p.name for p in folder.iterdir()} == _shown(entry)
-        assert ("u_thrust_N" in (folder / "recording.csv").read_text(encoding="utf-8")) == entry["stated"]
+        assert ("u_thrust_N" in (folder / "recording.csv").read_text(encoding="utf-8")) == entry.stated
         case = load_case(folder / "case.toml")
         case.rotor()
         imported = import_file(str(folder / "recording.csv"))
         assert {"thrust_N", "torque_Nm"} <= set(imported.values)
         assert np.all(np.isfinite(imported["thrust_N"]))
         words = "".join(p.read_text(encoding="utf-8") for p in folder.iterdir())
-        told = [c for c in entry["causes"] if c in words and c not in case.get("model.effects_off")]
+        told = [c for c in entry.causes if c in words and c not in case.get("model.effects_off")]
         assert not told
 
 
@@ -322,7 +323,7 @@ def test_same_seed_same_key_other_seed_other_key(sealed: tuple[Path, str], patch
 def test_seal_holds_and_a_second_proof_is_refused(sealed: tuple[Path, str]) -> None:
     out, digest = sealed
     assert seal.sha256((out / seal.KEY).read_text(encoding="utf-8")) == digest
-    assert seal.unseal(out, digest)["schema"] == "bemt.key/1"
+    assert seal.unseal(out, digest).schema == "bemt.key/1"
     with pytest.raises(InputError, match="a folder without one"):
         prove.conceal(out, "tiny", 7)
 
@@ -367,7 +368,7 @@ def test_diagnosis_sees_recording_and_case_only(sealed: tuple[Path, str], monkey
 
     monkeypatch.setattr(subprocess, "run", spy)
     answer, _ = prove.diagnose_folder(out / "items" / "0000")
-    assert answer == {"verdict": "none"}
+    assert answer.document() == {"verdict": "none"}
     (command, files, inside) = seen[0]
     assert files == _shown(entries(out)[0])
     assert not inside
@@ -378,17 +379,17 @@ def test_the_key_is_sealed_before_any_diagnosis(patched: Any, tmp_path: Path, mo
     out = tmp_path / "proof"
     order: list[bool] = []
 
-    def spy(folder: Path) -> tuple[dict[str, Any] | None, str]:
+    def spy(folder: Path) -> tuple[Answer, str]:
         text = (out / seal.KEY).read_text(encoding="utf-8")
         order.append((out / seal.SEAL).read_text(encoding="utf-8").strip() == seal.sha256(text))
-        return None, "spy"
+        return Answer(), "spy"
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
     document = prove.prove(str(out), "tiny", 3, 1)
     assert order and all(order)
-    assert any(row["met"] is False for row in document["score"])
-    assert document["schema"] == "bemt.proof/1"
-    assert {r["what"]: r["hits"] for r in document["score"]}["failed"] == len(order)
+    assert any(row.met is False for row in document.score)
+    assert document.schema == "bemt.proof/1"
+    assert {r.what: r.hits for r in document.score}["failed"] == len(order)
     assert (out / "proof.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     assert "Misses" in (out / "proof.txt").read_text(encoding="utf-8")
     # an interrupted run goes on with the key it has, and asks again only what has no answer
@@ -406,9 +407,9 @@ def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
     out, seen = tmp_path / "proof", []
     open_ = {"verdict": "insufficient", "effects": [], "ranking": [], "next_measurement": {"kind": "reference"}}
 
-    def spy(folder: Path) -> tuple[dict[str, Any] | None, str]:
+    def spy(folder: Path) -> tuple[Answer, str]:
         seen.append((folder.parent.name, folder.name))
-        return open_ if folder.name != "0001" else {**open_, "verdict": "none"}, ""
+        return Answer.from_document(open_ if folder.name != "0001" else {**open_, "verdict": "none"}), ""
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
     monkeypatch.setattr(items, "_REFERENCED", 0.0)
@@ -420,14 +421,14 @@ def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
     for name in again:
         folder = out / prove.ASKED / name
         assert (folder / "reference.csv").exists() and not (out / "items" / name / "reference.csv").exists()
-    assert any("with a reference" in row["what"] for row in document["score"])
+    assert any("with a reference" in row.what for row in document.score)
 
 
 def test_the_reference_lacks_the_cause_and_nothing_else(patched: Any) -> None:
     """A thrust cell 10 % off: the same rotor reads a tenth less in the reference, torque and points are the same."""
     bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
     item = items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
-    off = item.entry["parameters"]["thrust_gain"]["gain"]["value"]
+    off = item.entry.parameters["thrust_gain"]["gain"].value
     here, there = (
         np.genfromtxt(text.splitlines(), delimiter=",", names=True)
         for text in (item.files["recording.csv"], item.reference)
@@ -437,18 +438,22 @@ def test_the_reference_lacks_the_cause_and_nothing_else(patched: Any) -> None:
     assert abs(off) > 0.05
 
 
-def entry(kind: str, *ids: str, separation: float = 12.0, alike: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
-    return {"folder": "0000", "set": kind, "causes": list(ids), "separation": [separation] * len(ids),
-            "alike": [list(alike)] * len(ids), "variables": [["rpm"]] * len(ids), "plan": "grid_shuffled",
-            "rig": "open_0", "parameters": {i: {} for i in ids}, **more}  # fmt: skip
+def entry(kind: str, *ids: str, separation: float = 12.0, alike: tuple[str, ...] = (), **more: Any) -> Entry:
+    return Entry.from_document({
+        "folder": "0000", "set": kind, "causes": list(ids), "separation": [separation] * len(ids),
+        "alike": [list(alike)] * len(ids), "variables": [["rpm"]] * len(ids), "plan": "grid_shuffled",
+        "rig": "open_0", "parameters": {i: {} for i in ids}, **more,
+    })  # fmt: skip
 
 
-def answer(verdict: str, *effects: str, ranking: tuple[str, ...] | None = None, **more: Any) -> dict[str, Any]:
+def answer(verdict: str, *effects: str, ranking: tuple[str, ...] | None = None, **more: Any) -> Answer:
     names = ranking or (("+".join(effects),) if verdict in ("named", "sensor") else (verdict,))
     held = {"before": 4.0, "after": 1.0, "noise": 1.0, "gp_only": 1.1, "holdout_before": 4.0, "holdout_after": 1.1}
-    return {"verdict": verdict, "effects": list(effects), "probability": 0.99, "location": {"variable": "rpm"},
-            "ranking": [{"effect": n, "probability": 0.9, "parameters": {}} for n in names], "fit": {"thrust_N": held},
-            **more}  # fmt: skip
+    return Answer.from_document({
+        "verdict": verdict, "effects": list(effects), "probability": 0.99, "location": {"variable": "rpm"},
+        "ranking": [{"effect": n, "probability": 0.9, "parameters": {}} for n in names], "fit": {"thrust_N": held},
+        **more,
+    })  # fmt: skip
 
 
 SCENES = [
@@ -497,7 +502,7 @@ def test_a_tool_that_never_speaks_is_not_praised() -> None:
         (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "section"), False),
         (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "nacelle"), False),
         (entry("null"), answer("class", "untwist", "section"), False),  # a class is a claim
-        (entry("single", "untwist"), None, False),
+        (entry("single", "untwist"), Answer(), False),
     ],
 )
 def test_judgement(there: dict[str, Any], said: dict[str, Any] | None, right: bool) -> None:
@@ -507,7 +512,8 @@ def test_judgement(there: dict[str, Any], said: dict[str, Any] | None, right: bo
 def test_parameters_are_scored_where_both_sides_name_them() -> None:
     there = entry("single", "pitch_offset", parameters={"pitch_offset": {"offset_deg": {"value": 1.0, "unit": "deg"}}})
     told = answer("named", "pitch_offset")
-    told["ranking"][0]["parameters"] = {"offset_deg": {"value": 1.1, "low": 0.9, "high": 1.3, "unit": "deg"}}
+    one = Ranked("pitch_offset", 0.9, {"offset_deg": Estimate(1.1, 0.9, 1.3)})
+    told = replace(told, ranking=(one, *told.ranking[1:]))
     rows = {r.what: r for r in score.score([score.judge(there, told)])}
     assert rows["parameter error, median"].value == pytest.approx(0.1)
     assert rows["90 % interval holds the truth"].hits == 1
@@ -515,10 +521,10 @@ def test_parameters_are_scored_where_both_sides_name_them() -> None:
 
 def test_risk_listens_to_the_surest_first() -> None:
     sure = score.judge(entry("single", "untwist"), answer("named", "untwist"))
-    unsure = score.judge(entry("null"), {**answer("named", "nacelle"), "probability": 0.6})
+    unsure = score.judge(entry("null"), replace(answer("named", "nacelle"), probability=0.6))
     curve = score.risk_coverage([unsure, sure], (0.5, 1.0))
-    assert [point["risk"] for point in curve] == [0.0, 0.5]
-    assert proof_text._percent(curve[1]["risk"]) == "50.0 %"
+    assert [point.risk for point in curve] == [0.0, 0.5]
+    assert proof_text._percent(curve[1].risk) == "50.0 %"
 
 
 def test_a_recommended_run_is_tried_on_the_truth() -> None:
@@ -531,15 +537,15 @@ def test_a_recommended_run_is_tried_on_the_truth() -> None:
     thin = [{"rpm": f * top, "airspeed_m_s": 0.0, "pressure_Pa": 50e3} for f in np.linspace(0.6, 1.0, 8)]
     same = [{"rpm": 0.5 * top, "airspeed_m_s": 0.0}]
     tried = {
-        name: resolve.resolves(bench, there, {**said, "next_measurement": {"points": points, "separates": []}})
+        name: resolve.resolves(bench, there, replace(said, next_measurement=Step(points=tuple(points))))
         for name, points in (("thin", thin), ("same", same))
     }
     assert tried == {"thin": True, "same": False}
-    assert resolve.resolves(bench, there, {**said, "next_measurement": {"points": []}}) is None
+    assert resolve.resolves(bench, there, replace(said, next_measurement=Step())) is None
 
 
 def test_no_answer_is_no_virtue() -> None:
-    rows = {r.what: r for r in score.score([score.judge(e, None) for e, _ in SCENES])}
+    rows = {r.what: r for r in score.score([score.judge(e, Answer()) for e, _ in SCENES])}
     assert rows["failed"].met is False
     assert rows["claims on nulls, noise"].met is None
     assert rows["top 1, visible"].value == 0.0
@@ -558,7 +564,7 @@ def weighed(patched: Any) -> tuple[items.Bench, Item]:
 
 
 def _followed(
-    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[dict[str, Any]],
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[Answer],
     runs: int = 3,
 ) -> tuple[loop.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
     """Course of the item whose answers are given, with the commands and the files that were seen."""
@@ -570,7 +576,7 @@ def _followed(
     asked: list[list[str]] = []
     seen = [dict(made.files)]
 
-    def spy(folder: Path, words: list[str]) -> tuple[dict[str, Any], str]:
+    def spy(folder: Path, words: list[str]) -> tuple[Answer, str]:
         if "--out" in words:  # a name goes into the case
             home = folder / words[words.index("--out") + 1]
             home.mkdir()
@@ -582,7 +588,7 @@ def _followed(
 
     monkeypatch.setattr(prove, "asked", spy)
     monkeypatch.setattr(items, "_REFERENCED", 0.0)
-    course = loop._course(out, {**made.entry, "folder": "0000"}, bench, answers[0], runs, fixed=False)
+    course = loop._course(out, replace(made.entry, folder="0000"), bench, answers[0], runs, fixed=False)
     return course, asked, seen
 
 
@@ -654,7 +660,7 @@ def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> 
 
 @pytest.fixture(scope="module")
 def drawn(shared_data: Path) -> list[Item]:
-    return [item for item in real.draw_real(np.random.default_rng(3)) if item.entry["plan"] == "real"]
+    return [item for item in real.draw_real(np.random.default_rng(3)) if item.entry.plan == "real"]
 
 
 def test_the_manifest_says_what_is_concealed_and_where_it_is_known_from() -> None:
@@ -665,7 +671,7 @@ def test_the_manifest_says_what_is_concealed_and_where_it_is_known_from() -> Non
 
 
 def test_every_set_is_drawn_and_a_control_goes_with_every_claim_on_reynolds(drawn: list[Item]) -> None:
-    sets = [item.entry["set"] for item in drawn]
+    sets = [item.entry.set for item in drawn]
     assert set(sets) == set(real.SETS)
     assert sets.count("real reynolds") == sets.count("real shuffled") > 20
 
@@ -681,7 +687,7 @@ def test_real_items_are_sound_and_say_nothing_of_their_cause(drawn: list[Item], 
         channels = import_file(str(folder / "recording.csv")).values
         assert {"thrust_N"} <= set(channels) or {"CT", "CP"} <= set(channels)
         words = "".join(text for text in item.files.values())
-        assert not [c for c in item.entry["causes"] if c in words and c not in case.get("model.effects_off")]
+        assert not [c for c in item.entry.causes if c in words and c not in case.get("model.effects_off")]
 
 
 def test_the_slip_and_the_wrong_density_are_in_the_files(drawn: list[Item]) -> None:
@@ -691,9 +697,9 @@ def test_the_slip_and_the_wrong_density_are_in_the_files(drawn: list[Item]) -> N
         table = np.genfromtxt(item.files["recording.csv"].splitlines(), delimiter=",", names=True)
         return float(np.median(table["thrust_N"] / table["torque_Nm"]))
 
-    by_set = {kind: [ratio(i) for i in drawn if i.entry["set"] == kind] for kind in ("real slip", "real pitch")}
+    by_set = {kind: [ratio(i) for i in drawn if i.entry.set == kind] for kind in ("real slip", "real pitch")}
     assert np.median(by_set["real pitch"]) / np.median(by_set["real slip"]) == pytest.approx(real.POUND, rel=0.5)
-    cases = [i.files["case.toml"] for i in drawn if i.entry["set"] == "real density"]
+    cases = [i.files["case.toml"] for i in drawn if i.entry.set == "real density"]
     assert cases and all("density_kg_m3 = 1\n" in text for text in cases)
     assert not any("density" in i.files["recording.csv"] for i in drawn)
 
@@ -708,8 +714,9 @@ def test_without_data_it_says_where_they_come_from(monkeypatch: pytest.MonkeyPat
 
 def test_the_score_counts_what_was_found_and_what_was_claimed_wrongly() -> None:
     def judged(kind: str, causes: list[str], verdict: str, effects: list[str]) -> score.Judged:
-        entry = {"set": kind, "causes": causes, "alike": [[] for _ in causes], "separation": [99.0] * len(causes)}
-        return score.judge(entry, {"verdict": verdict, "effects": effects, "ranking": []})
+        n = len(causes)
+        entry = Entry(set=kind, causes=tuple(causes), alike=((),) * n, separation=(99.0,) * n)
+        return score.judge(entry, Answer(verdict, tuple(effects)))
 
     rows = score.score_real([
         judged("real duct", ["duct"], "named", ["duct"]), judged("real duct", ["duct"], "named", ["section"]),

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.readers import aerodyn, detect, dfdc, qprop, xrotor
-from bemt.data.readers._stations import read_stations
+from bemt.data.readers.stations import read_stations
 from bemt.physics.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case

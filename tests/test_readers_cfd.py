@@ -14,7 +14,7 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
-from bemt.data.readers import _cfd
+from bemt.data.readers import cfd
 from bemt.data.recordings.load import document, import_file
 from bemt.physics.dataset import Dataset
 
@@ -499,6 +499,6 @@ def test_every_published_sample_is_read_or_refused_with_the_reason(shared_data: 
 
 
 def test_si_units_only_when_stated() -> None:
-    assert _cfd.si_unit("[N m]") == "Nm" and _cfd.si_unit("dyn") is None
-    names = _cfd.unique(["a", "a", "a#2", "a"])
+    assert cfd.si_unit("[N m]") == "Nm" and cfd.si_unit("dyn") is None
+    names = cfd.unique(["a", "a", "a#2", "a"])
     assert len(set(names)) == 4 and names[0] == "a"

@@ -20,8 +20,8 @@ from bemt.base.errors import InputError
 from bemt.base.units import G0
 from bemt.data import readers as importers
 from bemt.data.readers import _large, generic_csv, jmajew, pybemt_ini, rcbenchmark
-from bemt.data.readers._headings import heading, surely_shaft_speed
-from bemt.data.readers._split import NO_VALUE
+from bemt.data.readers.headings import heading, surely_shaft_speed
+from bemt.data.readers.split import NO_VALUE
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import import_file
 from bemt.data.recordings.reduce import reduce, reduction

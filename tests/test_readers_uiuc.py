@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
 from bemt.data.readers import uiuc
-from bemt.data.readers._uiuc_names import parse_file_name
+from bemt.data.readers.uiuc_names import parse_file_name
 
 GEOMETRY = "r/R    c/R     beta\n0.15 0.11 {0:.3f}\n0.50 0.18 {1:.3f}\n0.75 0.15 {2:.3f}\n1.00 0.05 {3:.3f}\n"
 STATIC = "RPM    CT       CP\n2000.0 0.0950 0.0450\n4000.0 0.1000 0.0455\n"

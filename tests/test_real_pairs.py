@@ -42,23 +42,23 @@ def test_pairs_are_recordings_that_can_be_read_and_do_not_tell_their_cause(drawn
             assert {"thrust_N", "torque_Nm"} & set(channels) and np.isfinite(channels["rpm"]).all()
         if "case.toml" in item.files:
             load_case(folder / "case.toml").rotor()
-        assert not [c for c in item.entry["causes"] if c in "".join(item.files.values())]
+        assert not [c for c in item.entry.causes if c in "".join(item.files.values())]
 
 
 def test_a_pair_is_answered_by_a_process_of_its_own(drawn: list[Item], tmp_path: Path) -> None:
-    item = next(i for i in drawn if i.entry["set"] == "pair density, recorded")
+    item = next(i for i in drawn if i.entry.set == "pair density, recorded")
     for name, text in item.files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     answer, words = prove.diagnose_folder(tmp_path)
-    assert answer is not None, words
-    assert answer["schema"] == "bemt.comparison/1"
+    assert answer, words
+    assert answer.whole["schema"] == "bemt.comparison/1"
     assert score.answered(score.judge(item.entry, answer)) == "found"
 
 
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 def test_runs_of_one_stand_that_nobody_touched_agree(drawn: list[Item], tmp_path: Path, every: int) -> None:
     said = []
-    for k, item in enumerate([i for i in drawn if i.entry["set"] == "pair null"][::every]):
+    for k, item in enumerate([i for i in drawn if i.entry.set == "pair null"][::every]):
         folder = tmp_path / str(k)
         folder.mkdir()
         for name, text in item.files.items():

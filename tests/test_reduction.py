@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base import units
 from bemt.base.errors import InputError
 from bemt.data import readers as importers

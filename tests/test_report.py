@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import copy
 import csv
 import hashlib
 import html.parser
@@ -17,18 +16,20 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.page import render
+from bemt.physics.dataset import Dataset
 from bemt.results.report import book_html
-from bemt.results.report.cfd import attach, cfd_runs
+from bemt.results.report.book import About, Book
 from bemt.results.report.found_files import safe_files
 from bemt.results.report.front import summary
 from bemt.results.report.gather import attach_diagnoses, gather
@@ -36,6 +37,9 @@ from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks
 from bemt.results.report.rotor_view import viewer
 from bemt.results.report.verdicts import verdict
 from bemt.results.sweep.comparison import Comparison
+from bemt.results.sweep.rows import Result, Row
+from bemt.tools.cfd.report import attach, cfd_runs, operating_run, report_pages
+from geometry.surface import Surface
 
 CASE = """
 schema = "bemt.case/1"
@@ -90,7 +94,7 @@ def write_case(folder: Path, name: str, title: str, remark: str, bench_u: str = 
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Book, Path]:
     """Book and folder of two cases that can be solved, one of them hostile, and one that cannot."""
     root = tmp_path_factory.mktemp("report")
     write_case(root / "cases", "plain", "A plain propeller", "MRF, incompressible; domain 5 D")
@@ -104,7 +108,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path
 
 
 @pytest.fixture(scope="module")
-def text(made: tuple[dict[str, Any], Path]) -> str:
+def text(made: tuple[Book, Path]) -> str:
     return book_html(made[0])
 
 
@@ -214,7 +218,7 @@ def test_the_file_stands_alone(text: str) -> None:
     assert len(script) < 40_000
 
 
-def test_no_clock_and_no_chance_is_in_the_file(made: tuple[dict[str, Any], Path], text: str) -> None:
+def test_no_clock_and_no_chance_is_in_the_file(made: tuple[Book, Path], text: str) -> None:
     assert book_html(made[0]) == text
     plain = text[text.index('id="case-1-plain"') : text.index('id="case-2-rude"')]
     assert str(made[1]) not in plain, "no path of this machine"
@@ -263,8 +267,8 @@ def test_every_part_of_a_case_is_there(text: str) -> None:
     assert re.search(r"<code>[0-9a-f]{64}</code>", page)
 
 
-def test_a_faulty_case_is_named_and_does_not_stop_the_others(made: tuple[dict[str, Any], Path], text: str) -> None:
-    assert made[0]["exit_code"] == 2
+def test_a_faulty_case_is_named_and_does_not_stop_the_others(made: tuple[Book, Path], text: str) -> None:
+    assert made[0].exit_code == 2
     assert "not solved" in text and "A plain propeller" in text
     inside = {path.relative_to(made[1]).as_posix().split("/")[0] for path in made[1].rglob("*")}
     assert inside == {"cases", "out"}, "nothing is written beside the folder of results"
@@ -272,8 +276,13 @@ def test_a_faulty_case_is_named_and_does_not_stop_the_others(made: tuple[dict[st
 
 def poison(value: Any) -> Any:
     """Same shape; every text hostile, every number NaN."""
-    if isinstance(value, dict):
-        return {k: v if k in ("source", "status", "model") else poison(v) for k, v in value.items()}
+    if isinstance(value, Dataset):
+        return replace(value, values=poison(value.values), u=poison(value.u), flags=poison(value.flags))
+    if isinstance(value, dict | MappingProxyType):
+        return {k: poison(v) for k, v in value.items()}
+    if is_dataclass(value) and not isinstance(value, Surface):
+        kept = ("source", "status", "model")
+        return replace(value, **{f.name: poison(getattr(value, f.name)) for f in fields(value) if f.name not in kept})
     if isinstance(value, list):
         return [poison(v) for v in value]
     if isinstance(value, tuple):
@@ -285,8 +294,8 @@ def poison(value: Any) -> Any:
     return math.nan if isinstance(value, float) else value
 
 
-def test_nan_everywhere_and_hostile_words_render_harmlessly(made: tuple[dict[str, Any], Path]) -> None:
-    book = poison(copy.deepcopy(made[0]))
+def test_nan_everywhere_and_hostile_words_render_harmlessly(made: tuple[Book, Path]) -> None:
+    book = poison(made[0])
     page = book_html(book)
     assert_harmless(page)
     assert 'data-at="' not in page, "NaN makes no panel"
@@ -317,10 +326,8 @@ DIAGNOSIS = {
 }
 
 
-def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(
-    made: tuple[dict[str, Any], Path], tmp_path: Path
-) -> None:
-    book = copy.deepcopy(made[0])
+def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(made: tuple[Book, Path], tmp_path: Path) -> None:
+    book = made[0]
     folder = tmp_path / "plain" / "diagnosis"
     folder.mkdir(parents=True)
     (folder / "diagnosis.json").write_text(json.dumps(DIAGNOSIS))
@@ -330,22 +337,21 @@ def test_a_diagnosis_is_shown_with_its_figures_and_none_from_outside(
     (tmp_path / "secret.svg").write_text("<svg>secret</svg>")
     (folder / "link.svg").symlink_to(tmp_path / "secret.svg")
     assert [name for name, _ in safe_files(folder)] == ["residual_map.svg"]
-    attach_diagnoses(book, tmp_path)
+    book = attach_diagnoses(book, tmp_path)
     page = book_html(book)
     assert_harmless(page)
     assert "Diagnosis: what the model leaves out" in page and "Weigh the duct alone." in page
     assert "residual map" in page and "duct = ground_effect" in page
 
 
-def test_a_parameter_of_another_form_of_the_law_is_not_shown(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
+def test_a_parameter_of_another_form_of_the_law_is_not_shown(made: tuple[Book, Path], tmp_path: Path) -> None:
     unused, used = (dict(zip(("value", "low", "high"), values, strict=True), unit="")
                     for values in ([None] * 3, (0.84, 0.8, 0.91)))  # fmt: skip
     ranking = [{"effect": "drag_divergence", "probability": 0.9, "parameters": {"form": unused, "kappa": used}}]
     folder = tmp_path / "diagnosis" / "one"
     folder.mkdir(parents=True)
     (folder / "diagnosis.json").write_text(json.dumps({**DIAGNOSIS, "ranking": ranking}))
-    book = copy.deepcopy(made[0])
-    attach_diagnoses(book, tmp_path)
+    book = attach_diagnoses(made[0], tmp_path)
     page = book_html(book)
     assert "kappa 0.840 (0.800 to 0.910)" in page and "form -" not in page
 
@@ -362,11 +368,11 @@ def test_a_parameter_of_another_form_of_the_law_is_not_shown(made: tuple[dict[st
         '"effects": 7, "classes": [1], "next_measurement": []}',
     ],
 )
-def test_a_broken_diagnosis_breaks_nothing(made: tuple[dict[str, Any], Path], tmp_path: Path, content: str) -> None:
-    book = copy.deepcopy(made[0])
+def test_a_broken_diagnosis_breaks_nothing(made: tuple[Book, Path], tmp_path: Path, content: str) -> None:
+    book = made[0]
     (tmp_path / "plain" / "diagnosis").mkdir(parents=True)
     (tmp_path / "plain" / "diagnosis" / "diagnosis.json").write_text(content)
-    attach_diagnoses(book, tmp_path)
+    book = attach_diagnoses(book, tmp_path)
     assert_harmless(book_html(book))
 
 
@@ -393,31 +399,31 @@ def cfd_folder(root: Path, manifest: object, recording: str) -> Path:
     return root
 
 
-def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], Path], tmp_path: Path) -> None:
-    book = copy.deepcopy(made[0])
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path / "before the check", STUDY, RECORDING))
-    attach(book)
-    line = book["cases"][0]["result"]["comparisons"][-1]
-    assert math.isnan(line["u_D"]) and line["verdict"].startswith("u_D unknown"), "nobody has shown that it balances"
-    book = copy.deepcopy(made[0])
+def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[Book, Path], tmp_path: Path) -> None:
+    book = made[0]
+    book = report_pages(book, cfd_folder(tmp_path / "before the check", STUDY, RECORDING))
+    line = book.cases[0].result.comparisons[-1]
+    assert math.isnan(line.u_D) and line.verdict.startswith("u_D unknown"), "nobody has shown that it balances"
+    book = made[0]
     balanced = "\n".join(
         f"{row}{',0.001,-0.002' if k else ',balance_mass,balance_momentum'}"
         for k, row in enumerate(RECORDING.splitlines())
     )
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path, STUDY, balanced))
-    attach(book)
-    page = book["cases"][0]
-    assert page["own_cfd"]["run"] == "fine", "settled, free, bare, compressible, finest"
-    assert {row["label"] for row in page["own_rows"]} == {"incompressible, 34000 cells", "compressible, 90000 cells"}
-    assert page["own_radial"] == [(0.05, 40.0, 1.0), (0.1, 60.0, 2.0)]
-    line = page["result"]["comparisons"][-1]
-    audit = page["own_cfd"]["audit"]
-    parts = [item["u_relative"] for item in audit["lines"]]
-    assert line["D"] == 4.8 and line["u_D"] == pytest.approx(4.8 * math.sqrt(sum(p * p for p in parts)))
-    grid = next(item for item in audit["lines"] if item["topic"] == "grid study")
-    assert grid["u_relative"] == pytest.approx(math.sqrt((0.05 / 4.8) ** 2 - 0.001**2))
-    assert line["u_val"] > 0 and line["verdict"] in ("not distinguishable from noise", "differs")
-    html_text = book_html(book)
+    folder = cfd_folder(tmp_path, STUDY, balanced)
+    book, found = attach(book, cfd_runs(folder))
+    page = book.cases[0]
+    run = operating_run(found, page.result)
+    assert run is not None and run.run == "fine", "settled, free, bare, compressible, finest"
+    assert {row.label for row in page.own_rows} == {"incompressible, 34000 cells", "compressible, 90000 cells"}
+    assert page.own_radial == {"CFD, own, compressible": [(0.05, 40.0, 1.0), (0.1, 60.0, 2.0)]}
+    line = page.result.comparisons[-1]
+    assert run.audit is not None
+    parts = [item.u_relative for item in run.audit.lines]
+    assert line.D == 4.8 and line.u_D == pytest.approx(4.8 * math.sqrt(sum(p * p for p in parts)))
+    grid = next(item for item in run.audit.lines if item.topic == "grid study")
+    assert grid.u_relative == pytest.approx(math.sqrt((0.05 / 4.8) ** 2 - 0.001**2))
+    assert line.u_val > 0 and line.verdict in ("not distinguishable from noise", "differs")
+    html_text = book_html(report_pages(made[0], folder))
     assert_harmless(html_text)
     assert "Own CFD" in html_text and "did not settle" in html_text
 
@@ -429,11 +435,10 @@ def test_own_cfd_stands_beside_bemt_with_its_audit(made: tuple[dict[str, Any], P
     (STUDY, RECORDING.replace(",4.8,", ",nan,") + "cut,60\x00"),
     (STUDY, "run,rpm\n" + "a," * 500),
 ])  # fmt: skip
-def test_broken_recordings_break_nothing(made: tuple[dict[str, Any], Path], tmp_path: Path, manifest: object,
+def test_broken_recordings_break_nothing(made: tuple[Book, Path], tmp_path: Path, manifest: object,
                                          recording: str) -> None:  # fmt: skip
-    book = copy.deepcopy(made[0])
-    book["cfd"] = cfd_runs(cfd_folder(tmp_path, manifest, recording))
-    attach(book)
+    book = made[0]
+    book = report_pages(book, cfd_folder(tmp_path, manifest, recording))
     assert_harmless(book_html(book))
 
 
@@ -447,13 +452,13 @@ def test_broken_recordings_break_nothing(made: tuple[dict[str, Any], Path], tmp_
     ],
 )
 def test_verdicts_follow_validation_uncertainty(E: float, u_D: float | None, kind: str, words: str) -> None:
-    rows = [{"source": "bemt", "thrust_N": 10.0, "u": 1.0}]
     line = Comparison(reference="bench", source="bench", S=10.0, D=10.0 - E, u_input=1.0).document() | {"u_D": u_D}
-    found, _, sentence = verdict({"rows": rows, "comparisons": [line], "faults": []})
+    row = Row("bemt", "bemt", 10.0, u=1.0)
+    found, _, sentence = verdict(Result("one", rows=(row,), comparisons=(Comparison.from_document(line),)))
     assert found == kind and words in sentence
 
 
-def test_nothing_is_ever_called_correct(text: str, made: tuple[dict[str, Any], Path]) -> None:
+def test_nothing_is_ever_called_correct(text: str, made: tuple[Book, Path]) -> None:
     assert not re.search(r"\b(correct|validated|accurate|proven)\b", text + summary(made[0]), re.IGNORECASE)
 
 
@@ -477,8 +482,8 @@ def test_plots_keep_their_numbers_and_leave_out_what_is_not_one() -> None:
     assert len(places) == len(lines) == 2 and places[0][0] < places[1][0] and places[0][1] > places[1][1]
 
 
-def test_a_rotor_in_the_viewer_is_small_and_keeps_its_shape(made: tuple[dict[str, Any], Path]) -> None:
-    found = made[0]["cases"][0]["surfaces"]
+def test_a_rotor_in_the_viewer_is_small_and_keeps_its_shape(made: tuple[Book, Path]) -> None:
+    found = made[0].cases[0].surfaces
     packed = viewer(found)
     assert len(packed["mesh"]) < 300_000
     for one, mesh in zip(found, json.loads(packed["mesh"]), strict=True):
@@ -522,7 +527,7 @@ def test_command_writes_two_files_and_says_so(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
-    made: tuple[dict[str, Any], Path],
+    made: tuple[Book, Path],
 ) -> None:
     monkeypatch.setattr("bemt.results.report.gather.gather", lambda paths, out, progress: made[0])
     assert main(["report", str(made[1] / "cases"), "--out", str(tmp_path / "r")]) == 2
@@ -561,12 +566,12 @@ def test_a_report_of_one_case_made_from_its_label_holds_no_word_of_the_thesis(
         assert word not in words, word
 
 
-def test_a_report_of_own_cases_holds_no_word_of_the_thesis(made: tuple[dict[str, Any], Path], text: str) -> None:
-    assert made[0]["reproduction"] == [] and "thesis" not in text.lower() and "Cahill" not in text
+def test_a_report_of_own_cases_holds_no_word_of_the_thesis(made: tuple[Book, Path], text: str) -> None:
+    assert not made[0].reproduction and "thesis" not in text.lower() and "Cahill" not in text
 
 
-def test_the_head_says_whose_report_it_is(made: tuple[dict[str, Any], Path]) -> None:
-    page = book_html({**made[0], "about": {"title": "Fan <3>", "author": "A. Body", "date": "2026-11-22"}})
+def test_the_head_says_whose_report_it_is(made: tuple[Book, Path]) -> None:
+    page = book_html(replace(made[0], about=About("Fan <3>", "A. Body", "2026-11-22")))
     assert "<h1>Fan &lt;3&gt;</h1>" in page and "A. Body · 2026-11-22." in page
 
 
@@ -808,7 +813,7 @@ def test_no_page_is_wider_than_the_window(opened: Browser, width: int) -> None:
 
 
 def test_three_fidelities_are_those_of_the_cases_shown(tmp_path: Path) -> None:
-    from bemt.results.report.cfd import fidelities, fidelity_sections
+    from bemt.tools.cfd.report import fidelities, fidelity_sections
 
     folder = tmp_path / "disk"
     folder.mkdir()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.rotors.validate.propellers import validate
 
 # Section tables come from a network whose releases differ in the last digits.

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers
-from bemt.data.readers._stations import read_stations
+from bemt.data.readers.stations import read_stations
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import import_file
 from geometry.common import GeometryError

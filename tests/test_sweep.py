@@ -14,7 +14,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,18 +22,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.base.tables import csv_block, json_text, number_text, plain
 from bemt.physics.bem import Model
 from bemt.physics.k1k2 import U_MEASURED
-from bemt.results.sweep import batch, fingerprint, sweep
+from bemt.results.sweep import batch, fingerprint
 from bemt.results.sweep import batch as sweep_module
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.grid import run as grid_module
-from bemt.results.sweep.summary import summary
+from bemt.results.sweep.rows import Result
+from bemt.results.sweep.summary import summary as summary_of
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
+
+
+def sweep(*args: Any, **options: Any) -> dict[str, Any]:
+    """Document of a sweep, as ``--json`` prints it."""
+    document: dict[str, Any] = plain(sweep_module.sweep(*args, **options).document())
+    return document
+
+
+def summary(documents: Sequence[dict[str, Any]], **options: Any) -> str:
+    return summary_of([Result.from_document(d) for d in documents], **options)
+
 
 ROOT = Path(__file__).resolve().parents[1]
 KGF = 9.80665
@@ -130,7 +142,7 @@ def assumed(folder: Path, key: str, low: float, high: float, air: str = "density
     path = make_case(folder, key.replace(".", "_"), extra)
     text = path.read_text().replace("rpm = 6000", "rpm = 6000\nairspeed_m_s = 3").replace("density_kg_m3 = 1.2", air)
     path.write_text(re.sub(r'\[\[assumptions\]\]\nkey = "(blade|rotor)[^\[]*', "", text))
-    return solve_case(load_case(path))
+    return plain(solve_case(load_case(path)).document())
 
 
 @pytest.mark.parametrize(
@@ -430,13 +442,13 @@ def test_interrupt_ends_at_once_with_130_and_no_half_file(tmp_path: Path, jobs: 
 
 
 def test_strict_turns_a_large_error_into_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
 
     path = str(make_case(tmp_path))
     assert main(["sweep", path, "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e6"]) == 0
-    assert main(["sweep", path, "--quiet", "--strict", "--tolerance", "1e-6"]) == 1
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e6"]) == 0
+    assert main(["sweep", path, "--quiet", "--strict", "--tolerance-pct", "1e-6"]) == 1
     assert "BEMT thrust" in capsys.readouterr().err
 
 
@@ -460,7 +472,7 @@ def test_unconverged_points_are_counted_and_never_zero(tmp_path: Path, monkeypat
     assert result["grid"]["unconverged"] == 2
     _, rows = read_grid(tmp_path / "out" / "one" / "grid.csv")
     assert np.isnan(rows[:, 1]).all() and (rows[:, -1] == 0).all()
-    assert sweep_module.off_tolerance(result, 1e9) == [
+    assert sweep_module.off_tolerance(Result.from_document(result), 1e9) == [
         "one: unconverged at 6000 rev/min, 0 m/s", "one: unconverged at 5000 rev/min, 0 m/s",
         "one: 2 of 2 grid points unconverged",
     ]  # fmt: skip
@@ -493,7 +505,7 @@ def test_k1k2_of_the_shipped_cases(name: str, kgf: float) -> None:
 
 
 def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from bemt.app.commands.cli import main
+    from bemt.app.cli import main
 
     shipped = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
     assert main(["sweep", *(str(project / "cases" / name) for name in shipped)]) == 0
@@ -509,8 +521,7 @@ def test_one_screen_says_what_differs_most(project: Path, capsys: pytest.Capture
 def test_cases_of_one_name_are_told_apart_and_remarks_are_whole_in_a_pipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bemt.app.commands.cli import main
-    from bemt.results.sweep.summary import summary
+    from bemt.app.cli import main
 
     monkeypatch.chdir(tmp_path)
     for folder in ("one", "two"):
@@ -554,7 +565,6 @@ def test_a_flagged_point_is_no_plain_agreement() -> None:
 
 
 def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand_percent() -> None:
-    from bemt.results.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 12.0, "flags": []}
     known = {"u_num": 0.0, "u_input": 0.5, "u_D": math.nan, "u_val": math.nan, "model": "bemt", "quantity": "thrust_N"}
@@ -572,7 +582,6 @@ def test_a_difference_near_zero_thrust_is_a_share_of_the_largest_and_no_thousand
 
 
 def test_a_screen_of_many_cases_is_still_one_screen() -> None:
-    from bemt.results.sweep.summary import summary
 
     row = {"source": "bemt", "label": "bemt", "u": 0.5, "airspeed_m_s": 0.0, "flags": ["a flag"], "rpm": 6000.0}
     one = {"faults": [], "assumptions": [], "audit": [], "grid": None, "comparisons": []}

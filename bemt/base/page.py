@@ -12,6 +12,9 @@ from typing import Any
 
 from bemt.base.tables import number_text
 
+FIRST = "recording"
+"""Stem of the first picture in the folder of an answer: what was recorded, inside the band of the prediction."""
+
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Control characters, marks that turn the direction of writing, halves of characters."""
 

@@ -23,7 +23,7 @@ from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.data import readers as importers
 from bemt.data.readers import apc, uiuc
-from bemt.data.readers._uiuc_names import parse_file_name
+from bemt.data.readers.uiuc_names import parse_file_name
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air, isa_pressure
 from bemt.physics.dataset import Dataset

@@ -48,7 +48,7 @@ def write(path: Path) -> None:
 
 def check(count: int) -> None:
     """Errors of the table at random sections: cl and cd from -4 to 10 deg, CT and CP of a 10x5 that has them."""
-    from bemt.app.library import propeller
+    from bemt import propeller
     from bemt.physics.bem.model import Model
 
     random = np.random.default_rng(1)

@@ -1,11 +1,11 @@
 """Readers of recorded data: one file per format, found by scanning this folder.
 
-A reader is a module of this package (its name does not start with ``_``) that defines
+A reader is a module of this package that defines
 
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True if the head of a file (:data:`HEAD_BYTES` bytes, or text) has this format;
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
-  with all its faults. Use :class:`bemt.data.readers._recording.Builder` or :func:`bemt.data.readers._columns.dataset`.
+  with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.columns.dataset`.
   Readers of blades and polars return the object of their own package instead;
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
@@ -247,14 +247,14 @@ def importers() -> Mapping[str, ModuleType]:
     Raises
     ------
     TypeError
-        If a module lacks KIND, sniff or read, or repeats a kind (a bug, not an input error).
+        If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
     """
     found: dict[str, ModuleType] = {}
     for info in pkgutil.iter_modules(__path__):
-        if info.name.startswith("_"):
-            continue
         module = importlib.import_module(f"{__name__}.{info.name}")
         kind = getattr(module, "KIND", None)
+        if kind is None:  # what readers share
+            continue
         if not isinstance(kind, str) or not callable(getattr(module, "sniff", None)) or not hasattr(module, "read"):
             raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
         if kind in found:

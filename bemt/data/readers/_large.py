@@ -1,7 +1,7 @@
 """Large tables of numbers, read in blocks by pandas: the cells of a log with millions of rows are never all strings.
 
 Taken only where every line has the same number of cells and every column is of numbers; whatever else a file holds is
-read cell by cell (:mod:`bemt.data.readers._split`), with the same outcome. Odd cells are kept as text beside the
+read cell by cell (:mod:`bemt.data.readers.split`), with the same outcome. Odd cells are kept as text beside the
 numbers.
 """
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.data.readers import SourceText
-from bemt.data.readers._split import MOST_ODD, SplitTable, column_numbers, decimal_mark, split_line, split_table
+from bemt.data.readers.split import MOST_ODD, SplitTable, column_numbers, decimal_mark, split_line, split_table
 
 LARGE = 4 << 20
 """Size of a file from which it is read in blocks. [bytes]"""

@@ -20,7 +20,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, load_text, number, polar_aerodyn
-from bemt.data.readers._blade import BladeFile, Cursor, as_count
+from bemt.data.readers.blade import BladeFile, Cursor, as_count
 from bemt.physics.sections.polars import Polar
 
 KIND = "aerodyn"

@@ -25,7 +25,7 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.data.readers import SourceText, load_text, number
-from bemt.data.readers._cfd import (
+from bemt.data.readers.cfd import (
     Column,
     ExportRow,
     cells_of,
@@ -38,8 +38,8 @@ from bemt.data.readers._cfd import (
     slug,
     unique,
 )
-from bemt.data.readers._columns import Channel, channels_of, dataset
-from bemt.data.readers._headings import may_be_shaft_speed
+from bemt.data.readers.columns import Channel, channels_of, dataset
+from bemt.data.readers.headings import may_be_shaft_speed
 from bemt.physics.dataset import Dataset
 
 KIND = "cfd_post_csv"

@@ -13,7 +13,7 @@ from typing import Literal
 
 from bemt.base.toml import Table, entry, read_model
 from bemt.data.readers import head_text
-from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd import unit_of
 
 KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {

@@ -15,9 +15,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.data.readers import first_cells
-from bemt.data.readers._columns import Channel
-from bemt.data.readers._headings import known
-from bemt.data.readers._recording import Builder
+from bemt.data.readers.columns import Channel
+from bemt.data.readers.headings import known
+from bemt.data.readers.recording import Builder
 from bemt.physics.dataset import Dataset
 
 KIND = "crazyflie_bench"

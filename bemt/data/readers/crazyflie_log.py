@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bemt.base.toml_text import Collector
 from bemt.base.units import G0
 from bemt.data.readers import load_bytes
-from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.columns import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 KIND = "crazyflie_log"

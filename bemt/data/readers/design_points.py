@@ -17,8 +17,8 @@ import os
 import re
 
 from bemt.data.readers import load_text
-from bemt.data.readers._cfd import Column, ExportRow, cells_of, head_lines, no_units, numeric_table, si_unit, unique
-from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.cfd import Column, ExportRow, cells_of, head_lines, no_units, numeric_table, si_unit, unique
+from bemt.data.readers.columns import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 KIND = "design_points"

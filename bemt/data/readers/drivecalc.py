@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.data.readers import first_cells, load_text
-from bemt.data.readers._headings import heading, known
-from bemt.data.readers._recording import Builder
-from bemt.data.readers._split import split_table
+from bemt.data.readers.headings import heading, known
+from bemt.data.readers.recording import Builder
+from bemt.data.readers.split import split_table
 from bemt.physics.dataset import Dataset
 
 KIND = "drivecalc"

@@ -11,7 +11,7 @@ on the reference area, lengths and velocity of the case, which the file does not
 
 from __future__ import annotations
 
-from bemt.data.readers._cfd import Column, Layout, cells_of, outermost
+from bemt.data.readers.cfd import Column, Layout, cells_of, outermost
 
 KIND = "flow360_forces"
 

@@ -15,7 +15,7 @@ import os
 
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
-from bemt.data.readers._cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
+from bemt.data.readers.cfd import Column, ExportRow, cells_of, fields, head_lines, numeric_table
 from bemt.physics.dataset import Dataset
 
 KIND = "fluent_ascii"

@@ -27,8 +27,8 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
-from bemt.data.readers._cfd import head_lines, si_unit, slug, unique
-from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.cfd import head_lines, si_unit, slug, unique
+from bemt.data.readers.columns import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 KIND = "fluent_forces"

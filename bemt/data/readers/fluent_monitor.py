@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 
-from bemt.data.readers._cfd import Layout, head_lines
+from bemt.data.readers.cfd import Layout, head_lines
 from bemt.data.readers.fluent_report import column_of
 
 KIND = "fluent_monitor"

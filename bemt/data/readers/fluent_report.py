@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import re
 
-from bemt.data.readers._cfd import Column, ExportTable, Layout, head_lines, si_unit
+from bemt.data.readers.cfd import Column, ExportTable, Layout, head_lines, si_unit
 
 KIND = "fluent_report"
 

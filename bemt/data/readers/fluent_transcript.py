@@ -24,8 +24,8 @@ import numpy as np
 
 from bemt.base.averaging import Mean, keep_last
 from bemt.data.readers import SourceText, load_text, number
-from bemt.data.readers._cfd import head_lines, si_unit, slug
-from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.cfd import head_lines, si_unit, slug
+from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.fluent_forces import blocks
 from bemt.physics.dataset import Dataset
 

@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.data.readers import head_text, load_text, number
-from bemt.data.readers._headings import Heading, heading, slug
 from bemt.data.readers._large import NumberTable, large_table
-from bemt.data.readers._recording import Builder
-from bemt.data.readers._split import (
+from bemt.data.readers._words import NEUTRAL, english
+from bemt.data.readers.headings import Heading, heading, slug
+from bemt.data.readers.recording import Builder
+from bemt.data.readers.split import (
     SplitTable,
     decimal_mark,
     find_start,
@@ -31,7 +32,6 @@ from bemt.data.readers._split import (
     split_line,
     split_table,
 )
-from bemt.data.readers._words import NEUTRAL, english
 from bemt.physics.dataset import Dataset
 
 KIND = "table"

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from bemt.data.readers import first_cells
-from bemt.data.readers._headings import Heading, heading, known, slug
-from bemt.data.readers._recording import Builder, slip
+from bemt.data.readers.headings import Heading, heading, known, slug
+from bemt.data.readers.recording import Builder, slip
 from bemt.physics.dataset import Dataset
 
 KIND = "jmajew"

@@ -15,7 +15,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.data.readers import SourceText, head_text, load_text, number
-from bemt.data.readers._columns import Channel, dataset
+from bemt.data.readers.columns import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 KIND = "pybemt_ini"

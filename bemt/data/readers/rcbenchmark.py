@@ -30,11 +30,11 @@ from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import head_text, number
-from bemt.data.readers._headings import heading
 from bemt.data.readers._large import NumberTable
-from bemt.data.readers._recording import Builder, slip
-from bemt.data.readers._samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
-from bemt.data.readers._split import SplitTable
+from bemt.data.readers.headings import heading
+from bemt.data.readers.recording import Builder, slip
+from bemt.data.readers.samples import MISREAD, MOST_RPM_PER_V, against_load, spikes
+from bemt.data.readers.split import SplitTable
 from bemt.physics.dataset import Dataset
 
 KIND = "rcbenchmark"

@@ -30,7 +30,7 @@ import numpy as np
 from bemt.base import units
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, load_text, number
-from bemt.data.readers._unit_text import WEIGHTS, unit_of
+from bemt.data.readers.unit_text import WEIGHTS, unit_of
 from bemt.physics.dataset import Dataset
 
 KIND = "references"

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 
-from bemt.data.readers._cfd import Column, Layout, cells_of, si_unit
+from bemt.data.readers.cfd import Column, Layout, cells_of, si_unit
 
 KIND = "star_monitor"
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 
-from bemt.data.readers._cfd import Column, Layout, cells_of, outermost
+from bemt.data.readers.cfd import Column, Layout, cells_of, outermost
 
 KIND = "su2_history"
 

@@ -8,7 +8,7 @@ Every file is a table under one header line, blank separated::
     r/R t/c             thickness ratio (``nr640_thick.txt``)
 
 Coefficients are in the propeller convention: CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5), n in rev/s, J = V/(n D).
-What the names say, and by which rules, is in :mod:`bemt.data.readers._uiuc_names`.
+What the names say, and by which rules, is in :mod:`bemt.data.readers.uiuc_names`.
 
 Geometry of a propeller, first rule that applies (``geometry.origin``):
 
@@ -43,8 +43,8 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import HEAD_BYTES
-from bemt.data.readers._uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
-from bemt.data.readers._uiuc_tables import (
+from bemt.data.readers.uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
+from bemt.data.readers.uiuc_tables import (
     UiucGeometry,
     UiucLine,
     UiucStatic,

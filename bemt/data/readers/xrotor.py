@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.tables import number_of
 from bemt.data.readers import head_text
-from bemt.data.readers._blade import BladeFile, Cursor, as_count
+from bemt.data.readers.blade import BladeFile, Cursor, as_count
 from bemt.physics.sections.parametric import XrotorSection
 
 KIND = "xrotor"

@@ -14,8 +14,8 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.data.readers import polar_c81, uiuc
-from bemt.data.readers._columns import Channel, dataset
 from bemt.data.readers.apc import ApcPerformance
+from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.references import Reference
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import unit_in

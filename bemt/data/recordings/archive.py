@@ -98,7 +98,7 @@ def download(url: str, target: Path, known_sha256: str | None = None, progress: 
             raise InputError(Fault(os.fspath(target), "", str(error), "room and permission to write")) from error
         got, hint = (
             str(error).split("(Caused")[0].strip()[:200],
-            "Download it manually and give it with --from FILE.zip",
+            "Download it manually and give it with --source FILE.zip",
         )
         raise InputError(Fault(url, "", got or type(error).__name__, "an archive to fetch", hint)) from error
     except ValueError as error:  # pooch: the hash differs

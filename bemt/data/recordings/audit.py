@@ -24,10 +24,10 @@ paper). ASME V&V 20-2009. Limits of y+ for wall functions: B.E. Launder, D.B. Sp
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
+from bemt.base.document import Documented
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 
 STATUSES = ("fine", "doubtful", "fault", "not stated")
@@ -78,8 +78,7 @@ class CfdFacts:
     ducted: bool = False
 
 
-@dataclass(frozen=True)
-class AuditLine:
+class AuditLine(Documented):
     """One setting and its consequence."""
 
     topic: str  # Setting
@@ -273,12 +272,17 @@ def combined(lines: Iterable[AuditLine]) -> tuple[float, float]:
     return (math.nan if any(map(math.isnan, parts)) else known), known
 
 
-def audit_document(reference: str, lines: Sequence[AuditLine]) -> dict[str, Any]:
-    """Give an audit as plain values."""
-    u, known = combined(lines)
-    return {
-        "reference": reference,
-        "lines": [asdict(line) for line in lines],
-        "u_relative": u,
-        "u_relative_known": known,
-    }
+class Audit(Documented):
+    """Lines about one recorded value, and what they come to."""
+
+    reference: str
+    lines: tuple[AuditLine, ...]
+    # Standard uncertainty of the thrust from all lines, NaN where one is not known; from those that are [1]
+    u_relative: float
+    u_relative_known: float
+
+    @classmethod
+    def of(cls, reference: str, facts: CfdFacts) -> Audit:
+        """Audit a recorded value."""
+        lines = audit(facts)
+        return cls(reference, lines, *combined(lines))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from bemt.data.recordings.audit import CfdFacts, audit, audit_document
+from bemt.data.recordings.audit import CfdFacts
 
 _PHRASES: tuple[tuple[str, dict[str, Any]], ...] = (
     (r"cylinder of the (propeller|rotor|fan)'s (own )?diameter", {"domain_over_D": 1.0}),
@@ -56,24 +54,3 @@ def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
         if match:
             found[name] = float(f"{float(match[1]) * factor:.12g}")
     return replace(known or CfdFacts(), **found)
-
-
-def audit_rows(
-    rows: Iterable[Mapping[str, Any]], diameter_m: float, pitch_m: float, ducted: bool
-) -> list[dict[str, Any]]:
-    """Audit the recorded CFD values of a case by their remarks."""
-    out = []
-    for row in rows:
-        if row["source"] != "cfd":
-            continue
-        n = row["rpm"] / 60.0
-        CT = row["CT"]
-        facts = CfdFacts(
-            M_tip=float(row["M_tip"]),
-            J=row["airspeed_m_s"] / (n * diameter_m),
-            pitch_over_D=pitch_m / diameter_m,
-            CT=math.nan if CT is None else float(CT),
-            ducted=ducted,
-        )
-        out.append(audit_document(row["label"], audit(facts_from_remark(str(row.get("remark", "")), facts))))
-    return out

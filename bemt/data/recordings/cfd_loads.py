@@ -17,9 +17,9 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.base.units import Unit
-from bemt.data.readers._cfd import unit_of
-from bemt.data.readers._headings import may_be_shaft_speed, meanings, usual
+from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
+from bemt.data.readers.headings import may_be_shaft_speed, meanings, usual
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.physics.dataset import Dataset
 

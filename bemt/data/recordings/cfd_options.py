@@ -14,7 +14,7 @@ from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data import readers
 from bemt.data.readers import number
-from bemt.data.readers._cfd import unit_of
+from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
 from bemt.data.recordings.cfd_loads import DUCT
 

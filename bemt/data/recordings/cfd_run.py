@@ -18,8 +18,8 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
-from bemt.data.readers._headings import usual
 from bemt.data.readers.cfd_run import RunToml
+from bemt.data.readers.headings import usual
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
 from bemt.data.recordings.cfd_setup import with_grid_floor
@@ -335,7 +335,7 @@ def document(d: Dataset) -> dict[str, Any]:
     ]  # fmt: skip
     told = {k: d.provenance[k] for k in ("averaged", "drift", "conditions")}
     head = {"name": str(d.provenance["file"]), "files": list(d.provenance["files"]), "points": points}
-    return head | told | {"studies": list(d.provenance.get("studies", ())), "notes": list(d.notes)}
+    return head | told | {"studies": [s.document() for s in d.provenance.get("studies", ())], "notes": list(d.notes)}
 
 
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]", "duct_thrust_N": "of it duct [N]",

@@ -8,22 +8,18 @@ grids where they oscillate, diverge or show an implausible order. A load that is
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_text
 from bemt.data.recordings.cfd_loads import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
 from bemt.data.recordings.channels import named
-from bemt.data.recordings.grid_study import grid_study, ratios
+from bemt.data.recordings.grid_study import LOADS, LoadStudy, grid_study, ratios
 from bemt.physics.dataset import Dataset
 
-LOADS = {"thrust_N": "N", "duct_thrust_N": "N", "torque_Nm": "N m", "power_W": "W", "CT": "", "CQ": "", "CP": ""}
-"""Loads that are extrapolated, and their units."""
 _SAME = {"rpm": (2e-3, 0.0), "airspeed_m_s": (5e-3, 0.02), "density_kg_m3": (2e-3, 0.0), "J": (5e-3, 1e-3)}
 """Differences within which runs are of one condition, relative and absolute: what is typed in two solvers."""
 MOST = 3
@@ -64,9 +60,8 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
     Returns
     -------
     Dataset
-        One point for each condition, that of its finest grid. ``provenance["studies"]``: a dict for each load that was
-        extrapolated (``channel``, state, ``cells``, ``values``, ``order``, ``extrapolated``, ``gci_fine``,
-        ``u_relative``, ``flags``), finest grid first.
+        One point for each condition, that of its finest grid. ``provenance["studies"]``: a `LoadStudy` for each load
+        that was extrapolated.
 
     Raises
     ------
@@ -74,7 +69,7 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
         Where one condition has several rows on grids that are not told apart.
     """
     keep: list[int] = []
-    studies: list[dict[str, Any]] = []
+    studies: list[LoadStudy] = []
     sizes: dict[str, Array] = {k: np.full(len(d), np.nan) for k in LOADS if k in d}
     for group in groups(d):
         order = sorted(group, key=lambda i: -cells[i] if math.isfinite(cells[i]) else 1.0)
@@ -87,23 +82,23 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
             found = [s for k in sizes if (s := _study(d, k, order, cells))]
             studies += found
             for s in found:
-                sizes[s["channel"]][order[0]] = s["u_relative"]
+                sizes[s.channel][order[0]] = s.u_relative
     for k, u in sizes.items():  # a condition on one grid owes what the grid costs elsewhere
         most = np.nanmax(u) if np.isfinite(u).any() else math.nan
         sizes[k] = np.where(np.isfinite(u), u, most)
     rows = np.array(sorted(keep), dtype=np.intp)
     told = dict(d.provenance.get("conditions", {}))
-    told |= {"cells": float(np.nanmax(cells[rows])), "grids": max((len(s["cells"]) for s in studies), default=1)}
-    u_thrust = [s["u_relative"] for s in studies if s["channel"] in ("thrust_N", "CT")]
+    told |= {"cells": float(np.nanmax(cells[rows])), "grids": max((len(s.cells) for s in studies), default=1)}
+    u_thrust = [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]
     if u_thrust:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
     labels = tuple(d.labels[i] for i in rows) if d.labels else ()
     made = Dataset(
         "cfd", d.name, {k: v[rows] for k, v in d.values.items()}, {k: v[rows] for k, v in random.items()}, (),
-        {**d.provenance, "conditions": told, "studies": studies}, labels, notes=d.notes,
+        {**d.provenance, "conditions": told, "studies": tuple(studies)}, labels, notes=d.notes,
     )  # fmt: skip
-    return with_grid_floor(made, {k: v[rows] for k, v in sizes.items()}, tuple(map(study_text, studies)))
+    return with_grid_floor(made, {k: v[rows] for k, v in sizes.items()}, tuple(s.sentence() for s in studies))
 
 
 def _state(d: Dataset, row: int) -> str:
@@ -113,48 +108,19 @@ def _state(d: Dataset, row: int) -> str:
     )
 
 
-def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> dict[str, Any] | None:
+def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> LoadStudy | None:
     """Grid study of one load at one condition, finest grid first; None where there is none."""
     order = [i for i in order if math.isfinite(d[channel][i])]
     fine = order[:MOST]
     if len(fine) < 2 or any(d[channel][i] == 0.0 for i in fine[:2]):
         return None
-    counts = [float(cells[i]) for i in fine]
-    found = grid_study([float(d[channel][i]) for i in fine], ratios(counts))
-    state = {k: float(d[k][order[0]]) for k in _SAME if k in d}
-    flags = [
-        *found.flags,
-        *([f"{len(order)} grids: the order is that of the finest {MOST}"] if len(order) > MOST else []),
-    ]
-    return {
-        "channel": channel, **state, "cells": [float(cells[i]) for i in order],
-        "values": [float(d[channel][i]) for i in order], "ratios": list(found.ratios), "order": found.order,
-        "extrapolated": found.extrapolated, "gci_fine": found.gci_fine, "gci_coarse": found.gci_coarse,
-        "asymptotic": found.asymptotic, "u_relative": found.u_relative, "flags": flags,
-    }  # fmt: skip
-
-
-def study_text(s: Mapping[str, Any]) -> str:
-    """Sentence on a grid study.
-
-    >>> d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": [7.05, 7.42, 7.57]})
-    >>> study_text(by_grid(d, np.array([0.5e6, 1.7e6, 5.8e6])).provenance["studies"][0])
-    'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.671 N at cell size 0, GCI 1.68 %, u 1.5 %'
-    """  # noqa: E501
-    unit = LOADS[s["channel"]]
-    name = s["channel"].rsplit("_", 1)[0].replace("_", " ")
-    many = max(s["cells"]) >= 1e5
-    grids = ", ".join(f"{c / (1e6 if many else 1.0):.3g}" for c in s["cells"])
-    values = ", ".join(f"{v:.4g}" for v in s["values"])
-    state = f"{s['rpm']:g} rev/min" if s.get("rpm", math.nan) == s.get("rpm", math.nan) else "one speed"
-    state += f", {s['airspeed_m_s']:g} m/s" if s.get("airspeed_m_s") else f", J {s['J']:g}" if s.get("J") else ""
-    lead = f"{name} on {grids}{' million' if many else ''} cells at {state}: {values} {unit}".rstrip()
-    end = f"u {s['u_relative']:.1%}".replace("%", " %")
-    flags = f" ({'; '.join(s['flags'])})" if s["flags"] else ""
-    if s["order"] is None:
-        return f"{lead}; no order: three times their spread is taken, {end}{flags}"
-    best = f"{number_text(s['extrapolated'], 4)} {unit}".rstrip()
-    return f"{lead}; order {s['order']:.2f}, {best} at cell size 0, GCI {100 * s['gci_fine']:.2f} %, {end}{flags}"
+    found = grid_study([float(d[channel][i]) for i in fine], ratios([float(cells[i]) for i in fine]))
+    more = (f"{len(order)} grids: the order is that of the finest {MOST}",) if len(order) > MOST else ()
+    return LoadStudy(
+        channel, tuple(float(cells[i]) for i in order), tuple(float(d[channel][i]) for i in order), found.u_relative,
+        found.order, found.extrapolated, found.gci_fine, found.gci_coarse, found.asymptotic, (*found.flags, *more),
+        **{k: float(d[k][order[0]]) for k in _SAME if k in d},
+    )  # fmt: skip
 
 
 def together(parts: Sequence[Dataset], cells: Sequence[float] | None = None, name: str = "") -> Dataset:

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers._headings import USUAL
-from bemt.data.readers._recording import FULL_THROTTLE
+from bemt.data.readers.headings import USUAL
+from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
 
 HUGE = 1e9

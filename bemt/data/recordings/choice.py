@@ -73,13 +73,13 @@ def asked(rpm: float | None = None, period: float | None = None, revolutions: in
     if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):
         faults.append(Fault("", "--rpm", f"{rpm:g}", "a number from 0.01 to 1e6 rev/min"))
     if period is not None and not (math.isfinite(period) and 6e-5 <= period <= 6e3):
-        faults.append(Fault("", "--period", f"{period:g}", "a time from 6e-5 to 6000 s"))
+        faults.append(Fault("", "--period-s", f"{period:g}", "a time from 6e-5 to 6000 s"))
     if rpm is not None and period is not None:
-        faults.append(Fault("", "--rpm, --period", "both", "one of them"))
+        faults.append(Fault("", "--rpm, --period-s", "both", "one of them"))
     if revolutions is not None and not 1 <= revolutions <= 10**6:
         faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
     if revolutions is not None and rpm is None and period is None:
-        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period as well"))
+        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period-s as well"))
     if faults:
         raise InputError(faults)
     return Choice(60.0 / rpm if rpm is not None else period, revolutions)

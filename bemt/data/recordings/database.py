@@ -52,7 +52,7 @@ def _files(folder: Path) -> dict[str, str]:
 def _check_own(folder: Path, known: dict[str, Any]) -> None:
     """Refuse to replace a folder that holds more than an earlier run put there."""
     there, names = _files(folder), known.get("names")
-    hint = "Move them away, or name another folder with --dir"
+    hint = "Move them away, or name another folder with --out"
     if isinstance(names, dict):
         strange = [name for name, start in there.items() if names.get(name) != start]
         got = f"files added or changed since ({len(strange)}): {', '.join(strange[:5])}"
@@ -76,10 +76,10 @@ def get(
     from bemt.data.readers.uiuc import scan_folder
 
     if source is not None and url is not None:
-        raise InputError(Fault("", "--url", url, "none with --from, which downloads nothing", "Give one of the two"))
+        raise InputError(Fault("", "--url", url, "none with --source, which downloads nothing", "Give one of the two"))
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        hint = "Name an empty or new folder with --dir"
+        hint = "Name an empty or new folder with --out"
         raise InputError(Fault(os.fspath(folder), "", "files that this command did not put there", "no folder", hint))
     if known and source is None and not refresh:
         said = {key: value for key, value in known.items() if key != "names"}
@@ -126,7 +126,7 @@ def text(doc: dict[str, Any]) -> str:
     said = {
         "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
         "as recorded": "as recorded at its first use",
-        "replaced": "a different archive than before, as given by --from",
+        "replaced": "a different archive than before, as given by --source",
     }
     lines = [
         f"{doc['kind']}: {doc['propellers']} propellers, {doc['files']} files in {doc['folder']}",
@@ -142,5 +142,5 @@ def folder_of(kind: str, given: str | None) -> Path:
     """Folder as named, else that in the cache; without a cache one must be named."""
     cache = cache_dir()
     if given is None and cache is None:
-        raise InputError(Fault("BEMT_CACHE", "", "switched off", "a cache folder, or --dir DIR"))
+        raise InputError(Fault("BEMT_CACHE", "", "switched off", "a cache folder, or --out DIR"))
     return Path(given) if given else Path(cache or ".") / "data" / kind

@@ -1,6 +1,6 @@
 r"""What is in a file of results, with honest means.
 
-Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period``). The files of one CFD run are
+Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period-s``). The files of one CFD run are
 shown as they are, and then as one run (`bemt.data.recordings.cfd_run`): joined, with the units, sign, sector and zones
 that the user states.
 
@@ -32,9 +32,9 @@ from bemt.base import tables
 from bemt.base.averaging import Mean, relation
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
 from bemt.data import readers as importers
-from bemt.data.readers._uiuc_tables import NO_SPEED
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import adapt, damaged_export, recognised
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
@@ -93,7 +93,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
     elif record.provenance["format"] == "table":
         record = of_table(record)
     elif record.provenance.get("clock") == "time":
-        note = "mean over all rows, including start-up; give --rpm or --period for whole revolutions"
+        note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
 

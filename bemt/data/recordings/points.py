@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.data.readers._samples import MISREAD, against_load
+from bemt.data.readers.samples import MISREAD, against_load
 from bemt.data.recordings import plateaus
 from bemt.data.recordings.channels import LOADS, DroppedCells, file_name, lost, moves, runs_of, stated
 from bemt.physics.dataset import Dataset

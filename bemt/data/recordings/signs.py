@@ -106,7 +106,7 @@ def negative_thrust(facts: Facts) -> Iterator[Finding]:
     rpm, zero = facts.get("rpm"), _wind(facts)
     if zero is not None:
         text = f"thrust grows with the speed and changes its sign at {zero:.0f} rev/min: a propeller in wind does that"
-        fix = "state the airspeed: --airspeed V in diagnose, --air-a V or --air-b V in compare"
+        fix = "state the airspeed: --airspeed-m-s V in diagnose, --air-a V or --air-b V in compare"
         yield Finding("negative_thrust", facts.named("thrust_N"), text, fix, (), "warning")
         return
     turning = np.ones(len(v), dtype=bool) if rpm is None else np.nan_to_num(rpm) > 0.3 * np.nanpercentile(rpm, 95)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.data.readers._samples import MOST_RPM_PER_V
+from bemt.data.readers.samples import MOST_RPM_PER_V
 from bemt.data.recordings.findings import Facts, Finding, check_for
 from bemt.physics import k1k2 as empirical
 

@@ -13,10 +13,10 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data.readers import load_text
-from bemt.data.readers._headings import heading, meanings
-from bemt.data.readers._split import decimal_mark, some, split_table
-from bemt.data.readers._unit_text import unit_for
+from bemt.data.readers.headings import heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES, RecordingToml
+from bemt.data.readers.split import decimal_mark, some, split_table
+from bemt.data.readers.unit_text import unit_for
 from bemt.data.recordings.cfd_options import pairs
 
 _OF_DIMENSION = {"force": "thrust", "torque": "torque", "angular_speed": "rpm", "voltage": "voltage",

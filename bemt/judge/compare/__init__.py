@@ -1,4 +1,1 @@
-"""What changed between two recordings, and one run beside the model.
-
-``bemt.compare(a, b)`` says what changed between two recordings: ``help(bemt.app.library.compare)``.
-"""
+"""What changed between two recordings, and one run beside the model."""

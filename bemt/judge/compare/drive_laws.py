@@ -21,14 +21,13 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
+from bemt.physics.effects.base import FORM
 
 NONE, UNKNOWN = "none", "unknown"
 _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
 # A smooth change of each channel on its own, as (size, and its level, bend and local shape over it): nobody knows what
 # makes it.
 _UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 1.0, 0.1, 0.06))
-# What a change may rise or bow with the command, share of the change, with its prior weight, as of every law.
-_FORM = {0.15: 0.7, 0.45: 0.3}
 _SIZES = (0.02, 0.07, 0.25)
 SURE = 0.85
 """Probability from which one cause in the drive is named."""
@@ -200,7 +199,7 @@ def _weighed(channels: Mapping[str, MatchedChannel], scatter: Mapping[str, Scatt
     score = {NONE: none}
     for row in LAWS:
         found = []
-        for form, prior in _FORM.items():
+        for form, prior in FORM.items():  # what a change may rise or bow with the command, as of every law
             columns = _columns(row, channels, form, volts)
             if columns is not None:
                 A, weight = white(columns), math.log(prior / len(row.sizes))

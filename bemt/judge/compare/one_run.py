@@ -26,6 +26,7 @@ from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.propeller import rotor_of
 
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
@@ -65,7 +66,7 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
 
 
 def compare_run(
-    path: str | os.PathLike[str], case: Case | str | os.PathLike[str], progress: Callable[[str], None] | None = None
+    path: str | os.PathLike[str], case: Any, progress: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
     """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
@@ -73,7 +74,7 @@ def compare_run(
     ``audit``, ``notes``, ``sentence``, ``next``. A file that is no run, or of another rotor, is refused.
     """
     name = os.fspath(path)
-    made = case if isinstance(case, Case) else _case(os.fspath(case))
+    made = rotor_of(case).case
     points, imported = cfd_points(name)
     notes = list(points.notes)
     for channel, words, value in (
@@ -128,15 +129,6 @@ def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> ND
                 raise InputError(Fault(name, channel, f"{angle.max():g} deg", expected))
             return np.asarray(angle)
     return np.full(rows.size, case.angle_deg)
-
-
-def _case(name: str) -> Case:
-    from bemt.rotors.case import find_cases, load_case
-
-    files = find_cases([name])
-    if len(files) != 1:
-        raise InputError(Fault("--case", "", number_of(len(files), "case"), "the case of the rotor"))
-    return load_case(files[0])
 
 
 def _with(d: Dataset, channel: str, value: float) -> Dataset:

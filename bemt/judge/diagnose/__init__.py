@@ -5,5 +5,5 @@ The way of the data: ``record`` (points and covariates) -> ``problem`` (baseline
 effect) -> ``gate``, ``verdict`` (with ``confusion``) -> ``fit`` (parameters, held-out blocks), ``locate``, ``suggest``
 -> document (``bemt.diagnosis/1``), text, figures.
 
-``bemt.diagnose(recording, propeller)`` goes all the way: ``help(bemt.app.library.diagnose)``.
+``bemt.diagnose(recordings, case)`` goes all the way.
 """

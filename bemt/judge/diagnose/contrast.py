@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt import __version__
+from bemt.base.action import Told
 from bemt.base.errors import Fault, InputError
 from bemt.base.face import as_html
 from bemt.judge.compare.change_document import Invocation, document, next_step
@@ -19,6 +20,7 @@ from bemt.judge.compare.recordings import ERROR_IN, RunChange
 from bemt.judge.compare.selection import conditions_of, selected, with_air
 from bemt.judge.compare.stand_run import stand_run
 from bemt.judge.diagnose.by_laws import changed
+from bemt.rotors.propeller import Propeller, rotor_of
 
 if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
@@ -68,6 +70,23 @@ class Contrast:
 
         return text(self.document)
 
+    @property
+    def details(self) -> str:
+        """The answer with its ranking, sub-systems and all notes."""
+        from bemt.judge.compare.contrast_text import text
+
+        return text(self.document, details=True)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of schema ``bemt.comparison/1``."""
+        return self.document
+
+    def picture(self) -> bytes:
+        """The two recordings and what changed, as PNG."""
+        from bemt.judge.compare.contrast_figure import picture
+
+        return picture(self.change, self.document)
+
     def __str__(self) -> str:
         """The answer on one screen."""
         return self.text
@@ -85,7 +104,7 @@ class Contrast:
 def compare(
     a: str | os.PathLike[str],
     b: str | os.PathLike[str],
-    case: Case | str | os.PathLike[str] | None = None,
+    case: Propeller | Case | str | os.PathLike[str] | None = None,
     *,
     diameter_m: float | None = None,
     label: str | None = None,
@@ -110,11 +129,11 @@ def compare(
     names = [os.fspath(a), os.fspath(b)]
     asked = Invocation(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
-        None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike) else case.path.as_posix(),
+        None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
+        else rotor_of(case).case.path.as_posix(),
     )  # fmt: skip
     diameter_m = label_diameter(label) if diameter_m is None else diameter_m
-    if isinstance(case, str | os.PathLike):
-        case = _case(os.fspath(case))
+    case = None if case is None else rotor_of(case).case
     conditions = [list(rows_a), list(rows_b)]
     if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
         raise InputError(
@@ -154,6 +173,51 @@ def compare(
     step = _after(doc) if "diagnosis" in doc else next_step(found, asked)
     doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
     return Contrast(found, doc)
+
+
+def compared(
+    a: str, b: str | None, case: Any, *, label: str | None, diameter_m: float | None, rows_a: Sequence[str],
+    rows_b: Sequence[str], air_a: str | None, air_b: str | None, out: str | None, figures: bool,
+    progress: Callable[[str], None] | None,
+) -> Contrast | Told:  # fmt: skip
+    """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
+    from bemt.judge.compare import one_run, two_grids, two_runs
+
+    found: Contrast | Told
+    if b is None:
+        if case is None:
+            hint = "Two recordings, A B, need none"
+            raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
+        document = one_run.compare_run(a, case, progress)
+        found = Told(document, one_run.text(document), one_run.text(document, details=True))
+    elif (grids := two_grids.compare_grids(a, b, rows_a, rows_b)) is not None:
+        found = Told(grids, two_grids.text(grids))
+    elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
+        found = Told(runs, two_runs.text(runs))
+    else:
+        found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
+                        air_b=air_b, progress=progress)  # fmt: skip
+    if out is not None:
+        beside = case if figures and not (rows_a or rows_b or air_a or air_b) else None
+        _write(Path(out), found, figures, [name for name in (a, b) if name is not None], beside)
+    return found
+
+
+def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str], case: Any) -> None:
+    """Write comparison.json, its text, a picture, and the recordings inside the prediction band of the case."""
+    from bemt.base.page import FIRST
+    from bemt.base.tables import json_text, write_atomic
+    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.load import load_all
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomic(out / "comparison.json", json_text(found.to_dict()))
+    write_atomic(out / "comparison.txt", (found.details or found.text) + "\n")
+    if figures and isinstance(found, Contrast):
+        write_atomic(out / "comparison.png", found.picture())
+    if case is not None and not (isinstance(found, Told) and len(files) > 1):
+        cases, records = load_all(files, [case])
+        write_atomic(out / f"{FIRST}.png", first_picture(records, cases)[0].png())
 
 
 def _findings(imported: Dataset, diameter_m: float | None, ducted: bool) -> tuple[Finding, ...]:
@@ -200,16 +264,6 @@ def _two_choices(name: str) -> str:
             one, two = (shlex.quote(f"{column}={k}") for k in told[:2])
             return f"{how}; choose as in --rows-a {one} --rows-b {two}"
     return how
-
-
-def _case(path: str) -> Case:
-    """Read the one case at a path."""
-    from bemt.rotors.case import find_cases, load_case
-
-    found = find_cases([path])
-    if len(found) != 1:
-        raise InputError(Fault("--case", "", f"{len(found)} cases", "one case"))
-    return load_case(found[0])
 
 
 def _diagnosed(

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
+from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
 from bemt.judge.diagnose import figures_effects, figures_posterior
 from bemt.judge.diagnose.document import headline
-from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+from bemt.judge.diagnose.figures_recording import first_picture
 from bemt.judge.diagnose.record import CHANNELS
 
 if TYPE_CHECKING:

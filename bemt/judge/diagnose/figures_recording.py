@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
-FIRST = "recording"
-"""Stem of the file."""
-
 
 def points_of(record: Record) -> Dataset:
     """Give the points of a record, with their loads and what these are uncertain by."""

@@ -14,8 +14,9 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.evidence import unknown
 from bemt.judge.diagnose.explanation import Explanation
-from bemt.judge.diagnose.form import FORM, form_modes
+from bemt.judge.diagnose.form import form_modes
 from bemt.judge.diagnose.signatures import effect_of
+from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.evidence import Evidence

@@ -13,15 +13,12 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms
 from bemt.judge.diagnose import noise
 from bemt.physics import effects
+from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
     from bemt.base.gaussian.whitening import Conditional
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.signatures import Candidate
-
-FORM = {0.15: 0.7, 0.45: 0.3}
-"""Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect
-differ by that, of some by half [1]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -14,16 +15,17 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
-from bemt.data.readers._headings import surely_shaft_speed
+from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.recordings.channels import file_name, named, stated
 from bemt.data.recordings.check import check
 from bemt.judge.compare.selection import one_rotor, speed_in_doubt, wind_of
 from bemt.judge.diagnose import record as records
 from bemt.physics import effects
 from bemt.physics.air import Air
-from bemt.physics.dataset import Dataset
+from bemt.physics.dataset import Dataset, from_pandas
 from bemt.rotors.case import find_cases, load_case
 from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.propeller import rotor_of
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.record import Record
@@ -40,9 +42,9 @@ _SHORT, _STEADY = 200, 0.75
 _ONE_SPEED = 2.0
 
 
-def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
-    """Cases of the command line, one or one for each recording."""
-    found = [load_case(p) for given in paths for p in find_cases([given])]
+def cases_of(given: Sequence[Any], off: Sequence[str], n: int) -> list[Case]:
+    """Cases by object, path or label, one or one for each recording."""
+    found = [case for one in given for case in _cases(one)]
     if len(found) not in (1, n):
         got, expected = f"{len(found)} cases for {n} recordings", "one case, or one for each recording"
         raise InputError(Fault("--case", "", got, expected))
@@ -53,6 +55,13 @@ def cases_of(paths: Sequence[str], off: Sequence[str], n: int) -> list[Case]:
     if off:
         found = [c.replaced({"model.effects_off": [*c.get("model.effects_off"), *off]}) for c in found]
     return found
+
+
+def _cases(given: Any) -> list[Case]:
+    """Cases of one word: those of a folder, or that of a label."""
+    if isinstance(given, (str, os.PathLike)) and Path(given).is_dir():
+        return [load_case(p) for p in find_cases([os.fspath(given)])]
+    return [rotor_of(given).case]
 
 
 def load(
@@ -121,7 +130,7 @@ def _airspeed_in_doubt(imported: Dataset, case: Case, path: str) -> None:
     zero = wind_of(imported)
     if zero is not None and not case.airspeed_m_s:
         got = f"thrust that is negative below {zero:.0f} rev/min, as in wind, and no airspeed"
-        hint = "State it: --airspeed V (compare: --air-a or --air-b); in still air, where the cell's zero is off: 0"
+        hint = "State it: --airspeed-m-s V (compare: --air-a or --air-b); in still air, where the cell's zero is off: 0"
         raise InputError(Fault(path, "airspeed_m_s", got, "the airspeed", hint))
 
 
@@ -229,12 +238,12 @@ def _points(imported: Dataset, rows: Dataset, path: str) -> Dataset:
 
 
 def load_all(
-    recordings: Sequence[str], cases: Sequence[str], references: Sequence[str] = (), off: Sequence[str] = (),
+    recordings: Sequence[Any], cases: Sequence[Any], references: Sequence[Any] = (), off: Sequence[str] = (),
     only: Sequence[str] = (), before: Callable[[Sequence[Case]], None] | None = None,
     rpm: Sequence[float] = (), airspeed_m_s: Sequence[float] = (), ruled_out: Sequence[str] = (),
     reference_case: Case | None = None,
 ) -> tuple[list[Case], list[Record]]:  # fmt: skip
-    """Cases of the recordings, and recordings with the references last.
+    """Cases of the recordings, and recordings with the references last; each a path, a Dataset or a DataFrame.
 
     ``before`` may refuse the cases before any recording is read. References have the case of the recordings unless
     they have one of their own.
@@ -249,7 +258,7 @@ def load_all(
         prepare_case(case, None, 10)  # an unknown effect in the case is said before the work begins
     chosen = found * len(recordings) if len(found) == 1 else found
     counts = (len(recordings), len(recordings) + len(references))
-    speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed", airspeed_m_s, *counts)
+    speeds, winds = _each("--rpm", rpm, *counts), _each("--airspeed-m-s", airspeed_m_s, *counts)
     of_each = [*chosen, *[reference_case or found[0]] * len(references)]
     files = list(zip([*recordings, *references], of_each, speeds, winds, strict=True))
     if references and len(found) > 1 and reference_case is None:
@@ -257,15 +266,15 @@ def load_all(
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all, or theirs", hint))
     own, other = files[: len(recordings)], files[len(recordings) :]
     steps = [*_on_grids(own), *(s := _on_grids(other))]
-    read = _together(*(partial(load, p, c, d, n, v) for p, c, n, v, d in steps))
+    read = _together(*(partial(_read, p, c, d, n, v) for p, c, n, v, d in steps))
     known = [replace(r, reference=True) for r in read[len(read) - len(s) :]]
     return found, [*read[: len(read) - len(s)], *known]
 
 
-_File = tuple[str, "Case", float | None, float | None]
+_File = tuple[Any, "Case", float | None, float | None]
 
 
-def _on_grids(files: Sequence[_File]) -> list[tuple[str, Case, float | None, float | None, Dataset | None]]:
+def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, float | None, Dataset | None]]:
     """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import run_at
     from bemt.data.recordings.cfd_study import are_grids, together
@@ -273,7 +282,7 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[str, Case, float | None, flo
     runs: dict[int, Dataset] = {}
     for i, (path, _, rpm, wind) in enumerate(files if len(files) > 1 else ()):
         with suppress(InputError):  # said where it is loaded
-            if (run := run_at(path, rpm, wind)) is not None:
+            if isinstance(path, str) and (run := run_at(path, rpm, wind)) is not None:
                 runs[i] = run
     out, taken = [], set[int]()
     for i, file in enumerate(files):
@@ -286,6 +295,12 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[str, Case, float | None, flo
         taken |= {*group}
         out.append((*file, together([runs[j] for j in group]) if len(group) > 1 else runs.get(i)))
     return out
+
+
+def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspeed_m_s: float | None) -> Record:
+    if isinstance(given, str):
+        return load(given, case, run, rpm, airspeed_m_s)
+    return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 
 def _together(*steps: Callable[[], Any]) -> list[Any]:
@@ -302,9 +317,13 @@ def _together(*steps: Callable[[], Any]) -> list[Any]:
     return out
 
 
-def _there(path: str) -> None:
+def _there(path: Any) -> None:
     """Refuse a recording that does not exist."""
-    if not Path(path).exists():
+    if not isinstance(path, str):
+        if not isinstance(path, Dataset) and not hasattr(path, "columns"):
+            expected = "a path, a Dataset or a DataFrame"
+            raise InputError(Fault("", "recordings", f"{type(path).__name__} {path!r:.40}", expected))
+    elif not Path(path).exists():
         raise InputError(Fault(path, "", "no such file or folder", "a recording", "Check the path"))
 
 
@@ -317,19 +336,14 @@ def _each(option: str, given: Sequence[float], recordings: int, n: int) -> list[
     return [*map(float, given), *[None] * (n - len(given))]
 
 
-def _told_twice(paths: Sequence[str], only: Sequence[str], ruled_out: Sequence[str]) -> None:
+def _told_twice(given: Sequence[Any], only: Sequence[str], ruled_out: Sequence[str]) -> None:
     """Refuse recordings that count twice and effects that nobody knows."""
+    paths = [p for p in given if isinstance(p, str)]
     files = [Path(p).resolve() for p in paths]
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
     faults += [*_unknown(only), *_unknown(ruled_out, "--ruled-out")]
     if faults:
-        raise InputError(faults)
-
-
-def check_effects(only: Sequence[str]) -> None:
-    """Refuse effects that nobody knows."""
-    if faults := _unknown(only):
         raise InputError(faults)
 
 

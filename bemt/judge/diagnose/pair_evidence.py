@@ -10,11 +10,11 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum
-from bemt.judge.diagnose import form
 from bemt.judge.diagnose.explanation import NONE, Explanation
 from bemt.judge.diagnose.signatures import effect_of
 from bemt.judge.diagnose.state import State
 from bemt.physics import effects
+from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
@@ -116,7 +116,7 @@ def _form_gain(
     plain = state.white.changes(np.concatenate([x for _, x in shapes], axis=1))
     rest, of_a, of_b = plain.T @ state.r, plain.T @ state.S[:, A], plain.T @ state.S[:, B]
     gram = plain.T @ plain
-    choices = [(tuple(form.FORM) if modes else (min(form.FORM),)) if width else (1.0,)
+    choices = [(tuple(FORM) if modes else (min(FORM),)) if width else (1.0,)
                for (modes, _), width in zip(shapes, widths, strict=True)]  # fmt: skip
     sizes = list(product(*choices))
     scales = np.array([
@@ -125,7 +125,7 @@ def _form_gain(
         for chosen in sizes
     ])  # fmt: skip
     roots = np.linalg.cholesky(np.eye(scales.shape[1]) + scales[:, :, None] * gram * scales[:, None, :])
-    weights = np.array([sum(float(np.log(form.FORM.get(s, 1.0))) for s in chosen) for chosen in sizes])
+    weights = np.array([sum(float(np.log(FORM.get(s, 1.0))) for s in chosen) for chosen in sizes])
     levels = weights - np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
     found = np.linalg.solve(roots, (scales * (rest - of_a[:, at[0]] - of_b[:, at[1]]))[:, :, None])[:, :, 0]
     best = int(np.argmax([0.5 * float(d @ d) + level for d, level in zip(found, levels, strict=True)]))

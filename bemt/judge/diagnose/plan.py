@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -62,12 +63,38 @@ class Plan:
             words[i] = "visible" if seen else "invisible" if hidden else "marginal"
         return words | dict.fromkeys(self.absent, "invisible")
 
+    @property
+    def detectable(self) -> dict[str, str]:
+        """Each effect: yes, maybe or no at its ordinary strength."""
+        return {effect: DETECTABLE[word] for effect, word in self.sight.items()}
 
-def points(path: str, case: Case) -> Record:
-    """Read the points of a plan: a recording whose loads are not there yet."""
+    @property
+    def text(self) -> str:
+        """Tables for a terminal."""
+        return text(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of schema ``bemt.plan/1``."""
+        return document(self)
+
+
+def given(points: Any, case: Case) -> Record:
+    """Points of a plan (path, Dataset, DataFrame or columns): a recording whose loads are not there yet."""
     from bemt.data.recordings.load import import_file
+    from bemt.physics.dataset import Dataset, from_pandas
 
-    return record_of(import_file(path), case)
+    if isinstance(points, (str, os.PathLike)):
+        return record_of(import_file(os.fspath(points)), case)
+    if isinstance(points, Dataset):
+        return record_of(points, case)
+    import pandas as pd
+
+    if not isinstance(points, (Mapping, pd.DataFrame)):
+        from bemt.base.errors import Fault, InputError
+
+        expected = "a path, a Dataset, a DataFrame or columns by name"
+        raise InputError(Fault("", "points", f"{type(points).__name__} {points!r:.40}", expected))
+    return record_of(from_pandas(pd.DataFrame(points), name="points"), case)
 
 
 def record_of(imported: Dataset, case: Case) -> Record:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import copy
 import math
+import os
 import re
+import shlex
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,9 @@ import numpy as np
 import tomlkit
 
 from bemt import __version__
-from bemt.base.errors import Fault, InputError
+from bemt.base.action import in_words_of_the_library
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.judge.compare.as_measured import AsMeasured, as_measured
 from bemt.judge.diagnose.improve import beside, elsewhere
@@ -26,6 +31,8 @@ from bemt.rotors.case.as_built import MOVED, posterior_document
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
+from bemt.rotors.propeller import Propeller
+from bemt.rotors.propeller import load as load_rotor
 from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
@@ -196,3 +203,74 @@ def flight_point(case: Case, found: AsMeasured) -> float | None:
         return None
     pitch = case.rotor().blade.pitch_m()
     return 0.5 * ZERO_THRUST_MEASURED * pitch * case.rpm / 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedRotor:
+    """A rotor as its own runs show it, returned by :func:`bemt.calibrate_rotor`.
+
+    Parameters
+    ----------
+    source : Propeller
+        The propeller as its case describes it.
+    found : bemt.judge.compare.as_measured.AsMeasured
+        What the runs say.
+    recordings : tuple of str
+        The files.
+    folder : str, optional
+        Where its case was written.
+    files : tuple of str
+        Names of its files there.
+
+    Examples
+    --------
+    See :func:`bemt.calibrate_rotor`, which shows ``.converged``, ``.text``, ``.to_dict()`` and ``.write(folder)``.
+    """
+
+    source: Propeller
+    found: AsMeasured
+    recordings: tuple[str, ...]
+    folder: str | None = None
+    files: tuple[str, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fit converged."""
+        return bool(self.found.found.converged)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if the fit did not converge."""
+        return EXIT_OK if self.converged else EXIT_UNCONVERGED
+
+    @property
+    def text(self) -> str:
+        """What the runs say, and the next command."""
+        lines = [text(self.to_dict())]
+        if self.folder is None:
+            return "\n".join([*lines, "nothing written; --out DIR writes the case with this rotor"])
+        typed = shlex.quote(Path(self.folder).as_posix())
+        lines += [f"{Path(self.folder).as_posix()}: {', '.join(self.files)}", f"next: bemt sweep {typed}"]
+        lines += [f"      bemt drive {typed}"] if self.source.case.file.drive is not None else []
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert to plain values of schema ``bemt.rotor_calibration/1``."""
+        return document(self.source.case, self.found, self.recordings)
+
+    def write(self, folder: str | os.PathLike[str]) -> Propeller:
+        """Write the case of the rotor as measured, and load it.
+
+        Parameters
+        ----------
+        folder : str or path
+            Folder for the case; not the one of the case itself.
+
+        Returns
+        -------
+        Propeller
+            The rotor with its narrower band.
+        """
+        with in_words_of_the_library():
+            write(self.source.case, self.found, self.recordings, path_text("out", folder))
+        return load_rotor(folder)

@@ -16,7 +16,6 @@ from bemt.judge.diagnose import blocks, ratio_check, wrong_rotor_check
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import rule as ruling
 from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.diagnose.form import FORM
 from bemt.judge.diagnose.revisions import REVISIONS
 from bemt.judge.diagnose.rule import Rule, appended
 from bemt.judge.diagnose.suggest import LEVEL
@@ -52,6 +51,7 @@ from bemt.judge.diagnose.verdict import (
     unsettled,
 )
 from bemt.physics import effects
+from bemt.physics.effects.base import FORM
 
 MOTOR = "motor"
 """Another motor, controller or setting, as the scaling laws name it: no effect of the catalogue describes it."""

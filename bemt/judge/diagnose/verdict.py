@@ -19,7 +19,6 @@ from bemt.judge.diagnose import confusion as look
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import prior
 from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.diagnose.form import FORM
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.diagnose.thresholds import (
     ANOTHER,
@@ -45,7 +44,7 @@ from bemt.judge.diagnose.thresholds import (
     SURE,
 )
 from bemt.physics import effects
-from bemt.physics.effects.base import Effect
+from bemt.physics.effects.base import FORM, Effect
 
 if TYPE_CHECKING:
     from bemt.judge.compare.recordings import RunChange

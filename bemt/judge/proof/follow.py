@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.judge.proof import prove, score, seal
 from bemt.judge.proof.items import recording_text
 from bemt.judge.proof.pairs import followed, pair_files
 from bemt.judge.proof.real import DENSITY, POUND, WRONG_DENSITY
+from bemt.judge.proof.rows import Entry
 
 SCHEMA = "bemt.followed/1"
 _SILENT = ("none", "unknown", "insufficient")
@@ -40,62 +41,79 @@ def with_reference(folder: Path, undone: Mapping[str, float]) -> dict[str, str]:
     return given | {"recording.csv": recording_text(test), "reference.csv": recording_text(known)}
 
 
-def _asked_again(out: Path, entry: Mapping[str, Any]) -> tuple[str, dict[str, str]] | None:
+def _asked_again(out: Path, entry: Entry) -> tuple[str, dict[str, str]] | None:
     """Step and files of an item that was silent; None where nobody took the step."""
-    if entry["set"] in _UNDONE:
-        return "a reference without the cause", with_reference(out / "items" / entry["folder"], _UNDONE[entry["set"]])
-    if entry["plan"] == "pair" and not entry["set"].endswith("case"):
+    if entry.set in _UNDONE:
+        return "a reference without the cause", with_reference(out / "items" / entry.folder, _UNDONE[entry.set])
+    if entry.plan == "pair" and not entry.set.endswith("case"):
         for way in followed():
-            if " | ".join(way.of) == entry["rig"]:
+            if " | ".join(way.of) == entry.rig:
                 files = pair_files(*way.ab)
                 return None if files is None else (way.step, files)
     return None
 
 
-def follow(out: Path, jobs: int = 2, say: Callable[[str], None] | None = None) -> dict[str, Any]:
+class FollowedItem(Documented):
+    """A silent item, the step that was taken, and the answers before and after it in a word."""
+
+    set: str
+    rig: str
+    before: str
+    step: str
+    after: str
+    said: Mapping[str, Any]  # Verdict and effects after the step, nothing where it failed
+    error: str
+
+
+class FollowedItems(Documented):
+    """Document of the steps."""
+
+    schema: str
+    followed: tuple[FollowedItem, ...]
+
+
+def follow(out: Path, jobs: int = 2, say: Callable[[str], None] | None = None) -> FollowedItems:
     """Take the steps for all silent items of a proof of published recordings."""
     key = seal.unseal(out)
     todo = []
-    for entry in key["items"]:
-        file = out / "answers" / f"{entry['folder']}.json"
-        stored = json.loads(file.read_text("utf-8")) if file.exists() else {}
-        if not entry["causes"] or not stored.get("answer"):
+    for entry in key.items:
+        answer = seal.stored(out / "answers" / f"{entry.folder}.json").answer
+        if not entry.causes or not answer:
             continue
-        before = score.answered(score.judge(entry, stored["answer"]))
+        before = score.answered(score.judge(entry, answer))
         again = _asked_again(out, entry) if before in _SILENT else None
         if again is not None:
             todo.append((entry, before, *again))
 
-    def one(task: tuple[Mapping[str, Any], str, str, dict[str, str]]) -> dict[str, Any]:
+    def one(task: tuple[Entry, str, str, dict[str, str]]) -> FollowedItem:
         entry, before, step, files = task
-        folder = out / "followed" / entry["folder"]
+        folder = out / "followed" / entry.folder
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             write_atomic(folder / name, content)
         answer, error = prove.diagnose_folder(folder)
         after = score.answered(score.judge(entry, answer))
-        said = {} if answer is None else {"verdict": answer["verdict"], "effects": answer["effects"]}
-        told = {"set": entry["set"], "rig": entry["rig"], "before": before, "step": step, "after": after}
-        return told | {"said": said, "error": "" if answer else error[-500:]}
+        said = {"verdict": answer.verdict, "effects": answer.effects} if answer else {}
+        return FollowedItem(entry.set, entry.rig, before, step, after, said, "" if answer else error[-500:])
 
     found = prove.on_threads(one, todo, jobs, prove.teller("followed", say))
-    document = {"schema": SCHEMA, "followed": found}
-    write_atomic(out / "followed.json", json_text(document))
-    write_atomic(out / "followed.txt", text(document) + "\n")
-    return document
+    told = FollowedItems(SCHEMA, tuple(found))
+    write_atomic(out / "followed.json", json_text(told.document()))
+    write_atomic(out / "followed.txt", text(told) + "\n")
+    return told
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(told: FollowedItems) -> str:
     """Table of the steps."""
-    found = document["followed"]
+    found = told.followed
     words = ("found", "class", "none", "unknown", "insufficient", "wrong", "failed")
     rows = []
-    for kind in sorted({str(r["set"]) for r in found}):
-        some = [r["after"] for r in found if r["set"] == kind]
+    for kind in sorted({r.set for r in found}):
+        some = [r.after for r in found if r.set == kind]
         rows.append([kind, str(len(some)), *(str(some.count(w)) for w in words)])
-    right = sum(r["after"] in ("found", "class") for r in found)
+    right = sum(r.after in ("found", "class") for r in found)
     head = f"{len(found)} open answers followed by the step they recommend: {right} right or in a class"
-    each = [[r["set"], r["rig"], r["before"], r["step"], f"{r['after']}: {', '.join(r['said'].get('effects', ()))}"]
+    each = [[r.set, r.rig, r.before, r.step, f"{r.after}: {', '.join(r.said.get('effects', ()))}"]
             for r in found]  # fmt: skip
     return "\n\n".join([
         head, text_table(["set", "followed", *words], rows, left=(0,), indent="  "),

@@ -7,15 +7,19 @@ that a new item stays below in nine cases of ten (split conformal).  Half-widths
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bemt import __version__
-from bemt.judge.diagnose.interval_scales import scale_of
+from bemt.base.tables import json_text, write_atomic
+from bemt.judge.diagnose.interval_scales import FILE, scale_of
 from bemt.judge.proof import seal
+from bemt.judge.proof.rows import Entry, Estimate
 from bemt.judge.proof.score import VISIBLE, judge
 from bemt.physics import effects
 
@@ -26,45 +30,53 @@ _ENOUGH = 12
 _LOWEST, _HIGHEST = 0.7, 3.0
 
 
-def misses(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+@dataclass(frozen=True)
+class Off:
+    """Half-widths that a true parameter is off."""
+
+    name: str  # effect.parameter
+    score: float
+
+
+def misses(folder: Path) -> tuple[dict[str, str], list[Off]]:
     """Open the key of a kept proof, answered with the factors in use; half-widths that each true parameter is off."""
     key = seal.unseal(folder)
-    out: list[dict[str, Any]] = []
-    for entry in key["items"]:
+    out = []
+    for entry in key.items:
         told = _told(folder, entry)
-        for cause, parameters in entry["parameters"].items():
+        for cause, parameters in entry.parameters.items():
             for name, true in parameters.items():
                 found = told.get(name) or told.get(f"{cause}.{name}")
-                if found and found["low"] < found["high"]:
-                    score = _score(found, float(true["value"])) * scale_of(cause, name)
-                    out.append({"effect": cause, "parameter": name, "score": score})
-    return {k: key[k] for k in ("seed", "size", "version")}, out
+                if found and found.low < found.high:
+                    out.append(Off(f"{cause}.{name}", _score(found, true.value) * scale_of(cause, name)))
+    return {"seed": key.seed, "size": key.size, "version": key.version}, out
 
 
-def _told(folder: Path, entry: Mapping[str, Any]) -> Mapping[str, Any]:
+def _told(folder: Path, entry: Entry) -> Mapping[str, Estimate]:
     """Parameters that the kept answer gives where it names the causes and the plan can see them."""
-    if not entry["causes"] or entry["set"] == "unlisted" or min(entry["separation"]) < VISIBLE:
+    if not entry.causes or entry.set == "unlisted" or min(entry.separation) < VISIBLE:
         return {}
-    answer = seal.answer(folder / "answers" / f"{entry['folder']}.json")
-    if not answer or not judge(entry, answer).right or set(answer["effects"]) != set(entry["causes"]):
+    answer = seal.stored(folder / "answers" / f"{entry.folder}.json").answer
+    if not judge(entry, answer).right or set(answer.effects) != set(entry.causes):
         return {}
-    listed = {frozenset(str(r["effect"]).split("+")): r["parameters"] for r in answer["ranking"]}
-    found: Mapping[str, Any] = listed.get(frozenset(entry["causes"]), {})
-    return {k: v for k, v in found.items() if isinstance(v["value"], float)}
+    listed = {frozenset(r.effect.split("+")): r.parameters for r in answer.ranking}
+    found = listed.get(frozenset(entry.causes), {})
+    return {k: v for k, v in found.items() if isinstance(v.value, float)}
 
 
-def _score(told: Mapping[str, float], true: float) -> float:
+def _score(told: Estimate, true: float) -> float:
     """Distance of the truth from the estimate in half-widths on its side [1]."""
-    off = true - told["value"]
-    half = told["high"] - told["value"] if off > 0 else told["value"] - told["low"]
+    value = float(told.value)
+    off = true - value
+    half = told.high - value if off > 0 else value - told.low
     return abs(off) / max(half, 1e-12)
 
 
-def calibrate(found: Sequence[Mapping[str, Any]], sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def calibrate(found: Sequence[Off], sets: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Document of the factors, with where they come from; a kind is calibrated on those without one of their own."""
     by_name: dict[str, list[float]] = {}
     for m in found:
-        by_name.setdefault(f"{m['effect']}.{m['parameter']}", []).append(m["score"])
+        by_name.setdefault(m.name, []).append(m.score)
     own = {k: v for k, v in sorted(by_name.items()) if len(v) >= _ENOUGH}
     by_kind: dict[str, list[float]] = {}
     for name, scores in by_name.items():
@@ -86,3 +98,11 @@ def _factor(scores: Sequence[float]) -> dict[str, Any]:
     quantile = np.interp(SHARE * (n + 1), np.arange(1, n + 1), np.sort(scores))
     scale = float(np.clip(quantile, _LOWEST, _HIGHEST))
     return {"scale": round(scale, 3), "n": n, "held": round(float(np.mean(np.array(scores) <= 1.0)), 3)}
+
+
+def rewrite(folders: Sequence[Path], out: str | os.PathLike[str] | None) -> str:
+    """Write the factors on the intervals that kept proofs show; gives the file's name."""
+    sets, found = zip(*(misses(folder) for folder in folders), strict=True)
+    target = Path(out or ".") / FILE
+    write_atomic(target, json_text(calibrate([m for some in found for m in some], sets)))
+    return target.as_posix()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, applied
 from bemt.judge.proof.rigs import Rig, conditions, extended
+from bemt.judge.proof.rows import Entry, TrueValue
 from bemt.judge.proof.separation import FREEDOM, Yardstick, freedom, yardstick
 from bemt.judge.proof.stand import Stand, full_scales, record
 from bemt.judge.proof.truth import TrueAnswer
@@ -111,7 +111,7 @@ class Item:
     """One concealed item."""
 
     files: Mapping[str, str]  # Name to text: recording.csv, case.toml, stations.csv
-    entry: Mapping[str, Any]  # What the key says of it
+    entry: Entry  # What the key says of it
     # Run without the causes that can be taken away, given when the diagnosis asks for one; "" where it has no solution
     reference: str = ""
 
@@ -219,32 +219,21 @@ def make_item(
     }
     rule = yardstick(plain_loads, rows.run, base, bench.tangents(), electric)
     parts = [_judge(rule, bench, cause, s) for cause, s in zip(causes, signed, strict=True)]
-    entry: dict[str, Any] = {
-        "set": kind,
-        "causes": list(ids),
-        "kinds": [c.kind for c in causes],
-        "strengths": list(strengths),
-        "parameters": {
-            c.id: {n: {"value": v, "unit": u} for n, (v, u) in ch.parameters.items()}
-            for c, ch in zip(causes, changes, strict=True)
-        },
-        "separation": [p["separation"] for p in parts],
-        "separation_noise": [p["separation_noise"] for p in parts],
-        "alike": [p["alike"] for p in parts],
-        "variables": [_varied(c.variables, rows) for c in causes],
-        "plan": bench.plan,
-        "rig": bench.rig.name,
-        "ducted": bench.rig.duct is not None,
-        "seed": seed,
-        "referenced": "reference.csv" in files,
-        "stated": stated,
-        "air_known": air_known,
-        "rows": int(np.count_nonzero(good)),
-        "stand": {k: v for k, v in vars(stand).items() if k in _QUALITY},
-    }
+    noise, whole, alike = zip(*parts, strict=True) if parts else ((), (), ())
+    together = None
     if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
-        vectors = [rule.whole(rule.stack(s)) for s in signed]
-        entry["separation_together"] = [_across(vectors[k], vectors[1 - k]) for k in (0, 1)]
+        a, b = (rule.whole(rule.stack(s)) for s in signed)
+        together = _across(a, b), _across(b, a)
+    true = {c.id: {n: TrueValue(v, u) for n, (v, u) in ch.parameters.items()}
+            for c, ch in zip(causes, changes, strict=True)}  # fmt: skip
+    entry = Entry(
+        set=kind, causes=ids, kinds=tuple(c.kind for c in causes), strengths=strengths, parameters=true,
+        separation=whole, separation_noise=noise, alike=alike,
+        variables=tuple(_varied(c.variables, rows) for c in causes), plan=bench.plan, rig=bench.rig.name,
+        ducted=bench.rig.duct is not None, seed=seed, referenced="reference.csv" in files, stated=stated,
+        air_known=air_known, rows=int(np.count_nonzero(good)),
+        stand={k: v for k, v in vars(stand).items() if k in _QUALITY}, separation_together=together,
+    )  # fmt: skip
     return Item(files, entry, reference)
 
 
@@ -272,7 +261,7 @@ def _shown(
 
 
 def further_run(
-    bench: Bench, entry: Mapping[str, Any], runs: Sequence[Sequence[Mapping[str, float]]],
+    bench: Bench, entry: Entry, runs: Sequence[Sequence[Mapping[str, float]]],
     mended: Collection[str] = (), day: int = 0,
 ) -> str:  # fmt: skip
     """The last of the runs that were asked for, as CSV, on the rotor and stand of an item; "" if it has no solution.
@@ -287,22 +276,22 @@ def further_run(
     return _measured_again(Bench(bench.rig, bench.plan, rows), bench, entry, own, mended, (2, len(runs), day), told)
 
 
-def recorded_again(bench: Bench, entry: Mapping[str, Any], mended: Collection[str], day: int) -> str:
+def recorded_again(bench: Bench, entry: Entry, mended: Collection[str], day: int) -> str:
     """The points of an item once more on another day, as CSV, without the causes that were mended; "" if unsolved."""
     return _measured_again(bench, bench, entry, np.ones(bench.rows.rpm.size, dtype=bool), mended, (3, day), False)
 
 
 def _measured_again(
-    wider: Bench, bench: Bench, entry: Mapping[str, Any], own: NDArray[np.bool_], mended: Collection[str],
+    wider: Bench, bench: Bench, entry: Entry, own: NDArray[np.bool_], mended: Collection[str],
     draw: tuple[int, ...], air_told: bool,
 ) -> str:  # fmt: skip
     """Own rows of a bench on rotor and stand of an item."""
-    h = hidden(bench, entry["causes"], entry["strengths"], int(entry["seed"]), entry["set"], mended)
+    h = hidden(bench, entry.causes, entry.strengths, entry.seed, entry.set, mended)
     # each cell keeps the full scale that it had
     scales = full_scales(bench.measure(h.world, h.stand)[0])
-    rng = np.random.default_rng((int(entry["seed"]), *draw))
+    rng = np.random.default_rng((entry.seed, *draw))
     real, columns = wider.measure(h.world, h.stand, rng, scales=scales)
-    air_known = (air_told and "air_density" not in entry["causes"]) or bool(entry.get("air_known"))
+    air_known = (air_told and "air_density" not in entry.causes) or bool(entry.air_known)
     shown = _shown(wider, real, columns, h.stand, air_known, rng, h.stated)
     good = own & np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
@@ -327,10 +316,10 @@ def _reference(
 _QUALITY = ("noise", "floor", "share", "memory", "session", "step", "rpm_noise", "airspeed_noise")
 
 
-def _varied(names: Sequence[str], rows: Conditions) -> list[str]:
+def _varied(names: Sequence[str], rows: Conditions) -> tuple[str, ...]:
     """Variables of a cause that the plan varies: where nothing changes along one, nothing can be located in it."""
     still = float(np.ptp(rows.airspeed)) == 0.0
-    return [n for n in names if not (still and n in ("j", "airspeed"))]
+    return tuple(n for n in names if not (still and n in ("j", "airspeed")))
 
 
 def _across(own: Array, other: Array) -> float:
@@ -338,11 +327,13 @@ def _across(own: Array, other: Array) -> float:
     return float(np.linalg.norm(own - (own @ other) / length * other)) if length > 0.0 else float(np.linalg.norm(own))
 
 
-def _judge(rule: Yardstick, bench: Bench, cause: Cause, signature: Mapping[str, Array]) -> dict[str, Any]:
+def _judge(
+    rule: Yardstick, bench: Bench, cause: Cause, signature: Mapping[str, Array]
+) -> tuple[float, float, tuple[str, ...]]:
+    """Separation over noise and over all that is unknown, and what looks alike."""
     own = rule.stack(signature)
-    noise, whole = rule.separation(own)
     others = {i: rule.stack(s) for i, s in bench.signatures().items() if i != cause.id and i in LISTED}
-    return {"separation": whole, "separation_noise": noise, "alike": rule.alike(own, others)}
+    return *rule.separation(own), tuple(rule.alike(own, others))
 
 
 def recording_text(columns: Mapping[str, Array]) -> str:

@@ -19,21 +19,23 @@ import json
 import math
 import shlex
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from itertools import count, pairwise, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import draw, prove, score, seal
 from bemt.judge.proof.causes import CAUSES
 from bemt.judge.proof.items import Bench, further_run, recorded_again
 from bemt.judge.proof.rigs import Rig
+from bemt.judge.proof.rows import Answer, Entry, Step
 from bemt.physics import effects
 
 SCHEMA = "bemt.loop/1"
@@ -51,7 +53,7 @@ class Course:
     """How one item went."""
 
     folder: str  # Item
-    answers: list[dict[str, Any]]  # First answer, then one after each step
+    answers: list[Answer]  # First answer, then one after each step
     # What each step was: ``reference``, ``run``, ``look``, ``mend`` (recorded once more without what was named) or
     # ``model`` (into the case, no run)
     steps: list[str] = field(default_factory=list)
@@ -61,10 +63,43 @@ class Course:
     # the loop cannot take, "no run", "used up", "failed"
     end: str = ""
 
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Course:
+        """Course that was kept."""
+        return cls(**{**document, "answers": [Answer.from_document(a) for a in document["answers"]]})
+
+    def document(self) -> dict[str, Any]:
+        """The course to be kept."""
+        return {**vars(self), "answers": [a.document() for a in self.answers]}
+
     def after(self, runs: int) -> int:
         """Place of the last answer that so many runs gave."""
         used = np.cumsum([0, *(step != _MODEL for step in self.steps)])
         return int(np.count_nonzero(used[: len(self.answers)] <= runs)) - 1
+
+
+class After(Documented):
+    """What was found after so many runs, each of how many, and the time of the stand [min]."""
+
+    runs: int
+    found: tuple[int, int]
+    found_or_class: tuple[int, int]
+    pairs_named: tuple[int, int]
+    pairs: tuple[int, int]
+    right_when_claimed: tuple[int, int]
+    nulls_accused: tuple[int, int]
+    unlisted_named: tuple[int, int]
+    minutes: float
+
+
+class Loop(Documented):
+    """Document of a loop."""
+
+    schema: str
+    programme: str
+    items: int
+    after: tuple[After, ...]
+    ends: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -82,7 +117,7 @@ class _Item:
     """An item at work: its files, its bench, the runs made so far, and the command that was answered last."""
 
     out: Path
-    entry: Mapping[str, Any]
+    entry: Entry
     bench: Bench
     box: Path
     left: int  # Runs
@@ -94,7 +129,7 @@ class _Item:
 
     def reference(self) -> int:
         """Bring the reference that was sealed with the item; how many points it has, 0 if there is none."""
-        file = self.out / prove.ASKED / str(self.entry["folder"]) / _REFERENCE
+        file = self.out / prove.ASKED / self.entry.folder / _REFERENCE
         if not file.exists():
             return 0
         words = file.read_text("utf-8")
@@ -126,7 +161,7 @@ class _Item:
 
     def mend(self, names: Sequence[str]) -> int:
         """Take causes away, those that are there, and record everything once more; how many points that is."""
-        self.mended += [n for n in names if n in self.entry["causes"]]
+        self.mended += [n for n in names if n in self.entry.causes]
         day, points = self._day(), 0
         texts = {"recording.csv": recorded_again(self.bench, self.entry, self.mended, day)}
         for k in range(1, len(self.runs) + 1):
@@ -163,17 +198,17 @@ class _Item:
         return list(words)
 
 
-def _recommended(item: _Item, answer: Mapping[str, Any]) -> _Taken | str:
+def _recommended(item: _Item, answer: Answer) -> _Taken | str:
     """Take the step that follows from an answer; else say why there is none."""
-    step = answer.get("next_measurement") or {}
-    if answer["verdict"] in _DONE:
-        return _put_aside(item, answer["effects"], bool(answer.get("confirmed")))
-    if step.get("kind") == "look" and not step.get("checks"):  # of a class, the fault that is sure is to be put right
-        return _put_aside(item, [s[0] for s in answer.get("sets", ()) if len(s) == 1 and _at_the_stand(s[0])], False)
+    step = answer.step
+    if answer.verdict in _DONE:
+        return _put_aside(item, answer.effects, answer.confirmed)
+    if step.kind == "look" and not step.checks:  # of a class, the fault that is sure is to be put right
+        return _put_aside(item, [s[0] for s in answer.sets if len(s) == 1 and _at_the_stand(s[0])], False)
     taken = _step(item, step)
-    if taken in ("no reference", "mend") and step.get("otherwise"):
-        taken = _step(item, step["otherwise"])
-    return "none" if answer["verdict"] == "none" and taken == "no run" else taken
+    if taken in ("no reference", "mend") and step.otherwise:
+        taken = _step(item, step.otherwise)
+    return "none" if answer.verdict == "none" and taken == "no run" else taken
 
 
 def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | str:
@@ -204,23 +239,23 @@ def _at_the_stand(name: str) -> bool:
     return name in _SET_UP or (name in known and known[name].kind == "stand")
 
 
-def _step(item: _Item, step: Mapping[str, Any]) -> _Taken | str:
+def _step(item: _Item, step: Step) -> _Taken | str:
     """Take one step."""
-    kind, commands = str(step.get("kind", "")), step.get("commands") or ()
+    kind, commands = step.kind, step.commands
     if kind not in ("run", "reference", "look") or not commands:
         return kind or "no run"
     if not item.left:
         return "used up"
     words = shlex.split(commands[0])[1:]
     if kind == "look":
-        if not step.get("checks"):
+        if not step.checks:
             return "no run"
-        there = step["checks"] in item.entry["causes"] and step["checks"] not in item.mended
+        there = step.checks in item.entry.causes and step.checks not in item.mended
         return _Taken(kind, minutes(kind, 0), [] if there else words)
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
         return _Taken(kind, minutes(kind, points), words) if points else "no reference"
-    name, points = (item.run(step["points"]), len(step["points"])) if step["points"] else item.repeat()
+    name, points = (item.run(step.points), len(step.points)) if step.points else item.repeat()
     return _Taken(kind, minutes(kind, points), [name if w == _NEW else w for w in words]) if name else "no run"
 
 
@@ -248,8 +283,8 @@ def _fixed(item: _Item, number: int) -> _Taken | str:
     return _Taken(kind, minutes(kind, points), ["diagnose", "recording.csv", *runs, *known, "--case", _CASE])
 
 
-def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, Any], runs: int, fixed: bool) -> Course:
-    course = Course(str(entry["folder"]), [first])
+def _course(out: Path, entry: Entry, bench: Bench, first: Answer, runs: int, fixed: bool) -> Course:
+    course = Course(entry.folder, [first])
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
         item = _Item(out, entry, bench, Path(box), runs)
         for file in (out / "items" / course.folder).iterdir():
@@ -268,14 +303,14 @@ def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, 
             course.minutes.append(taken.minutes)
             course.aside.append(taken.aside)
             if not taken.words:  # the check has found it
-                step = course.answers[-1]["next_measurement"]
-                looked_for = step["checks"] or step["otherwise"]["checks"]
-                found = {"verdict": "named", "effects": [looked_for], "confirmed": True}
-                course.answers.append({**course.answers[-1], **found})
+                step = course.answers[-1].step
+                looked_for = step.checks or (step.otherwise or Step()).checks or ""
+                found = replace(course.answers[-1], verdict="named", effects=(looked_for,), confirmed=True)
+                course.answers.append(found)
                 continue
             item.words = item.of_its_own(taken.words)
             answer, _ = prove.asked(item.box, item.words)
-            if answer is None:
+            if not answer:
                 return replace(course, end="failed")
             course.answers.append(answer)
     raise AssertionError("a course has an end")
@@ -283,27 +318,27 @@ def _course(out: Path, entry: Mapping[str, Any], bench: Bench, first: dict[str, 
 
 def loop(
     out: Path, runs: int = 3, jobs: int = 2, fixed: bool = False, say: Callable[[str], None] | None = None
-) -> dict[str, Any]:  # fmt: skip
+) -> Loop:  # fmt: skip
     """Follow every item of a finished proof for so many runs; answers are kept in ``loop`` or ``loop_fixed``."""
     key = seal.unseal(out)
     kept = out / ("loop_fixed" if fixed else "loop")
     kept.mkdir(exist_ok=True)
-    first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)}
+    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
+    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
     todo = []
-    for entry in sorted(key["items"], key=_rank):
-        answer = seal.answer(out / "answers" / f"{entry['folder']}.json")
-        if entry["set"] in _SETS and answer:
+    for entry in sorted(key.items, key=_rank):
+        answer = seal.stored(out / "answers" / f"{entry.folder}.json").answer
+        if entry.set in _SETS and answer:
             todo.append((entry, answer))
 
-    def one(task: tuple[Mapping[str, Any], dict[str, Any]]) -> Course:
+    def one(task: tuple[Entry, Answer]) -> Course:
         entry, answer = task
-        file = kept / f"{entry['folder']}.json"
+        file = kept / f"{entry.folder}.json"
         if file.exists():
-            return Course(**json.loads(file.read_text("utf-8")))
-        bench = found[entry["rig"], entry["plan"]]
+            return Course.of(json.loads(file.read_text("utf-8")))
+        bench = found[entry.rig, entry.plan]
         course = _course(out, entry, Bench(bench.rig, bench.plan, bench.rows), answer, runs, fixed)
-        write_atomic(file, json.dumps(asdict(course)))
+        write_atomic(file, json.dumps(course.document()))
         return course
 
     courses: list[Course] = []
@@ -312,32 +347,32 @@ def loop(
             courses.append(course)
             if say:
                 say(f"followed {k}/{len(todo)}")
-    document = _scored([e for e, _ in todo], courses, runs, fixed)
-    write_atomic(out / f"{kept.name}.json", json_text(document))
-    write_atomic(out / f"{kept.name}.txt", text(document) + "\n")
-    return document
+    scored = _scored([e for e, _ in todo], courses, runs, fixed)
+    write_atomic(out / f"{kept.name}.json", json_text(scored.document()))
+    write_atomic(out / f"{kept.name}.txt", text(scored) + "\n")
+    return scored
 
 
-def _rank(entry: Mapping[str, Any]) -> int:
+def _rank(entry: Entry) -> int:
     """Place of an item in the order of work: visible pairs, the others in mixed order, last what no plan can see."""
-    if not entry["causes"] or entry["set"] == "unlisted":
+    if not entry.causes or entry.set == "unlisted":
         return 1
-    return (0 if entry["set"] == "pair" else 1) if score.judge(entry, {}).separation >= score.VISIBLE else 2
+    return (0 if entry.set == "pair" else 1) if score.judge(entry, Answer()).separation >= score.VISIBLE else 2
 
 
-def _named(entry: Mapping[str, Any], course: Course, at: int) -> list[str]:
+def _named(entry: Entry, course: Course, at: int) -> list[str]:
     """What a course has named up to an answer; of names for one cause, which the plan cannot tell apart, one."""
     last = course.answers[at]
-    said = [*(n for some in course.aside[:at] for n in some), *(last["effects"] if last["verdict"] in _DONE else ())]
+    said = [*(n for some in course.aside[:at] for n in some), *(last.effects if last.verdict in _DONE else ())]
     names = list(dict.fromkeys(said))
-    allowed = [{c, *alike} for c, alike in zip(entry["causes"], entry["alike"], strict=True)]
+    allowed = entry.allowed
     if not all(any(n in a for a in allowed) for n in names):
         return names
     of_each = [[n for n in names if n in a] or [""] for a in allowed]
     return max((list(filter(None, dict.fromkeys(some))) for some in product(*of_each)), key=len)
 
 
-def judge(entry: Mapping[str, Any], course: Course, runs: int) -> tuple[score.Judged, bool]:
+def judge(entry: Entry, course: Course, runs: int) -> tuple[score.Judged, bool]:
     """Judge what a course has said after so many runs, and whether what it named is what is at work.
 
     Everything that was named counts, and so does the class of the last answer: where nothing is left to find, that is a
@@ -347,64 +382,64 @@ def judge(entry: Mapping[str, Any], course: Course, runs: int) -> tuple[score.Ju
     last, names = course.answers[at], _named(entry, course, at)
     if not names:
         return score.judge(entry, last), False
-    named = score.judge(entry, {**last, "verdict": "named", "effects": names, "sets": [[n] for n in names]})
+    sets = tuple((n,) for n in names)
+    named = score.judge(entry, replace(last, verdict="named", effects=tuple(names), sets=sets))
     # a class with what was put aside in it asks for no second cause
-    if last["verdict"] != "class" or set(names) & set(last["effects"]):
+    if last.verdict != "class" or set(names) & set(last.effects):
         return named, named.right
-    there = {c for c, alike in zip(entry["causes"], entry["alike"], strict=True) if not {c, *alike} & set(names)}
-    known = {i for c, alike in zip(entry["causes"], entry["alike"], strict=True) for i in (c, *alike)}
-    right = bool(there & set(last["effects"])) and known >= set(names)
-    said = {**last, "effects": [*names, *last["effects"]], "sets": [*([n] for n in names), last["effects"]]}
+    there = {c for c, allowed in zip(entry.causes, entry.allowed, strict=True) if not allowed & set(names)}
+    right = bool(there & set(last.effects)) and set().union(*entry.allowed) >= set(names)
+    said = replace(last, effects=(*names, *last.effects), sets=(*sets, last.effects))
     return replace(named, right=right, answer=said), named.right
 
 
-def _scored(entries: Sequence[Mapping[str, Any]], courses: Sequence[Course], runs: int, fixed: bool) -> dict[str, Any]:
+def _scored(entries: Sequence[Entry], courses: Sequence[Course], runs: int, fixed: bool) -> Loop:
     """What was found after each number of runs, and what it cost."""
     after = []
     for k in range(runs + 1):
         pairs_of = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
         judged = [j for j, _ in pairs_of]
-        visible = [(j, exact) for j, exact in pairs_of if j.entry["set"] in ("single", "sensor") and j.visible]
-        pairs = [(j, exact) for j, exact in pairs_of if j.entry["set"] == "pair" and j.visible]
-        nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch")]
-        caused = [j for j in judged if j.entry["causes"] and j.entry["set"] != "unlisted" and j.claims]
-        spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e["causes"]]
-        after.append({
-            "runs": k,
-            "found": _count(exact for _, exact in visible),
-            "found_or_class": _count(exact or j.right for j, exact in visible),
-            "pairs_named": _count(exact for _, exact in pairs),
-            "pairs": _count(exact or score.in_sets(j) for j, exact in pairs),
-            "right_when_claimed": _count(j.right for j in caused),
-            "nulls_accused": _count(j.claims for j in nothing),
-            "unlisted_named": _count(j.claims for j in judged if j.entry["set"] == "unlisted"),
-            "minutes": float(np.mean(spent)) if spent else math.nan,
-        })  # fmt: skip
+        visible = [(j, exact) for j, exact in pairs_of if j.entry.set in ("single", "sensor") and j.visible]
+        pairs = [(j, exact) for j, exact in pairs_of if j.entry.set == "pair" and j.visible]
+        nothing = [j for j in judged if j.entry.set in ("null", "mismatch")]
+        caused = [j for j in judged if j.entry.causes and j.entry.set != "unlisted" and j.claims]
+        spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e.causes]
+        after.append(After(
+            runs=k,
+            found=_count(exact for _, exact in visible),
+            found_or_class=_count(exact or j.right for j, exact in visible),
+            pairs_named=_count(exact for _, exact in pairs),
+            pairs=_count(exact or score.in_sets(j) for j, exact in pairs),
+            right_when_claimed=_count(j.right for j in caused),
+            nulls_accused=_count(j.claims for j in nothing),
+            unlisted_named=_count(j.claims for j in judged if j.entry.set == "unlisted"),
+            minutes=float(np.mean(spent)) if spent else math.nan,
+        ))  # fmt: skip
     ends: dict[str, int] = {}
     for c in courses:
         ends[c.end] = ends.get(c.end, 0) + 1
-    return {"schema": SCHEMA, "programme": "fixed" if fixed else "recommended", "items": len(courses), "after": after,
-            "ends": dict(sorted(ends.items()))}  # fmt: skip
+    programme = "fixed" if fixed else "recommended"
+    return Loop(SCHEMA, programme, len(courses), tuple(after), dict(sorted(ends.items())))
 
 
-def _count(flags: Any) -> list[int]:
+def _count(flags: Iterable[bool]) -> tuple[int, int]:
     values = [bool(f) for f in flags]
-    return [sum(values), len(values)]
+    return sum(values), len(values)
 
 
-def text(document: Mapping[str, Any]) -> str:
+def text(found: Loop) -> str:
     """Table of a loop."""
 
     def share(pair: Sequence[int]) -> str:
         return f"{pair[0]}/{pair[1]} ({100 * pair[0] / pair[1]:.0f} %)" if pair[1] else "-"
 
-    keys = ("found", "found_or_class", "pairs_named", "pairs", "right_when_claimed", "nulls_accused", "unlisted_named")
-    rows = [[str(a["runs"]), *(share(a[k]) for k in keys), f"{a['minutes']:.0f}"] for a in document["after"]]
+    rows = [[str(a.runs), *map(share, (a.found, a.found_or_class, a.pairs_named, a.pairs, a.right_when_claimed,
+             a.nulls_accused, a.unlisted_named)), f"{a.minutes:.0f}"] for a in found.after]  # fmt: skip
     header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims",
               "nulls accused", "unlisted named", "stand [min]"]  # fmt: skip
     title = {"fixed": "the fixed programme: a reference, a sweep at rest, a sweep in wind",
-             "recommended": "the step that follows from each answer"}[document["programme"]]  # fmt: skip
-    ends = ", ".join(f"{k} {n}" for k, n in document["ends"].items())
+             "recommended": "the step that follows from each answer"}[found.programme]  # fmt: skip
+    ends = ", ".join(f"{k} {n}" for k, n in found.ends.items())
     return "\n".join([
-        f"{document['items']} items, {title}", text_table(header, rows, left=(), indent="  "), f"  ended by: {ends}",
+        f"{found.items} items, {title}", text_table(header, rows, left=(), indent="  "), f"  ended by: {ends}",
     ])  # fmt: skip

@@ -19,6 +19,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.folders import data_roots
 from bemt.judge.proof.items import Item, recording_text
+from bemt.judge.proof.rows import Entry
 
 _KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
          "second_rotor_rad_s", "run")  # fmt: skip
@@ -193,27 +194,11 @@ def draw_pairs() -> Iterator[Item]:
             continue
         files |= {} if pair.case is None else {"case.toml": _case(pair.case)}
         n = len(pair.causes)
-        yield Item(
-            files,
-            {
-                "set": pair.kind,
-                "causes": list(pair.causes),
-                "kinds": [],
-                "strengths": [1.0] * n,
-                "parameters": {},
-                "separation": [99.0] * n,
-                "separation_noise": [],
-                "alike": [list(pair.alike)] * n,
-                "variables": [[]] * n,
-                "plan": "pair",
-                "rig": f"{pair.a} | {pair.b}",
-                "ducted": False,
-                "seed": 0,
-                "rows": files["recording.csv"].count("\n") - 1,
-                "stand": {},
-                "reason": pair.reason,
-            },
-        )
+        yield Item(files, Entry(
+            set=pair.kind, causes=pair.causes, strengths=(1.0,) * n, separation=(99.0,) * n, alike=(pair.alike,) * n,
+            variables=((),) * n, plan="pair", rig=f"{pair.a} | {pair.b}",
+            rows=files["recording.csv"].count("\n") - 1, reason=pair.reason,
+        ))  # fmt: skip
 
 
 @cache

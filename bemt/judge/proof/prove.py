@@ -11,10 +11,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.proof import draw, items, proof_text, real, resolve, score, seal
+from bemt.judge.proof.rows import Answer, Key, Miss, Proof
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -68,9 +70,8 @@ def conceal(
             for file, text in {**item.files, "reference.csv": item.reference}.items():
                 write_atomic(out / ASKED / name / file, text)
         hashes = {file: seal.sha256(text) for file, text in item.files.items()}
-        entries.append({"folder": name, "files": hashes, **item.entry})
-    return seal.seal(out, {"schema": KEY_SCHEMA, "version": __version__, "seed": str(seed), "size": size,
-                           "items": entries})  # fmt: skip
+        entries.append(replace(item.entry, folder=name, files=hashes))
+    return seal.seal(out, Key(KEY_SCHEMA, __version__, str(seed), size, tuple(entries)))
 
 
 def teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
@@ -88,7 +89,7 @@ def on_threads(one: Callable[[T], R], todo: Sequence[T], jobs: int, tell: Callab
     return found
 
 
-def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
+def diagnose_folder(folder: Path) -> tuple[Answer, str]:
     """Run the diagnosis on one folder, as a process of its own that sees a copy of recording and case only."""
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
         given = [name for name in _GIVEN if (folder / name).exists()]
@@ -97,8 +98,8 @@ def diagnose_folder(folder: Path) -> tuple[dict[str, Any] | None, str]:
         return asked(Path(box), question(folder))
 
 
-def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
-    """Answer to a command in a folder, and what went wrong where there is none."""
+def asked(folder: Path, words: Sequence[str]) -> tuple[Answer, str]:
+    """Answer to a command in a folder, an empty one and what went wrong where there is none."""
     command = [sys.executable, "-m", "bemt", *words, "--json"]
     # the numerical libraries' own threads would fight over the cores that --jobs shares out
     one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
@@ -107,12 +108,11 @@ def asked(folder: Path, words: Sequence[str]) -> tuple[dict[str, Any] | None, st
     try:
         ran = subprocess.run(command, cwd=folder, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
                              text=True, timeout=TIME_LIMIT_S, check=False)  # fmt: skip
-        answer = json.loads(ran.stdout)
-        return (answer if "verdict" in answer else None), ran.stderr.strip()
+        return Answer.from_document(json.loads(ran.stdout)), ran.stderr.strip()
     except subprocess.TimeoutExpired:
-        return None, f"no answer within {TIME_LIMIT_S:g} s"
+        return Answer(), f"no answer within {TIME_LIMIT_S:g} s"
     except ValueError:
-        return None, ran.stderr.strip() or "no JSON document on the output"
+        return Answer(), ran.stderr.strip() or "no JSON document on the output"
 
 
 def question(folder: Path) -> list[str]:
@@ -130,16 +130,13 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
     Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
     """
     _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, teller("diagnosed", say))
-    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.answer(out / "answers" / f"{f.name}.json"))]
+    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.stored(out / "answers" / f"{f.name}.json").answer)]
     _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, teller("reference given", say))
 
 
-def asks(answer: Mapping[str, Any] | None) -> bool:
+def asks(answer: Answer) -> bool:
     """Whether an answer leaves the cause open and asks for a reference."""
-    if not answer:
-        return False
-    step = answer.get("next_measurement") or {}
-    return answer["verdict"] in ("insufficient", "unknown") and step.get("kind") == "reference"
+    return answer.verdict in ("insufficient", "unknown") and answer.step.kind == "reference"
 
 
 def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: Callable[[int, int], None]) -> None:
@@ -151,50 +148,47 @@ def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: C
         answer, words = diagnose_folder(folder)
         if words == "interrupted":  # not an answer: it is asked for again
             return
-        document = {"answer": answer, "error": "" if answer else words[-2000:], "seconds": time.monotonic() - began}
-        write_atomic(answers / f"{folder.name}.json", json.dumps(document))
+        told = {"answer": answer.document() if answer else None, "error": "" if answer else words[-2000:],
+                "seconds": time.monotonic() - began}  # fmt: skip
+        write_atomic(answers / f"{folder.name}.json", json.dumps(told))
 
     on_threads(one, todo, jobs, tell)
 
 
-def proof(out: Path, digest: str | None = None) -> dict[str, Any]:
+def proof(out: Path, digest: str | None = None) -> Proof:
     """Open the key and score the answers."""
     key = seal.unseal(out, digest)
     judged, again, seconds, errors = [], [], [], {}
     settled: list[bool] = []
-    made = key["size"] != REAL
-    first, _ = np.random.SeedSequence(int(key["seed"])).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key["size"]], first)} if made else {}
-    for entry in key["items"]:
-        file = out / "answers" / f"{entry['folder']}.json"
-        stored: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        judged.append(score.judge(entry, stored.get("answer")))
-        if made and asks(judged[-1].answer) and (out / ASKED / entry["folder"]).exists():
-            second = seal.answer(out / f"answers_{ASKED}" / f"{entry['folder']}.json")
-            again.append(score.judge(entry, second))
-        if made and judged[-1].answer:
-            settles = resolve.resolves(found[entry["rig"], entry["plan"]], entry, judged[-1].answer)
+    made = key.size != REAL
+    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
+    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)} if made else {}
+    for entry in key.items:
+        stored = seal.stored(out / "answers" / f"{entry.folder}.json")
+        judged.append(score.judge(entry, stored.answer))
+        if made and asks(stored.answer) and (out / ASKED / entry.folder).exists():
+            again.append(score.judge(entry, seal.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
+        if made and stored.answer:
+            settles = resolve.resolves(found[entry.rig, entry.plan], entry, stored.answer)
             settled += [] if settles is None else [settles]
-        seconds.append(float(stored.get("seconds", math.nan)))
-        if not stored.get("answer"):
-            errors[entry["folder"]] = stored.get("error", "no answer")
-    misses = [
-        {"folder": j.entry["folder"], "set": j.entry["set"], "causes": j.entry["causes"], "plan": j.entry["plan"],
-         "rig": j.entry["rig"], "separation": j.separation, "alike": j.entry["alike"], "said": j.said,
-         "verdict": j.answer.get("verdict"), "effects": j.answer.get("effects", []),
-         "ranking": [[r["effect"], r["probability"]] for r in j.answer.get("ranking", [])[:4]],
-         "error": errors.get(j.entry["folder"], "")}
+        seconds.append(stored.seconds)
+        if not stored.answer:
+            errors[entry.folder] = stored.error
+    misses = tuple(
+        Miss(j.entry.folder, j.entry.set, j.entry.causes, j.entry.plan, j.entry.rig, j.separation, j.entry.alike,
+             j.said, j.answer.verdict or None, j.answer.effects,
+             tuple((r.effect, r.probability) for r in j.answer.ranking[:4]), errors.get(j.entry.folder, ""))
         for j in judged if not j.right and (j.claims or j.visible or not j.answer)
-    ]  # fmt: skip
+    )  # fmt: skip
     rows = score.score(judged, settled, again) if made else score.score_real(judged)
-    return {
-        "schema": SCHEMA, "version": __version__, "size": key["size"], "seed": key["seed"], "commit": _commit(),
-        "key_sha256": digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), "items": len(judged),
-        "score": [vars(r) for r in rows], "baselines": [vars(r) for r in score.baselines(judged)] if made else [],
-        "strata": score.strata(judged) if made else [], "risk_coverage": score.risk_coverage(judged),
-        "confusion": score.confusion(judged), "answers": {} if made else score.answers(judged), "misses": misses,
-        "seconds_median": sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
-    }  # fmt: skip
+    return Proof(
+        SCHEMA, __version__, key.size, key.seed, _commit(),
+        digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(rows),
+        baselines=tuple(score.baselines(judged)) if made else (), strata=tuple(score.strata(judged)) if made else (),
+        risk_coverage=tuple(score.risk_coverage(judged)), confusion=score.confusion(judged),
+        answers={} if made else score.answers(judged), misses=misses,
+        seconds_median=sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
+    )  # fmt: skip
 
 
 def _commit() -> str:
@@ -213,7 +207,7 @@ def _commit() -> str:
 def prove(
     out: str | None, size: str = "small", seed: int | None = None, jobs: int | None = None,
     say: Callable[[str], None] | None = None, tell: Callable[[str], None] | None = None,
-) -> dict[str, Any]:  # fmt: skip
+) -> Proof:  # fmt: skip
     """Do the whole proof; with a folder and without a seed an interrupted one is resumed with its sealed key.
 
     ``say`` takes passing lines of progress, ``tell`` the hash of the key, once it is sealed.
@@ -224,7 +218,7 @@ def prove(
         began = time.monotonic()
         if seed is None and (folder / seal.SEAL).exists():  # an interrupted run: its key stays as it is
             digest = (folder / seal.SEAL).read_text(encoding="utf-8").strip()
-            words = f"going on with the sealed key of size {seal.unseal(folder, digest)['size']}, SHA-256 {digest}"
+            words = f"going on with the sealed key of size {seal.unseal(folder, digest).size}, SHA-256 {digest}"
         else:
             digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say, jobs)
             words = f"key sealed, SHA-256 {digest}"
@@ -232,10 +226,11 @@ def prove(
             tell(words)
         sealed = time.monotonic()
         diagnose_all(folder, jobs, say)
-        document = proof(folder, digest)
-        document["seconds"] = {"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
+        found = replace(
+            proof(folder, digest), seconds={"conceal": sealed - began, "diagnose": time.monotonic() - sealed}
+        )
         if out:
-            write_atomic(folder / "proof.json", json_text(document))
-            write_atomic(folder / "proof.txt", proof_text.text(document) + "\n")
-            write_atomic(folder / "proof.html", proof_text.html(document))
-    return document
+            write_atomic(folder / "proof.json", json_text(found.document()))
+            write_atomic(folder / "proof.txt", proof_text.text(found) + "\n")
+            write_atomic(folder / "proof.html", proof_text.html(found))
+    return found

@@ -18,9 +18,10 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.folders import data_roots, find_data
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.proof.items import Item, recording_text
 from bemt.judge.proof.pairs import draw_pairs
+from bemt.judge.proof.rows import Entry
 from bemt.physics.sections import rule as section_rule
 from bemt.rotors.case.unknowns import section_of
 
@@ -52,14 +53,11 @@ def _item(
     kind: str, rig: str, columns: Mapping[str, Array], case: str, stations: str, variables: list[str],
     reference: Mapping[str, Array] | None = None,
 ) -> Item:  # fmt: skip
-    causes, alike = list(manifest()[kind]["causes"]), list(manifest()[kind].get("alike", []))
-    entry = {
-        "set": kind, "causes": causes, "kinds": [], "strengths": [1.0] * len(causes), "parameters": {},
-        # what a table shows to the eye; there is no yardstick for a truth that nobody knows
-        "separation": [99.0] * len(causes), "separation_noise": [], "alike": [alike for _ in causes],
-        "variables": [variables for _ in causes], "plan": "real", "rig": rig, "ducted": False, "seed": 0,
-        "rows": int(next(iter(columns.values())).size), "stand": {},
-    }  # fmt: skip
+    causes, alike = tuple(manifest()[kind]["causes"]), tuple(manifest()[kind].get("alike", ()))
+    n, rows = len(causes), int(next(iter(columns.values())).size)
+    # what a table shows to the eye; there is no yardstick for a truth that nobody knows
+    entry = Entry(set=kind, causes=causes, strengths=(1.0,) * n, separation=(99.0,) * n, alike=(alike,) * n,
+                  variables=(tuple(variables),) * n, plan="real", rig=rig, rows=rows)  # fmt: skip
     files = {"recording.csv": recording_text(columns), "case.toml": case, "stations.csv": stations}
     return Item(files | ({} if reference is None else {"reference.csv": recording_text(reference)}), entry)
 
@@ -271,6 +269,6 @@ def draw_real(rng: np.random.Generator) -> list[Item]:
     items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor(), *draw_pairs()]
     if not items:
         roots = ", ".join(r.as_posix() for r in data_roots())
-        hint = "`bemt data uiuc` fetches the largest; BEMT_DATA names a folder of them"
+        hint = "`bemt fetch uiuc` fetches the largest; BEMT_DATA names a folder of them"
         raise InputError(Fault(roots, "", "no published recordings", "uiuc, x22a, jmajew ...", hint))
     return [items[int(i)] for i in rng.permutation(len(items))]

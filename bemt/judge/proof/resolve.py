@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from bemt.judge.proof.causes import CAUSES
 from bemt.judge.proof.items import Bench
 from bemt.judge.proof.rigs import extended
+from bemt.judge.proof.rows import Answer, Entry
 from bemt.judge.proof.separation import yardstick
 from bemt.judge.proof.stand import Stand
 
 _ENOUGH = 3.0
 
 
-def resolves(bench: Bench, entry: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
+def resolves(bench: Bench, entry: Entry, answer: Answer) -> bool | None:
     """Whether the recommended points separate the concealed cause from what it was confused with."""
-    points = (answer.get("next_measurement") or {}).get("points") or []
-    if len(entry["causes"]) != 1 or not points or answer.get("verdict") not in ("class", "insufficient"):
+    points = answer.step.points
+    if len(entry.causes) != 1 or not points or answer.verdict not in ("class", "insufficient"):
         return None
-    name = entry["causes"][0]
-    named = [*answer.get("effects", ()), *answer["next_measurement"].get("separates", ())]
+    name = entry.causes[0]
+    named = [*answer.effects, *answer.step.separates]
     more = Bench(bench.rig, bench.plan, extended(bench.rows, points))
     able = {c.id: c for c in more.allowed()}
     rivals = [i for i in dict.fromkeys(named) if i != name and i in able]
     if not rivals or name not in CAUSES:
         return None
     cause = CAUSES[name]
-    change = cause.make(entry["strengths"][0], bench.rig, bench.rows, np.random.default_rng(int(entry["seed"])))
+    change = cause.make(entry.strengths[0], bench.rig, bench.rows, np.random.default_rng(entry.seed))
     plain, columns = more.measure(more.plain(), Stand())
     electric = {str(n): columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in columns}
-    rule = yardstick(plain, more.rows.run, Stand(**entry["stand"]), more.tangents(), electric)
+    rule = yardstick(plain, more.rows.run, Stand(**entry.stand), more.tangents(), electric)
     rng = np.random.default_rng(0)
     others = {i: rule.stack(more.signature(able[i].make(1.0, more.rig, more.rows, rng), able[i])) for i in rivals}
     own = rule.stack(more.signature(change, cause))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 
 from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof.rows import Answer, Entry, Location, Risk, ScoreRow, Stratum
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
@@ -43,8 +43,8 @@ def wilson(hits: int, n: int, z: float = 1.96) -> tuple[float, float]:
 class Judged:
     """One item with its answer."""
 
-    entry: Mapping[str, Any]  # Of the key
-    answer: Mapping[str, Any]  # The diagnosis, empty when it failed
+    entry: Entry
+    answer: Answer  # Empty when it failed
     claims: bool  # Whether a cause or a class of causes was claimed
     # Whether the claim holds, or, where nothing is to be claimed, nothing was.  A claim holds when every effect it
     # names is at work and none is missing that the plan can see; of a class, when one of its members is
@@ -56,57 +56,39 @@ class Judged:
     @property
     def separation(self) -> float:
         """Of the weaker cause, when the other may take what it can. [1]"""
-        return float(min(self.entry.get("separation_together") or self.entry["separation"] or [0.0]))
+        return float(min(self.entry.seen or [0.0]))
 
     @property
     def visible(self) -> bool:
         """Whether the plan can see the cause."""
-        return bool(self.entry["causes"]) and self.separation >= VISIBLE
+        return bool(self.entry.causes) and self.separation >= VISIBLE
 
     @property
     def said(self) -> str:
         """The answer in a word."""
         if not self.answer:
             return "failed"
-        verdict = str(self.answer["verdict"])
-        return "+".join(self.answer["effects"]) if verdict in ("named", "sensor") else verdict
+        verdict = self.answer.verdict
+        return "+".join(self.answer.effects) if verdict in ("named", "sensor") else verdict
 
 
-@dataclass(frozen=True)
-class ScoreRow:
-    """A row of the score table."""
-
-    what: str  # Metric
-    # Count, of how many; for medians the count of values. [-]
-    hits: int
-    n: int
-    # Share or median, with its 95 % Wilson interval (NaN for medians). [-]
-    value: float
-    low: float
-    high: float
-    target: str  # Wanted
-    met: bool | None  # Whether the value meets the target; None without data
-
-
-def judge(entry: Mapping[str, Any], answer: Mapping[str, Any] | None) -> Judged:
+def judge(entry: Entry, answer: Answer) -> Judged:
     """Judge one answer."""
     if not answer:
-        return Judged(entry, {}, False, False, False, False)
-    causes = list(entry["causes"])
-    verdict, said = str(answer["verdict"]), list(answer["effects"])
+        return Judged(entry, answer, False, False, False, False)
+    causes, verdict, said = entry.causes, answer.verdict, answer.effects
     claims = verdict in _CLAIMS
-    if not causes or entry["set"] == "unlisted":
+    if not causes or entry.set == "unlisted":
         return Judged(entry, answer, claims, not claims, False, False)
-    allowed = [{c, *a} for c, a in zip(causes, entry["alike"], strict=True)]
+    allowed, seen = entry.allowed, entry.seen
     if verdict == "class":
         right = any(c in said for c in causes)
     else:
-        seen = entry.get("separation_together") or entry["separation"]
         right = claims and (_matches(said, allowed) or any(
-            _matches(said, [allowed[k]]) and max(seen[:k] + seen[k + 1 :], default=0.0) < VISIBLE
+            _matches(said, [allowed[k]]) and max((*seen[:k], *seen[k + 1 :]), default=0.0) < VISIBLE
             for k in range(len(allowed)) if len(allowed) > 1
         ))  # fmt: skip
-    names = [str(r["effect"]) for r in answer["ranking"]]
+    names = [r.effect for r in answer.ranking]
     listed = [n for n in names if n not in _NOTHING]
     top1 = (verdict == "class" and right) or bool(listed) and _matches(listed[0].split("+"), allowed)
     top3 = top1 or any(_matches(n.split("+"), allowed) for n in names[:3])
@@ -125,10 +107,9 @@ def _matches(said: Sequence[str], allowed: Sequence[set[str]]) -> bool:
 
 def in_sets(j: Judged) -> bool:
     """Whether there is one set for each cause, with the cause in it or one that the plan cannot tell from it."""
-    if j.right and j.answer["verdict"] != "class":
+    if j.right and j.answer.verdict != "class":
         return True
-    sets = [set(s) for s in j.answer.get("sets", ())]
-    allowed = [{c, *a} for c, a in zip(j.entry["causes"], j.entry["alike"], strict=True)]
+    sets, allowed = [set(s) for s in j.answer.sets], j.entry.allowed
     if len(sets) != len(allowed):
         return False
     return any(all(s & a for s, a in zip(order, allowed, strict=True)) for order in permutations(sets))
@@ -150,40 +131,34 @@ def _median(what: str, values: Sequence[float], target: str, limit: float) -> Sc
 
 def _blamed(j: Judged) -> bool:
     """Whether a fault of the stand was put down to the air."""
-    said = set(j.answer.get("effects", ()))
-    return j.claims and not said & set(j.entry["causes"]) and any(
+    said = set(j.answer.effects)
+    return j.claims and not said & set(j.entry.causes) and any(
         i not in CAUSES or CAUSES[i].kind == "air" for i in said
     )  # fmt: skip
 
 
 def _beside(j: Judged) -> bool:
     """Whether a claim holds no cause that is at work, and none that the plan cannot tell from one."""
-    there = {*j.entry["causes"], *(i for alike in j.entry["alike"] for i in alike)}
-    return not there & set(j.answer["effects"])
+    there = {*j.entry.causes, *(i for alike in j.entry.alike for i in alike)}
+    return not there & set(j.answer.effects)
 
 
 def _parameters(j: Judged) -> list[tuple[float, bool]]:
     """Relative error of each parameter that both sides name, and whether its interval holds the truth."""
     out = []
-    ranking = {str(r["effect"]): r.get("parameters", {}) for r in j.answer.get("ranking", ())}
-    name = next((n for n in ranking if set(n.split("+")) == set(j.entry["causes"])), None)
-    if name is None or not j.right or j.answer["verdict"] not in ("named", "sensor"):
+    ranking = {r.effect: r.parameters for r in j.answer.ranking}
+    name = next((n for n in ranking if set(n.split("+")) == set(j.entry.causes)), None)
+    if name is None or not j.right or j.answer.verdict not in ("named", "sensor"):
         return []
-    for cause, wanted in j.entry["parameters"].items():
+    for cause, wanted in j.entry.parameters.items():
         for parameter, true in wanted.items():
             got = ranking[name].get(parameter) or ranking[name].get(f"{cause}.{parameter}")
-            if got and isinstance(got.get("value"), (int, float)) and true["value"]:
-                size = abs(float(got["value"]) - true["value"]) / abs(true["value"])
-                low, high = got.get("low"), got.get("high")
+            if got and isinstance(got.value, (int, float)) and true.value:
+                size = abs(float(got.value) - true.value) / abs(true.value)
+                low, high = got.low, got.high
                 # ratios of units are exact in the library and rounded in the key
-                inside = (
-                    low is not None
-                    and high is not None
-                    and (
-                        low <= true["value"] <= high or (low == high and math.isclose(low, true["value"], rel_tol=1e-3))
-                    )
-                )
-                out.append((size, inside))
+                near = low == high and math.isclose(low, true.value, rel_tol=1e-3)
+                out.append((size, low <= true.value <= high or near))
     return out
 
 
@@ -191,18 +166,18 @@ def _held_out(j: Judged) -> tuple[float, float]:
     """Held-out error after over before, and after over noise, all channels together."""
     before = after = 0.0
     count = 0
-    for channel in j.answer.get("fit", {}).values():
-        noise, first, last = (channel.get(k) for k in ("noise", "holdout_before", "holdout_after"))
-        if noise and first is not None and last is not None:
-            before, after, count = before + (first / noise) ** 2, after + (last / noise) ** 2, count + 1
+    for fit in j.answer.fit.values():
+        first, last = (v / fit.noise if fit.noise else math.nan for v in (fit.holdout_before, fit.holdout_after))
+        if math.isfinite(first) and math.isfinite(last):
+            before, after, count = before + first**2, after + last**2, count + 1
     return (math.sqrt(after / before), math.sqrt(after / count)) if count and before else (math.nan, math.nan)
 
 
 def _located(j: Judged) -> bool:
-    where = j.answer.get("location") or {}
+    where = j.answer.location or Location()
     # what rises and falls together in this plan is one variable to it
-    words = [str(v).lower() for v in (where.get("variable", ""), *where.get("ties", ()))]
-    families = j.entry["variables"][0]
+    words = [v.lower() for v in (where.variable, *where.ties)]
+    families = j.entry.variables[0]
     return any(w == f or w.startswith(f"{f}_") or (len(f) > 2 and f in w) for w in words for f in families)
 
 
@@ -212,14 +187,14 @@ def score(
     """The table of DIAGNOSIS 5; ``again`` are items that asked for a reference, with the answer that it led to."""
 
     def of(*sets: str) -> list[Judged]:
-        return [j for j in judged if j.entry["set"] in sets]
+        return [j for j in judged if j.entry.set in sets]
 
     def told(*sets: str) -> list[Judged]:
         """Items with an answer: who does not answer has not refrained from a wrong claim."""
         return [j for j in of(*sets) if j.answer]
 
     visible = [j for j in of("single", "sensor") if j.visible]
-    pairs = [j for j in of("pair") if j.visible and j.entry["plan"].startswith(("grid", "two_air"))]
+    pairs = [j for j in of("pair") if j.visible and j.entry.plan.startswith(("grid", "two_air"))]
     hidden = [j for j in told("single", "sensor", "underpowered") if not j.visible]
     with_cause = [j for j in of("single", "sensor", "pair", "underpowered") if j.claims]
     unlisted = told("unlisted")
@@ -227,7 +202,7 @@ def score(
     sizes = [p for j in visible + pairs for p in _parameters(j)]
     seen = [j for j in visible + pairs if j.answer]
     held = [_held_out(j) for j in seen]
-    where = [j for j in visible if j.answer and j.entry["variables"][0]]
+    where = [j for j in visible if j.answer and j.entry.variables[0]]
     return [
         _share("claims on nulls, noise", (j.claims for j in told("null")), "<= 2 %", 0.02, True),
         _share("claims on nulls, solver mismatch only", (j.claims for j in told("mismatch")), "<= 2 %", 0.02, True),
@@ -240,11 +215,11 @@ def score(
           for word, is_one in (("with", _referenced), ("without", lambda j: not _referenced(j)))),
         _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
                True),
-        _share("pairs named exactly, rpm x J", (j.right and j.answer["verdict"] != "class" for j in pairs), ">= 75 %",
+        _share("pairs named exactly, rpm x J", (j.right and j.answer.verdict != "class" for j in pairs), ">= 75 %",
                0.75),
         _share("pairs named, or one of each in its set, rpm x J", (in_sets(j) for j in pairs), ">= 75 %", 0.75),
         _share("unlisted given a listed name", (j.claims for j in unlisted), "<= 5 %", 0.05, True),
-        _share("unlisted at 10 sigma called unknown", (j.answer.get("verdict") == "unknown" for j in clear), ">= 80 %",
+        _share("unlisted at 10 sigma called unknown", (j.answer.verdict == "unknown" for j in clear), ">= 80 %",
                0.80),
         _share("sensor faults blamed on the air", (_blamed(j) for j in told("sensor")), "<= 2 %", 0.02, True),
         _median("parameter error, median", [s for s, _ in sizes], "<= 15 %", 0.15),
@@ -260,31 +235,31 @@ def score(
 
 def _referenced(j: Judged) -> bool:
     """Whether the item came with a run without its cause."""
-    return bool(j.entry.get("referenced"))
+    return bool(j.entry.referenced)
 
 
 def _with_reference(again: Sequence[Judged]) -> list[ScoreRow]:
     """What a reference made of the items that asked for one."""
-    causes = [j for j in again if j.entry["set"] in ("single", "sensor", "pair") and j.visible]
-    claims = [j for j in again if j.claims and j.entry["set"] in ("single", "sensor", "pair", "underpowered")]
-    nothing = [j for j in again if j.entry["set"] in ("null", "mismatch")]
+    causes = [j for j in again if j.entry.set in ("single", "sensor", "pair") and j.visible]
+    claims = [j for j in again if j.claims and j.entry.set in ("single", "sensor", "pair", "underpowered")]
+    nothing = [j for j in again if j.entry.set in ("null", "mismatch")]
     return [
         _share("left open though visible: right or in a class with a reference", (j.right for j in causes), ">= 50 %",
                0.5),
         _share("right when it claims, with a reference", (j.right for j in claims), ">= 97 %", 0.97),
         _share("claims on nulls, with a reference", (j.claims for j in nothing), "<= 2 %", 0.02, True),
         _share("unlisted given a listed name, with a reference",
-               (j.claims for j in again if j.entry["set"] == "unlisted"), "<= 5 %", 0.05, True),
+               (j.claims for j in again if j.entry.set == "unlisted"), "<= 5 %", 0.05, True),
     ]  # fmt: skip
 
 
 def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
     """Score of published recordings: by set, what was found and what was claimed wrongly."""
     out = []
-    for kind in sorted({str(j.entry["set"]) for j in judged}):
-        some = [j for j in judged if j.entry["set"] == kind and j.answer]
+    for kind in sorted({j.entry.set for j in judged}):
+        some = [j for j in judged if j.entry.set == kind and j.answer]
         wrong = (j.claims and not j.right for j in some)
-        if some and some[0].entry["causes"]:
+        if some and some[0].entry.causes:
             out.append(_share(f"{kind}: found", (j.claims and j.right for j in some), ">= 80 %", 0.80))
         out.append(_share(f"{kind}: wrong claims", wrong, "<= 2 %", 0.02, True))
     return [*out, _share("failed", (not j.answer for j in judged), "0", 0.0, True)]
@@ -294,7 +269,7 @@ def answers(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
     """How often each set was answered how."""
     out: dict[str, dict[str, int]] = {}
     for j in judged:
-        row = out.setdefault(str(j.entry["set"]), {})
+        row = out.setdefault(j.entry.set, {})
         row[answered(j)] = row.get(answered(j), 0) + 1
     return dict(sorted(out.items()))
 
@@ -304,64 +279,58 @@ def answered(j: Judged) -> str:
     if not j.answer:
         return "failed"
     if not j.claims:
-        return str(j.answer["verdict"])
+        return j.answer.verdict
     if not j.right:
         return "wrong"
-    return "class" if j.answer["verdict"] == "class" else "found"
+    return "class" if j.answer.verdict == "class" else "found"
 
 
 def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
     """What simpler rules would have said of the same data."""
-    visible = [j for j in judged if j.entry["set"] in ("single", "sensor") and j.visible and j.answer]
-    nothing = [j for j in judged if j.entry["set"] in ("null", "mismatch", "unlisted") and j.answer]
+    visible = [j for j in judged if j.entry.set in ("single", "sensor") and j.visible and j.answer]
+    nothing = [j for j in judged if j.entry.set in ("null", "mismatch", "unlisted") and j.answer]
 
     def best(j: Judged) -> tuple[str, float]:
-        odds = {k: v for k, v in (j.answer.get("log_bayes") or {}).items() if k not in _NOTHING and "+" not in k}
+        odds = {k: v for k, v in (j.answer.log_bayes or {}).items() if k not in _NOTHING and "+" not in k}
         name = max(odds, key=lambda k: odds[k], default="")
         return name, float(odds.get(name, 0.0))
 
     def smooth(j: Judged) -> float:
-        pairs = [(c.get("gp_only"), c.get("noise")) for c in j.answer.get("fit", {}).values()]
-        good = [(a / b) ** 2 for a, b in pairs if a is not None and b]
+        ratios = [f.gp_only / f.noise if f.noise else math.nan for f in j.answer.fit.values()]
+        good = [r**2 for r in ratios if math.isfinite(r)]
         return math.sqrt(sum(good) / len(good)) if good else math.nan
 
     return [
         _share("best single: top 1, visible",
-               (best(j)[0] in {*j.entry["causes"], *j.entry["alike"][0]} for j in visible), "", 0.0),
+               (best(j)[0] in {*j.entry.causes, *j.entry.alike[0]} for j in visible), "", 0.0),
         _share("best single: claims where nothing listed is", (best(j)[1] > 0.0 for j in nothing), "", 1.0, True),
         _share("nearest signature: top 1, visible",
-               (j.answer.get("nearest_signature") in {*j.entry["causes"], *j.entry["alike"][0]} for j in visible), "",
+               (j.answer.nearest_signature in {*j.entry.causes, *j.entry.alike[0]} for j in visible), "",
                0.0),
         _median("smooth curve only: held-out RMSE / noise", [smooth(j) for j in visible], "", math.inf),
     ]  # fmt: skip
 
 
-def risk_coverage(
-    judged: Sequence[Judged], points: Sequence[float] = (0.25, 0.5, 0.75, 0.9, 1.0)
-) -> list[dict[str, float]]:
+def risk_coverage(judged: Sequence[Judged], points: Sequence[float] = (0.25, 0.5, 0.75, 0.9, 1.0)) -> list[Risk]:
     """Share of wrong claims against the share of claims that one listens to, the surest first."""
-    claims = sorted((j for j in judged if j.claims), key=lambda j: -float(j.answer.get("probability") or 0.0))
+    claims = sorted((j for j in judged if j.claims), key=lambda j: -j.answer.sure)
     out = []
     for share in points:
         n = max(round(share * len(claims)), 1) if claims else 0
         if n:
             wrong = sum(not j.right for j in claims[:n])
-            least = float(claims[n - 1].answer.get("probability") or 0.0)
-            out.append({"coverage": share, "risk": wrong / n, "n": float(n), "probability": least})
+            out.append(Risk(share, wrong / n, float(n), claims[n - 1].answer.sure))
     return out
 
 
-def strata(
-    judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10.0, 20.0, math.inf)
-) -> list[dict[str, Any]]:
+def strata(judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10.0, 20.0, math.inf)) -> list[Stratum]:
     """Single causes by separation."""
-    single = [j for j in judged if j.entry["set"] in ("single", "sensor", "underpowered")]
-    out: list[dict[str, Any]] = []
+    single = [j for j in judged if j.entry.set in ("single", "sensor", "underpowered")]
+    out = []
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         some = [j for j in single if low <= j.separation < high]
-        counts = {"top1": sum(j.top1 for j in some), "claims": sum(j.claims for j in some)}
-        right = sum(j.claims and j.right for j in some)
-        out.append({"low": low, "high": high, "n": len(some), **counts, "right": right})
+        top1, claims = sum(j.top1 for j in some), sum(j.claims for j in some)
+        out.append(Stratum(low, high, len(some), top1, claims, sum(j.claims and j.right for j in some)))
     return out
 
 
@@ -369,7 +338,7 @@ def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = No
     """How often what was there was called what."""
     out: dict[str, dict[str, int]] = {}
     for j in judged:
-        there = key(j) if key else "+".join(j.entry["causes"]) or str(j.entry["set"])
+        there = key(j) if key else "+".join(j.entry.causes) or j.entry.set
         row = out.setdefault(there, {})
         row[j.said] = row.get(j.said, 0) + 1
     return dict(sorted(out.items()))

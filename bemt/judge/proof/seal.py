@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
+from bemt.judge.proof.rows import Key, Stored
 
-__all__ = ["KEY", "SEAL", "answer", "sha256", "seal", "unseal"]
+__all__ = ["KEY", "SEAL", "seal", "sha256", "stored", "unseal"]
 
 KEY, SEAL = "key.json", "key.sha256"
 
@@ -27,9 +26,9 @@ def sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def seal(folder: Path, key: Mapping[str, Any]) -> str:
+def seal(folder: Path, key: Key) -> str:
     """Write a key and its hash."""
-    text = json_text(key)
+    text = json_text(key.document())
     folder.mkdir(parents=True, exist_ok=True)
     write_atomic(folder / KEY, text)
     digest = sha256(text)
@@ -37,7 +36,7 @@ def seal(folder: Path, key: Mapping[str, Any]) -> str:
     return digest
 
 
-def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
+def unseal(folder: Path, digest: str | None = None) -> Key:
     """Read a key after checking it and every file that it vouches for."""
     path = folder / KEY
     try:
@@ -47,11 +46,11 @@ def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
         raise InputError(Fault(str(error.filename), "", "no such file", "the key and its seal of a proof")) from error
     if sha256(text) != wanted:
         raise InputError(Fault(path.as_posix(), "", f"SHA-256 {sha256(text)}", wanted, "The key was changed"))
-    key: dict[str, Any] = json.loads(text)
+    key = Key.from_document(json.loads(text))
     faults = []
-    for item in key["items"]:
-        for name, known in item["files"].items():
-            file = folder / "items" / item["folder"] / name
+    for item in key.items:
+        for name, known in item.files.items():
+            file = folder / "items" / item.folder / name
             try:
                 found = sha256(file.read_text(encoding="utf-8"))
             except (OSError, UnicodeDecodeError):
@@ -63,7 +62,6 @@ def unseal(folder: Path, digest: str | None = None) -> dict[str, Any]:
     return key
 
 
-def answer(file: Path) -> dict[str, Any] | None:
-    """Answer in a file; None where there is none."""
-    found: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8"))["answer"] if file.exists() else None
-    return found
+def stored(file: Path) -> Stored:
+    """What a file of an answer holds; no answer where there is no file."""
+    return Stored.from_document(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else Stored()

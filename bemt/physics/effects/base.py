@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FORM = {0.15: 0.7, 0.45: 0.3}
+"""Standard deviation of the form of an effect, share of its size, with its prior weight: published laws of one effect
+differ by that, of some by half [1]."""
 # Reynolds number that represents blades where the Mach number matters.
 RE_FAST = 5e5
 # Points further apart than the second show no transient; nothing changes the speed of a rotor within the first [s].

@@ -1,6 +1,6 @@
 """The validation report as one self-contained HTML file and a summary.
 
-What the pages show is gathered as plain values (:mod:`bemt.results.report.gather`), then written; no value of a file
+What the pages show is gathered, typed (:mod:`bemt.results.report.book`), then written; no value of a file
 reaches a page unescaped, no file outside of DIR is written, and the HTML lets no script run but its own.
 """
 
@@ -8,74 +8,67 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from bemt.base.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from bemt.results.report.book import Book
+    from bemt.results.report.values import Page
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
 HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
 
-def _pages(book: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Pages in the order of the menu: id, name in the menu, title, what stands above the sections, sections."""
+def _pages(book: Book) -> Iterator[Page]:
+    """Pages in the order of the menu."""
     from bemt.results.report.case_page import case_sections, reproduction_table
-    from bemt.results.report.cfd import CFD_WORDS, FIDELITY_WORDS, cfd_sections, fidelity_sections
     from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
     from bemt.results.report.front import answers, front_parts
     from bemt.results.report.trends import trend_sections
-    from bemt.results.report.values import sections
+    from bemt.results.report.values import Page, sections
     from bemt.results.report.verdicts import headline
 
-    names = [str(page["result"]["name"]) for page in book["cases"]]
+    names = [page.result.name for page in book.cases]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
-    yield {"id": "front", "name": "Answers", "title": "Answers", "answers": answers(book, ids),
-           "top": front_parts(book, ids), "sections": []}  # fmt: skip
-    for page, name, key in zip(book["cases"], names, ids, strict=True):
-        yield {
-            "id": key,
-            "name": name[:40],
-            "title": headline(page["result"]),
-            "top": [("verdict", page_verdict(page))],
-            "sections": case_sections(page, book["reproduction"]),
-        }
-    given = [item for item in book["reproduction"] if str(item["status"]).startswith("input")]
-    numbers = reproduction_table([item for item in book["reproduction"] if item not in given])
+    yield Page("front", "Answers", "Answers", front_parts(book, ids), [], answers(book, ids))
+    for case, name, key in zip(book.cases, names, ids, strict=True):
+        said = "verdict", page_verdict(case)
+        yield Page(key, name[:40], headline(case.result), [said], case_sections(case, book.reproduction))
+    given = [item for item in book.reproduction if item.status.startswith("input")]
+    numbers = reproduction_table([item for item in book.reproduction if item not in given])
     inputs = f"{len(given)} inputs, not computed", [("table", reproduction_table(given))]
     thesis = (
         "T. Cahill, MS thesis, Northeastern University, April 2025. Statistics of the UIUC database are checked by "
         "reports/studies/reproduce.py where those data are."
     )
-    told = sections(*((item["name"], diagnosis_parts(item)) for item in book["diagnoses"]))
-    for key, title, top, found in (
-        ("trends", "Trends", [], trend_sections(book)),
-        ("cfd", "Own CFD", [("words", CFD_WORDS)], cfd_sections(book["cfd"])),
-        ("fidelities", "Three fidelities", [("words", FIDELITY_WORDS)], fidelity_sections(book["fidelities"])),
-        ("diagnoses", "Diagnoses", [], told),
-        ("reproduction", "Reproduction", [("words", thesis), ("table", numbers), ("more", inputs)], []),
-    ):
-        if found or (key == "reproduction" and numbers):
-            title_of = "Every number of the source thesis" if key == "reproduction" else title
-            yield {"id": key, "name": title, "title": title_of, "top": top, "sections": found}
+    told = sections(*((item.name, diagnosis_parts(item)) for item in book.diagnoses))
+    trends = Page("trends", "Trends", "Trends", [], trend_sections(book))
+    yield from (p for p in (trends, *book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
+    if numbers:
+        top = [("words", thesis), ("table", numbers), ("more", inputs)]
+        yield Page("reproduction", "Reproduction", "Every number of the source thesis", top, [])
 
 
-def book_html(book: Mapping[str, Any]) -> str:
+def book_html(book: Book) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
     from bemt.results.report.verdicts import headline
 
-    about, only = book.get("about", {}), book["cases"]
-    made = " · ".join(filter(None, (about.get("author"), about.get("date"), about.get("revision"))))
+    about, only = book.about, book.cases
+    made = " · ".join(filter(None, (about.author, about.date, about.revision)))
     lead = (
         "Propellers and ducted fans: blade element momentum theory, the K1/K2 formula, CFD, bench and vendor data. "
         "Nothing here is fitted to the value it is compared with."
     )
     foot = (
-        f"Made by bemt {book['version']}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). "
+        f"Made by bemt {book.version}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). "
         "Colours after Okabe and Ito. This file loads nothing from the network."
     )
-    title = about.get("title") or (headline(only[0]["result"]) if len(only) == 1 else "Validation report")
+    title = about.title or (headline(only[0].result) if len(only) == 1 else "Validation report")
     return render(
         "bemt.results.report", "report.html", ["page.js", "plot.js", "rotor.js"], pages=list(_pages(book)), foot=foot,
         title=title, lead=f"{made}. {lead}" if made else lead,
@@ -88,13 +81,14 @@ def write(
     progress: Callable[[str], None],
     about: Mapping[str, str] | None = None,
     recordings: Sequence[str] = (),
-) -> tuple[Mapping[str, Any], tuple[Path, Path]]:
+) -> tuple[Book, tuple[Path, Path]]:
     """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files.
 
     ``about`` holds title, author, date and revision for the head of the page, each as far as wanted.
     ``recordings`` are runs of the one case: they are diagnosed first, and stand on its page.
     """
     from bemt.base.tables import write_atomic
+    from bemt.results.report.book import About
     from bemt.results.report.front import summary
     from bemt.results.report.gather import gather
 
@@ -103,7 +97,7 @@ def write(
         from bemt.results.report.gather import diagnose_into
 
         diagnose_into(paths, recordings, folder, progress)
-    book = {**gather(paths, folder, progress), "about": dict(about or {})}
+    book = replace(gather(paths, folder, progress), about=About.from_document(about or {}))
     files = folder / HTML_NAME, folder / MARKDOWN_NAME
     try:
         write_atomic(files[0], book_html(book))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,15 @@ import numpy as np
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.cfd import audit_parts, study_parts
+from bemt.results.report.audit_block import audit_parts, study_parts
+from bemt.results.report.book import CasePage, Reproduced
 from bemt.results.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points
 from bemt.results.report.rotor_view import viewer
 from bemt.results.report.values import Section, sections, uri
 from bemt.results.report.verdicts import headline, stand
 from bemt.results.sweep.comparison import Comparison
+from bemt.results.sweep.rows import Fan, Result, Row
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip
@@ -29,74 +31,73 @@ MODELS = {"bemt": "BEMT", "k1k2": "K1/K2", "bemt variant": "BEMT, variant"}
 US = ("u_num", "u_input", "u_model", "u_D", "u_val")
 
 
-def _points(page: Mapping[str, Any], x: str, y: str, keep: Any) -> list[Trace]:
+def _points(page: CasePage, x: str, y: str, keep: Callable[[Row], bool]) -> list[Trace]:
     """Recorded values as points, one trace per source."""
-    out, result = [], page["result"]
-    everything = [*result["rows"], *page.get("own_rows", [])]
-    D = result["conditions"]["diameter_m"]
+    out = []
+    D = page.result.at.diameter_m
     for source, shape in LOOK.items():
         rows = [
             (
-                r["airspeed_m_s"] / (r["rpm"] / 60.0 * D) if x == "J" else r[x],
-                r[y],
-                r.get("u") if y == "thrust_N" else None,
-                r["label"],
+                r.airspeed_m_s / (r.rpm / 60.0 * D) if x == "J" else getattr(r, x),
+                getattr(r, y),
+                r.u if y == "thrust_N" else None,
+                r.label,
             )
-            for r in everything
-            if r["source"] == source and r.get(y) is not None and keep(r)
+            for r in (*page.result.rows, *page.own_rows)
+            if r.source == source and not math.isnan(getattr(r, y)) and keep(r)
         ]
         if rows:
             out.append(points(NAMES.get(source, source), rows, source, shape))
     return out
 
 
-def _geometry(page: Mapping[str, Any]) -> Section:
-    g = page["geometry"]
+def _geometry(page: CasePage) -> Section:
+    g = page.blade
     plots: list[dict[str, Any] | None] = []
-    if page["surfaces"]:
-        alt = f"{headline(page['result'])}: rotor"
-        plots.append({"kind": "rotor", "alt": alt, "src": uri(page["pictures"]["rotor"]), **viewer(page["surfaces"])})
-    if g:
-        r = g["r_over_R"]
-        beta = [Trace("β", r, g["beta_deg"], colour=COLOURS["bench"])]
-        plots.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g["chord_mm"])])))
+    if page.surfaces:
+        alt = f"{headline(page.result)}: rotor"
+        plots.append({"kind": "rotor", "alt": alt, "src": uri(page.picture), **viewer(page.surfaces)})
+    if g is not None:
+        r = g.r_over_R
+        beta = [Trace("β", r, g.beta_deg, colour=COLOURS["bench"])]
+        plots.append(figure(Plot("Chord", "r/R [-]", "chord [mm]", [Trace("chord", r, g.chord_mm)])))
         plots.append(figure(Plot("Blade angle and twist", "r/R [-]", "blade angle β [deg]", beta)))
     return "Geometry", [("figures", plots)]
 
 
-def _inputs(page: Mapping[str, Any]) -> Section:
-    result = page["result"]
-    c = result["conditions"]
+def _inputs(page: CasePage) -> Section:
+    result = page.result
+    c = result.at
     rows: list[Sequence[object]] = [
-        ["rotational speed", num(c["rpm"], 6), "rev/min"],
-        ["airspeed", num(c["airspeed_m_s"]), "m/s"],
-        *([["full throttle", drive["text"], ""]] if (drive := result.get("drive")) else []),
-        ["density", num(c["density_kg_m3"]), "kg/m³"],
-        ["temperature", num(c["temperature_C"], 3), "°C"],
-        ["diameter", num(c["diameter_m"]), "m"],
-        ["hub diameter", num(c["hub_diameter_m"]), "m"],
-        ["blades", num(c["blades"]), "-"],
-        ["pitch at 0.75 R", num(c["pitch_075R_m"]), "m"],
-        ["solidity", num(c["solidity"], 3), "-"],
-        ["blade elements", num(c["stations"]), "-"],
-        ["n_crit of the section tables", num(c["n_crit"], 3), "-"],
-        ["section drag level", num(c["drag_level"], 3), "-"],
+        ["rotational speed", num(c.rpm, 6), "rev/min"],
+        ["airspeed", num(c.airspeed_m_s), "m/s"],
+        *([["full throttle", result.drive.text, ""]] if result.drive else []),
+        ["density", num(c.density_kg_m3), "kg/m³"],
+        ["temperature", num(c.temperature_C, 3), "°C"],
+        ["diameter", num(c.diameter_m), "m"],
+        ["hub diameter", num(c.hub_diameter_m), "m"],
+        ["blades", num(c.blades), "-"],
+        ["pitch at 0.75 R", num(c.pitch_075R_m), "m"],
+        ["solidity", num(c.solidity, 3), "-"],
+        ["blade elements", num(c.stations), "-"],
+        ["n_crit of the section tables", num(c.n_crit, 3), "-"],
+        ["section drag level", num(c.drag_level, 3), "-"],
     ]
     words = (
-        f"Effects on: {', '.join(map(str, c['effects']))}. Convention: {c['convention']}. Air: {c['air']}. "
-        f"Program version {result.get('version', 'unknown')}."
+        f"Effects on: {', '.join(c.effects)}. Convention: {c.convention}. Air: {c.air}. "
+        f"Program version {result.version}."
     )
-    files = [[f["name"], Cell(f["sha256"], code=True)] for f in page["files"]]
+    files = [[name, Cell(sha256, code=True)] for name, sha256 in page.files]
     told = (
         "The source does not state the following values. Each is declared as a range; the last columns show the effect "
         "on the thrust when only this value is changed."
     )
     lines: list[Sequence[object]] = []
-    for a in result["assumptions"]:
-        at = [v for v in a["thrust_N"] if v is not None]
+    for a in result.assumptions:
+        at = [v for v in a.thrust_N if not math.isnan(v)]
         spread = f"{number_text(min(at))} – {number_text(max(at))}" if at else "unknown"
-        shown = num(a["nominal"]) if isinstance(a["nominal"], int | float) else Cell(str(a["nominal"]))
-        lines.append([Cell(a["key"], code=True), shown, a["range"], spread, num(a["u_thrust_N"], 2), a["why"]])
+        shown = num(a.nominal) if isinstance(a.nominal, int | float) else Cell(str(a.nominal))
+        lines.append([Cell(a.key, code=True), shown, a.range, spread, num(a.u_thrust_N, 2), a.why])
     head = ["assumed", "value", "range", "thrust over the range [N]", "u [N]", "why"]
     return "Inputs and assumptions", [
         ("table", table(["input", "value", "unit"], rows, sort=False)),
@@ -107,42 +108,42 @@ def _inputs(page: Mapping[str, Any]) -> Section:
     ]
 
 
-def _performance(page: Mapping[str, Any]) -> Section:
-    result, c = page["result"], page["curves"]
-    if not c:
+def _performance(page: CasePage) -> Section:
+    result, c = page.result, page.curves
+    if c is None:
         return "", []
-    own, j, w = result["conditions"], c["over_J"], c["over_rpm"]
+    own, j, w = result.at, c.over_J, c.over_rpm
     plots = []
 
-    def near(row: Mapping[str, Any], key: str) -> bool:
-        return bool(abs(row[key] - own[key]) <= 0.02 * max(abs(own[key]), 1.0))
+    def near(given: float, stated: float) -> bool:
+        return abs(given - stated) <= 0.02 * max(abs(stated), 1.0)
 
     for name, label in LABELS.items():
         y = j[name]
         if name == "eta":  # a ratio of two small numbers where thrust ends
-            y = np.where(j["CT"] > 0.1 * np.nanmax(np.append(j["CT"], 0.0)), y, np.nan)
+            y = np.where(j.CT > 0.1 * np.nanmax(np.append(j.CT, 0.0)), y, np.nan)
         most = None
         if name == "eta":  # of the least thrust in the band, as the limit falls with thrust
-            most = co.eta_limit(j["J"], 0.0 if result.get("fan") else j["CT"] - j["u_CT"])
-        traces = [Trace("BEMT", j["J"], y, j[f"u_{name}"], COLOURS["bemt"], ceiling=most)]
+            most = co.eta_limit(j.J, 0.0 if result.fan else j.CT - j.u["CT"])
+        traces = [Trace("BEMT", j.J, y, j.u[name], COLOURS["bemt"], ceiling=most)]
         if name == "CT":
-            traces.append(Trace("K1/K2", j["J"], j["k1k2_CT"], None, COLOURS["k1k2"], "7 4"))
+            traces.append(Trace("K1/K2", j.J, c.k1k2_CT, None, COLOURS["k1k2"], "7 4"))
         if name != "eta":
-            traces += _points(page, "J", name, lambda r: near(r, "rpm"))
-        title = f"{label[0].upper()}{label[1:]} over advance ratio at {own['rpm']:g} rev/min"
+            traces += _points(page, "J", name, lambda r: near(r.rpm, own.rpm))
+        title = f"{label[0].upper()}{label[1:]} over advance ratio at {own.rpm:g} rev/min"
         note = "The band ends at the limit of momentum theory." if name == "eta" else ""
         plots.append(Plot(title, "J = V / (n D) [-]", f"{label} [-]", traces, note=note))
     with np.errstate(divide="ignore", invalid="ignore"):
-        per_kW: Any = np.where(w["power_W"] > 0, 1e3 * w["thrust_N"] / w["power_W"], np.nan)
-    simple = Trace("K1/K2", w["rpm"], w["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4")
+        per_kW: Any = np.where(w.power_W > 0, 1e3 * w.thrust_N / w.power_W, np.nan)
+    simple = Trace("K1/K2", w.rpm, c.k1k2_thrust_N, None, COLOURS["k1k2"], "7 4")
     for title, label, y, u, more, channel in (
-        ("Thrust over rotational speed", "thrust [N]", w["thrust_N"], w["u_thrust_N"], [simple], "thrust_N"),
-        ("Shaft power over rotational speed", "shaft power [W]", w["power_W"], w["u_power_W"], [], "power_W"),
+        ("Thrust over rotational speed", "thrust [N]", w.thrust_N, w.u["thrust_N"], [simple], "thrust_N"),
+        ("Shaft power over rotational speed", "shaft power [W]", w.power_W, w.u["power_W"], [], "power_W"),
         ("Thrust per shaft power", "thrust per power [N/kW]", per_kW, None, [], ""),
     ):
-        seen = _points(page, "rpm", channel, lambda r: near(r, "airspeed_m_s")) if channel else []
-        traces = [Trace("BEMT", w["rpm"], y, u, COLOURS["bemt"]), *more, *seen]
-        title = f"{title} at {own['airspeed_m_s']:g} m/s"
+        seen = _points(page, "rpm", channel, lambda r: near(r.airspeed_m_s, own.airspeed_m_s)) if channel else []
+        traces = [Trace("BEMT", w.rpm, y, u, COLOURS["bemt"]), *more, *seen]
+        title = f"{title} at {own.airspeed_m_s:g} m/s"
         plots.append(Plot(title, "rotational speed [rev/min]", label, traces, x_zero=True))
     words = (
         "Bands: one standard uncertainty from the declared assumptions and from the model on real rotors. "
@@ -151,73 +152,74 @@ def _performance(page: Mapping[str, Any]) -> Section:
     return "Performance", [("words", words), ("figures", [figure(p) for p in plots])]
 
 
-def _radial(page: Mapping[str, Any]) -> Section:
-    d = page["radial"]
-    if not d:
+def _radial(page: CasePage) -> Section:
+    d = page.radial
+    if d is None:
         return "", []
-    r = d["r_over_R"]
-    R = 0.5 * page["result"]["conditions"]["diameter_m"]
-    own = page.get("own_radial") or []
-    name = f"CFD, own, {page['own_cfd']['solver']}" if own else ""
-    x = [p[0] / R for p in own]
+    r = d.r_over_R
+    R = 0.5 * page.result.at.diameter_m
     thrust, torque = (
-        [Trace(name, x, [p[k] for p in own], None, COLOURS["openfoam"], "7 4")] if own else [] for k in (1, 2)
+        [
+            Trace(name, [p[0] / R for p in own], [p[k] for p in own], None, COLOURS["openfoam"], "7 4")
+            for name, own in page.own_radial.items()
+            if own
+        ]
+        for k in (1, 2)
     )
     plots = (
-        Plot("Thrust loading, all blades", "r/R [-]", "dT/dr [N/m]", [Trace("BEMT", r, d["dT_dr"]), *thrust]),
-        Plot("Torque loading, all blades", "r/R [-]", "dQ/dr [N]", [Trace("BEMT", r, d["dQ_dr"]), *torque]),
-        Plot("Angle of attack", "r/R [-]", "α [deg]", [Trace("BEMT", r, d["alpha_deg"])]),
-        Plot("Section Mach number", "r/R [-]", "M [-]", [Trace("BEMT", r, d["M"])]),
+        Plot("Thrust loading, all blades", "r/R [-]", "dT/dr [N/m]", [Trace("BEMT", r, d.dT_dr), *thrust]),
+        Plot("Torque loading, all blades", "r/R [-]", "dQ/dr [N]", [Trace("BEMT", r, d.dQ_dr), *torque]),
+        Plot("Angle of attack", "r/R [-]", "α [deg]", [Trace("BEMT", r, d.alpha_deg)]),
+        Plot("Section Mach number", "r/R [-]", "M [-]", [Trace("BEMT", r, d.M)]),
     )
     return "Radial loading", [("figures", [figure(p) for p in plots])]
 
 
-def _fan(result: Mapping[str, Any]) -> Section:
-    fan = result.get("fan")
-    if not fan:
+def _fan(fan: Fan | None) -> Section:
+    if fan is None:
         return "", []
     rows: list[Sequence[object]] = [
-        ["thrust of the rotor", num(fan["rotor_thrust_N"]), "N"],
-        ["thrust of the duct", num(fan["duct_thrust_N"]), "N"],
-        ["thrust of the stator", num(fan["stator_thrust_N"]), "N"],
-        ["share of the duct", num(fan["duct_share"], 3), "-"],
-        ["mass flow", num(fan.get("mass_flow_kg_s")), "kg/s"],
-        ["exhaust speed", num(fan["exhaust_speed_m_s"]), "m/s"],
-        ["u of the exhaust speed", num(fan["u_exhaust_speed_m_s"], 2, none="unknown"), "m/s"],
-        ["momentum through the exit", num(fan["exit_momentum_N"]), "N"],
-        ["pitch speed", num(fan["geometric_pitch_speed_m_s"]), "m/s"],
+        ["thrust of the rotor", num(fan.rotor_thrust_N), "N"],
+        ["thrust of the duct", num(fan.duct_thrust_N), "N"],
+        ["thrust of the stator", num(fan.stator_thrust_N), "N"],
+        ["share of the duct", num(fan.duct_share, 3), "-"],
+        ["mass flow", num(fan.mass_flow_kg_s), "kg/s"],
+        ["exhaust speed", num(fan.exhaust_speed_m_s), "m/s"],
+        ["u of the exhaust speed", num(fan.u_exhaust_speed_m_s, 2, none="unknown"), "m/s"],
+        ["momentum through the exit", num(fan.exit_momentum_N), "N"],
+        ["pitch speed", num(fan.geometric_pitch_speed_m_s), "m/s"],
     ]
     return "Duct and fan", [("table", table(["part", "value", "unit"], rows, sort=False))]
 
 
-def _verification(page: Mapping[str, Any]) -> Section:
-    v = page["refinement"]
-    if not v:
+def _verification(page: CasePage) -> Section:
+    v = page.refinement
+    if v is None:
         return "", []
-    line = Trace("BEMT", v["stations"], v["thrust_N"], colour=COLOURS["bemt"])
+    line = Trace("BEMT", v.stations, v.thrust_N, colour=COLOURS["bemt"])
     plot = figure(
         Plot("Thrust against blade elements", "blade elements [-]", "thrust [N]", [line], log_x=True, zero=False)
     )
-    solved = zip(v["stations"], v["thrust_N"].tolist(), v["torque_Nm"].tolist(), strict=True)
+    solved = zip(v.stations, v.thrust_N.tolist(), v.torque_Nm.tolist(), strict=True)
     rows = [[num(n), num(T, 7), num(Q, 6)] for n, T, Q in solved]
-    words, study = [], v.get("grid_study")
-    if math.isfinite(v["change_to_finest"]):
+    words, study = [], v.grid_study
+    if math.isfinite(v.change_to_finest):
         words.append(
-            f"With the {v['used']} elements used, the thrust is {100 * v['change_to_finest']:+.3f} % off that with "
-            f"{v['stations'][-1]}."
+            f"With the {v.used} elements used, the thrust is {100 * v.change_to_finest:+.3f} % off that with "
+            f"{v.stations[-1]}."
         )
-    if study and study["order"] is not None and study["gci_fine"] is not None:
-        words.append(f"Observed order {study['order']:.2f}; grid convergence index {100 * study['gci_fine']:.4f} %.")
-    if study and study["flags"]:
-        words.append("Remarks: " + "; ".join(study["flags"]) + ".")
+    if study and study.order is not None and study.gci_fine is not None:
+        words.append(f"Observed order {study.order:.2f}; grid convergence index {100 * study.gci_fine:.4f} %.")
+    if study and study.flags:
+        words.append("Remarks: " + "; ".join(study.flags) + ".")
     found = table(["elements", "thrust [N]", "torque [N m]"], rows) if plot else None
     side = {"kind": "block", "parts": [("table", found), ("words", " ".join(words))]} if plot or words else None
     return "Verification", [("figures", [plot, side])]
 
 
-def _validation(result: Mapping[str, Any]) -> Section:
+def _validation(result: Result) -> Section:
     """Every comparison, BEMT's first; a column of uncertainties that nobody knows is left out."""
-    found = [c for c in Comparison.of(result) if c.source != "k1k2_printed" or c.model == "k1k2"]
+    found = [c for c in result.comparisons if c.source != "k1k2_printed" or c.model == "k1k2"]
     us = [u for u in US if any(math.isfinite(getattr(c, u)) for c in found)]
     rows: list[Sequence[object]] = []
     for c in sorted(found, key=lambda c: list(MODELS).index(c.model) if c.model in MODELS else len(MODELS)):
@@ -241,64 +243,63 @@ def _quantity(c: Comparison) -> str:
     return f"{name.replace('_', ' ')} [{c.unit}]"
 
 
-def reproduction_table(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+def reproduction_table(items: Sequence[Reproduced]) -> dict[str, Any] | None:
     """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:
-        status = str(item["status"])
+        status = item.status
         kind = "fault" if status.startswith("not reproduced") else "unknown" if "input" in status else "fine"
-        ours = item["ours"]
+        ours = item.ours
         shown = num(ours, 5) if isinstance(ours, int | float) else Cell("" if ours is None else str(ours))
         try:
-            stated = Cell(str(item["stated"]), num(float(item["stated"])).value, True)
+            stated = Cell(str(item.stated), num(float(item.stated)).value, True)
         except ValueError:
-            stated = Cell(str(item["stated"]))
+            stated = Cell(str(item.stated))
         words = Cell(status.removesuffix(", because"), badge=kind)
-        rows.append([str(item["quantity"]), stated, shown, str(item["unit"]), words, str(item["note"])])
+        rows.append([item.quantity, stated, shown, item.unit, words, item.note])
     return table(["quantity", "stated", "ours", "unit", "status", "note"], rows)
 
 
-def _of_case(items: Sequence[Mapping[str, Any]], name: str) -> list[Mapping[str, Any]]:
+def _of_case(items: Sequence[Reproduced], name: str) -> list[Reproduced]:
     """Items that name the case: its last word before a colon, or its name in the heading of their section."""
     last = name.rpartition("_")[2].lower()
     flat = "".join(c for c in name.lower() if c.isalnum())
 
-    def about(item: Mapping[str, Any]) -> bool:
-        head = "".join(c for c in str(item["section"]).lower() if c.isalnum())
-        return str(item["quantity"]).lower().startswith(last + ":") or (len(flat) > 3 and flat in head)
+    def about(item: Reproduced) -> bool:
+        head = "".join(c for c in item.section.lower() if c.isalnum())
+        return item.quantity.lower().startswith(last + ":") or (len(flat) > 3 and flat in head)
 
     return [item for item in items if about(item)]
 
 
-def _limits(page: Mapping[str, Any]) -> Section:
-    result = page["result"]
+def _limits(page: CasePage) -> Section:
+    result = page.result
     flags: dict[str, None] = {}
-    for row in [*result["rows"], *result["variants"]]:
-        for flag in row["flags"]:
-            flags.setdefault(f"{row['label']}: {flag}")
-    for flag in page["curves"]["flags"] if page.get("curves") else ():
+    for row in (*result.rows, *result.variants):
+        for flag in row.flags:
+            flags.setdefault(f"{row.label}: {flag}")
+    for flag in page.curves.flags if page.curves else ():
         flags.setdefault(f"curves: {flag}")
     general = [
         "Blade elements are independent: no sweep, no radial flow, no blade-vortex interaction, no unsteady loads.",
         "Section tables come from a network trained on XFOIL, weak near stall at low Reynolds numbers; beyond stall "
         "they continue as a flat plate.",
     ]
-    return "Limits", [("list", [*flags, *result["notes"], *page["problems"], *general])]
+    return "Limits", [("list", [*flags, *result.notes, *page.problems, *general])]
 
 
-def case_sections(page: Mapping[str, Any], reproduction: Sequence[Mapping[str, Any]]) -> list[Section]:
+def case_sections(page: CasePage, reproduction: Sequence[Reproduced]) -> list[Section]:
     """Give the sections of one case."""
-    result = page["result"]
-    if not result.get("rows"):
-        return sections(("Faults", [("list", [str(fault) for fault in result.get("faults", [])])]))
-    audits = [part for audit in result.get("audit", []) for part in audit_parts(audit)]
-    told = page.get("diagnosis")
-    items = reproduction_table(_of_case(reproduction, str(result["name"])))
+    result = page.result
+    if not result.rows:
+        return sections(("Faults", [("list", result.faults)]))
+    audits = [part for audit in result.audit for part in audit_parts(audit)]
+    told = page.diagnosis
+    items = reproduction_table(_of_case(reproduction, result.name))
     return sections(
         ("Your recording and the prediction", [("figures", first_pictures(told))] if told else []),
-        _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result),
-        ("Grids of the CFD", study_parts(result.get("grid_studies", []))), ("Audit of the CFD", audits),
-        _verification(page),
+        _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result.fan),
+        ("Grids of the CFD", study_parts(result.grid_studies)), ("Audit of the CFD", audits), _verification(page),
         ("Diagnosis: what the model leaves out", diagnosis_parts(told, first=False) if told else []),
         _inputs(page), _limits(page),
         ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),

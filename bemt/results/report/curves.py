@@ -6,34 +6,24 @@ The bands are those of `bemt.rotors.case.propagate`, as everywhere.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import InputError
+from bemt.results.report.book import BladeCurves, CaseCurves, RadialCurves, Refinement
 from bemt.rotors.case import Case
 
 N_J, N_RPM = 29, 21
 REFINED = (10, 20, 40, 80)
-CHANNELS = ("CT", "CP", "eta", "thrust_N", "torque_Nm", "power_W")
 
 
-def geometry_curves(case: Case) -> dict[str, Any]:
-    """Chord, blade angle and thickness over the radius."""
+def blade_curves(case: Case) -> BladeCurves:
+    """Chord and blade angle over the radius."""
     rotor = case.rotor()
-    blade = rotor.blade
-    r = np.linspace(blade.Rhub, blade.R, 41)
-    chord, beta = blade.at(r)
-    x = [a for a, _ in blade.anchors]
-    t = [section.thickness for _, section in blade.anchors]
-    return {
-        "r_over_R": r / rotor.R,
-        "chord_over_R": chord / rotor.R,
-        "chord_mm": 1e3 * chord,
-        "beta_deg": np.degrees(beta),
-        "thickness": np.interp(r / rotor.R, x, t) if x else np.full(r.size, np.nan),
-    }
+    r = np.linspace(rotor.blade.Rhub, rotor.blade.R, 41)
+    chord, beta = rotor.blade.at(r)
+    return BladeCurves(r / rotor.R, 1e3 * chord, np.degrees(beta))
 
 
 def _grids(case: Case, pitch_over_D: float, full_rpm: float | None) -> tuple[Array, Array, int]:
@@ -50,7 +40,7 @@ def _grids(case: Case, pitch_over_D: float, full_rpm: float | None) -> tuple[Arr
     )
 
 
-def case_curves(case: Case, full_rpm: float | None = None) -> dict[str, Any]:
+def case_curves(case: Case, full_rpm: float | None = None) -> CaseCurves:
     """Performance over J and over rpm up to full throttle [rev/min], BEMT with bands and K1/K2."""
     from bemt.rotors.case.prepare import k1k2_case
     from bemt.rotors.case.propagate import propagate
@@ -60,22 +50,10 @@ def case_curves(case: Case, full_rpm: float | None = None) -> dict[str, Any]:
     rpm, V, cut = _grids(case, rotor.blade.pitch_m() / rotor.D, full_rpm)
     found = propagate(case, rpm, V).points
     simple = k1k2_case(case, None, rpm, V, case.air())
-    whole: dict[str, Array] = {
-        **{name: found[name] for name in CHANNELS},
-        **{f"u_{name}": found.u[name] for name in CHANNELS},
-        "J": found.J,
-        "rpm": rpm,
-        "M_tip": found.M_tip,
-        "k1k2_thrust_N": simple.thrust_N,
-        "k1k2_CT": simple.CT,
-    }
     shown = [*range(keep := _until_windmill(found.CT[:cut])), *range(cut, len(found))]
-    over_J = {name: v[:cut] for name, v in whole.items()}
-    return {
-        "over_J": {name: v[:keep] for name, v in over_J.items()},
-        "over_rpm": {name: v[cut:] for name, v in whole.items()},
-        "flags": counted([found.flags[i] for i in shown]),
-    }
+    flags = counted([found.flags[i] for i in shown])
+    over_J, over_rpm = found.select(slice(keep)), found.select(slice(cut, None))
+    return CaseCurves(over_J, over_rpm, simple.CT[:keep], simple.thrust_N[cut:], flags)
 
 
 def _until_windmill(CT: Array) -> int:
@@ -84,7 +62,7 @@ def _until_windmill(CT: Array) -> int:
     return int(below[0]) + 1 if below.size else len(CT)
 
 
-def radial_curves(case: Case) -> dict[str, Any]:
+def radial_curves(case: Case) -> RadialCurves:
     """Loading along the blade at the case's own operating point."""
     from bemt.physics.bem import solver
     from bemt.rotors.case.prepare import prepare_case
@@ -92,20 +70,13 @@ def radial_curves(case: Case) -> dict[str, Any]:
     prep = prepare_case(case).prep
     answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
     stations = prep.stations
-    radial = {name: values[0] for name, values in answer.radial.items()}
     ok = np.where(answer.converged[0], 1.0, np.nan)
-    return {
-        "r_over_R": stations.r / prep.rotor.R,
-        "dT_dr": radial["dT"] / stations.dr * ok,
-        "dQ_dr": radial["dQ"] / stations.dr * ok,
-        "alpha_deg": np.degrees(radial["alpha"]) * ok,
-        "cl": radial["cl"] * ok,
-        "M": radial["M"] * ok,
-        "Re": radial["Re"] * ok,
-    }
+    dT, dQ, alpha, M = (answer.radial[name][0] for name in ("dT", "dQ", "alpha", "M"))
+    r_over_R = stations.r / prep.rotor.R
+    return RadialCurves(r_over_R, dT / stations.dr * ok, dQ / stations.dr * ok, np.degrees(alpha) * ok, M * ok)
 
 
-def refinement(case: Case) -> dict[str, Any]:
+def refinement(case: Case) -> Refinement:
     """Thrust and torque against the number of blade elements."""
     from bemt.data.recordings.grid_study import grid_study
     from bemt.rotors.case.prepare import prepare_case
@@ -116,25 +87,11 @@ def refinement(case: Case) -> dict[str, Any]:
     study = None
     if np.all(np.isfinite(T[-3:])) and not np.any(T[-2:] == 0.0):
         try:
-            found = grid_study(T[:-4:-1].tolist(), [2.0, 2.0])
-            study = {
-                "order": found.order,
-                "extrapolated": found.extrapolated,
-                "gci_fine": found.gci_fine,
-                "u_relative": found.u_relative,
-                "flags": list(found.flags),
-            }
+            study = grid_study(T[:-4:-1].tolist(), [2.0, 2.0])
         except InputError:
             study = None
     used = case.file.model.stations
     finest = float(T[-1])
     near = REFINED.index(used) if used in REFINED else None
     change = math.nan if near is None or finest == 0.0 else float(T[near]) / finest - 1.0
-    return {
-        "stations": list(REFINED),
-        "used": used,
-        "thrust_N": T,
-        "torque_Nm": Q,
-        "change_to_finest": change,
-        "grid_study": study,
-    }
+    return Refinement(REFINED, T, Q, used, change, study)

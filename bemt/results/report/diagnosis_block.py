@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from bemt.base.page import num, table
-from bemt.judge.diagnose.figures_recording import FIRST
+from bemt.base.page import FIRST, num, table
+from bemt.results.report.book import CasePage, Diagnosed
 from bemt.results.report.values import Part, picture
 from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 
@@ -46,9 +46,9 @@ def _parameters(value: Any) -> str:
     return "; ".join(words)
 
 
-def diagnosis_verdict(item: Mapping[str, Any]) -> tuple[str, str, str]:
+def diagnosis_verdict(item: Diagnosed) -> tuple[str, str, str]:
     """Give kind and words of a badge, and sentences."""
-    d = _mapping(item.get("document"))
+    d = item.document
     said = str(d.get("verdict") or "unknown")
     effects = ", ".join(str(e) for e in _list(d.get("effects")))
     why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
@@ -56,28 +56,28 @@ def diagnosis_verdict(item: Mapping[str, Any]) -> tuple[str, str, str]:
     return KIND.get(said, "unknown"), f"{word}: {effects}" if effects else word, why
 
 
-def page_verdict(page: Mapping[str, Any]) -> tuple[str, str, str]:
+def page_verdict(page: CasePage) -> tuple[str, str, str]:
     """Say how a case stands; where only its diagnosis knows recordings, that says it."""
-    own = verdict(page["result"])
-    item = page.get("diagnosis")
+    own = verdict(page.result)
+    item = page.diagnosis
     if own[1] != NOTHING_RECORDED or not item:
         return own
     kind, word, why = diagnosis_verdict(item)
     return kind, word, f"{own[2].partition('. ')[0]}. {re.split(r'(?<=[.]) (?=[A-Z])', why)[0]}"
 
 
-def first_pictures(item: Mapping[str, Any]) -> list[dict[str, Any]]:
+def first_pictures(item: Diagnosed) -> list[dict[str, Any]]:
     """Pictures of the recordings inside the prediction band."""
-    own = [(name, data) for name, data in item.get("figures", []) if name.startswith(FIRST)]
+    own = [(name, data) for name, data in item.figures if name.startswith(FIRST)]
     return [picture(name, data) | {"alt": "Recording and prediction", "narrow": True} for name, data in own]
 
 
-def diagnosis_parts(item: Mapping[str, Any], first: bool = True) -> list[Part]:
+def diagnosis_parts(item: Diagnosed, first: bool = True) -> list[Part]:
     """Give one diagnosis: verdict, first picture, place, ranking, errors before and after, what to measure, figures.
 
     ``first`` is False where the first picture stands elsewhere on the page.
     """
-    d = _mapping(item.get("document"))
+    d = item.document
     said = str(d.get("verdict") or "unknown")
     out: list[Part] = [("verdict", diagnosis_verdict(item)), ("figures", first_pictures(item) if first else [])]
     place = _mapping(d.get("location"))
@@ -108,5 +108,5 @@ def diagnosis_parts(item: Mapping[str, Any], first: bool = True) -> list[Part]:
         out += [("command", str(command)) for command in _list(step.get("commands"))]
     absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
-    rest = [picture(name, data) for name, data in item.get("figures", []) if not name.startswith(FIRST)]
+    rest = [picture(name, data) for name, data in item.figures if not name.startswith(FIRST)]
     return [*out, ("figures", rest)]

@@ -12,6 +12,7 @@ from bemt.physics.effects import catalogue, source_of
 
 if TYPE_CHECKING:
     from bemt.physics.effects import Effect
+    from bemt.physics.effects.base import Parameter
 
 SCHEMA = "bemt.effects/1"
 KINDS = {
@@ -23,35 +24,40 @@ KINDS = {
 
 def document() -> dict[str, Any]:
     """Give all effects, as ``--json`` prints them."""
-    order = list(KINDS)
-    known = sorted(catalogue().values(), key=lambda cls: (order.index(cls.kind), cls.id))
-    return {"schema": SCHEMA, "effects": [_entry(cls) for cls in known]}
+    return {"schema": SCHEMA, "effects": [_entry(cls) for kind in KINDS for cls in _known(kind)]}
 
 
-def _entry(cls: type[Effect]) -> dict[str, Any]:
+def _known(kind: str) -> list[type[Effect]]:
+    """Effects of a kind by name."""
+    return sorted((cls for cls in catalogue().values() if cls.kind == kind), key=lambda cls: cls.id)
+
+
+def _choices(cls: type[Effect]) -> dict[str, list[Any]]:
+    """Words that each field of an effect may be, its default first."""
     effect = cls()
-    given = effect.variants() or ()
-    numbers = {p.name for p in cls.parameters}
-    words = {
+    given, numbers = effect.variants() or (), {p.name for p in cls.parameters}
+    return {
         f.name: list(dict.fromkeys([getattr(effect, f.name), *(v[f.name] for v in given if f.name in v)]))
         for f in dataclasses.fields(cls)  # type: ignore[arg-type]
         if f.name not in numbers
     }
+
+
+def _entry(cls: type[Effect]) -> dict[str, Any]:
     return {
         "id": cls.id, "title": cls.title, "kind": cls.kind, "sign": cls.sign, "on_by_default": cls.on_by_default,
         "diagnosed": cls.diagnosed, "needs": list(cls.needs), "source": source_of(cls),
         "parameters": [
-            {"name": p.name, "unit": p.unit, "default": getattr(effect, p.name), "low": p.low, "high": p.high,
+            {"name": p.name, "unit": p.unit, "default": getattr(cls(), p.name), "low": p.low, "high": p.high,
              "off": p.off, "source": p.source}
             for p in cls.parameters
         ],
-        "choices": words,
+        "choices": _choices(cls),
     }  # fmt: skip
 
 
-def _range(p: dict[str, Any]) -> str:
-    unit = "" if p["unit"] == "1" else f" {p['unit']}"
-    return f"{p['low']:.4g} to {p['high']:.4g}{unit}"
+def _range(p: Parameter, unit: bool = True) -> str:
+    return f"{p.low:.4g} to {p.high:.4g}{f' {p.unit}' if unit and p.unit != '1' else ''}"
 
 
 def text() -> str:
@@ -59,12 +65,9 @@ def text() -> str:
     lines = []
     for kind, head in KINDS.items():
         rows = []
-        for e in document()["effects"]:
-            if e["kind"] != kind:
-                continue
-            state = "on" if e["on_by_default"] else "off"
-            rows.append([e["id"], state, e["title"], "", ""])
-            rows += [["", "", "", p["name"], f"{_range(p)}, default {p['default']:.4g}"] for p in e["parameters"]]
+        for e in _known(kind):
+            rows.append([e.id, "on" if e.on_by_default else "off", e.title, "", ""])
+            rows += [["", "", "", p.name, f"{_range(p)}, default {getattr(e(), p.name):.4g}"] for p in e.parameters]
         if rows:
             table = text_table(["effect", "default", "what", "parameter", "range"], rows, left=range(5))
             lines += [head, "\n".join(line.rstrip() for line in table.splitlines()), ""]
@@ -73,7 +76,6 @@ def text() -> str:
 
 def markdown(only: Container[str] | None = None) -> str:
     """Give effects as the page docs/effects.md."""
-    found = [e for e in document()["effects"] if only is None or e["id"] in only]
     lines = [
         "# Effects",
         "",
@@ -84,35 +86,34 @@ def markdown(only: Container[str] | None = None) -> str:
         "",
     ]
     for kind, head in KINDS.items():
-        mine = [e for e in found if e["kind"] == kind]
+        mine = [e for e in _known(kind) if only is None or e.id in only]
         if not mine:
             continue
         lines += [f"## {head}", "", "| id | effect | signature |", "|---|---|---|"]
-        lines += [f"| [`{e['id']}`](#{e['id']}) | {e['title']} | {e['sign']} |" for e in mine]
+        lines += [f"| [`{e.id}`](#{e.id}) | {e.title} | {e.sign} |" for e in mine]
         lines += [""]
         for e in mine:
             lines += _page(e)
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _page(e: dict[str, Any]) -> list[str]:
-    state = ["On by default." if e["on_by_default"] else "Off by default."]
-    if not e["diagnosed"]:
+def _page(e: type[Effect]) -> list[str]:
+    state = ["On by default." if e.on_by_default else "Off by default."]
+    if not e.diagnosed:
         state.append("Never named by a diagnosis.")
-    if e["needs"]:
-        state.append(f"Visible only in recordings with {', '.join(f'`{n}`' for n in e['needs'])}.")
-    lines = [f"### {e['id']}", "", *textwrap.wrap(" ".join(state), 118), ""]
-    if e["parameters"]:
+    if e.needs:
+        state.append(f"Visible only in recordings with {', '.join(f'`{n}`' for n in e.needs)}.")
+    lines = [f"### {e.id}", "", *textwrap.wrap(" ".join(state), 118), ""]
+    if e.parameters:
         lines += [
             "| parameter | unit | default | range | no effect at | source of the range |",
             "|---|---|---|---|---|---|",
         ]
-        for p in e["parameters"]:
-            off = "" if p["off"] is None else f"{p['off']:.4g}"
-            number = f"{p['default']:.4g}"
-            cells = [f"`{p['name']}`", p["unit"], number, _range(p | {"unit": "1"}), off, p["source"]]
+        for p in e.parameters:
+            off = "" if p.off is None else f"{p.off:.4g}"
+            cells = [f"`{p.name}`", p.unit, f"{getattr(e(), p.name):.4g}", _range(p, unit=False), off, p.source]
             lines.append(f"| {' | '.join(cells)} |")
         lines.append("")
-    for name, words in e["choices"].items():
+    for name, words in _choices(e).items():
         lines += [*textwrap.wrap(f"`{name}`: " + ", ".join(f"`{w}`" for w in words), 118), ""]
-    return [*lines, *textwrap.wrap(e["source"], 118, break_on_hyphens=False), ""]
+    return [*lines, *textwrap.wrap(source_of(e), 118, break_on_hyphens=False), ""]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
+from bemt.results.report.book import Book, CasePage
 from bemt.results.report.diagnosis_block import diagnosis_verdict, page_verdict
 from bemt.results.report.plot import Mark, Plot, figure, points
-from bemt.results.report.values import Part, uri
+from bemt.results.report.values import Answer, Part, uri
 from bemt.results.report.verdicts import answer, headline, verdict
 
 SOURCES = {
@@ -40,40 +41,35 @@ NEEDS = {
 OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
 
 
-def answers(book: Mapping[str, Any], ids: Sequence[str]) -> list[dict[str, Any]]:
+def answers(book: Book, ids: Sequence[str]) -> list[Answer]:
     """Give one sentence per case."""
     out = []
-    for page, key in zip(book["cases"], ids, strict=True):
+    for page, key in zip(book.cases, ids, strict=True):
         kind, word, told = page_verdict(page)
-        words = answer(page["result"]) if verdict(page["result"])[1] == word else told
-        still = page["pictures"].get("rotor")
-        out.append({"id": key, "title": headline(page["result"]), "kind": kind, "word": word,
-                    "words": words, "picture": uri(still) if still else ""})  # fmt: skip
+        words = answer(page.result) if verdict(page.result)[1] == word else told
+        picture = uri(page.picture) if page.picture else ""
+        out.append(Answer(key, headline(page.result), kind, word, words, picture))
     return out
 
 
-def _values(page: Mapping[str, Any]) -> dict[str, list[tuple[str, float, float]]]:
+def _values(page: CasePage) -> dict[str, list[tuple[str, float, float]]]:
     """Thrusts by source: (label, thrust, standard uncertainty)."""
-    result = page["result"]
-    own = result.get("conditions", {})
     out: dict[str, list[tuple[str, float, float]]] = {}
-    for row in result.get("rows", []):
-        T, u = row.get("thrust_N"), row.get("u")
-        here = abs(row["rpm"] - own["rpm"]) <= 1e-6 * own["rpm"] and row["airspeed_m_s"] == own["airspeed_m_s"]
-        if T is not None and math.isfinite(T) and here:
-            out.setdefault(row["source"], []).append((row["label"], float(T), math.nan if u is None else float(u)))
-    run = page.get("own_cfd")
-    if run:
-        words = f"{run['campaign']}, {run['solver']}, {run['cells']:.0f} cells"
-        out.setdefault("openfoam", []).append((words, run["thrust_N"], run["u_thrust_N"]))
+    for row in page.result.rows:
+        own = page.result.at
+        here = abs(row.rpm - own.rpm) <= 1e-6 * own.rpm and row.airspeed_m_s == own.airspeed_m_s
+        if math.isfinite(row.thrust_N) and here:
+            out.setdefault(row.source, []).append((row.label, row.thrust_N, row.u))
+    for source, label, T, u in page.own_points:
+        out.setdefault(source, []).append((label, T, u))
     return out
 
 
-def _comparison_plot(book: Mapping[str, Any]) -> dict[str, Any] | None:
+def _comparison_plot(book: Book) -> dict[str, Any] | None:
     """Thrust of every case and source over that of the first recording."""
     names: list[str] = []
     found: dict[str, list[tuple[float, float, float, str]]] = {source: [] for source in SOURCES}
-    for page in reversed(book["cases"]):
+    for page in reversed(book.cases):
         values = _values(page)
         base = next((values[s][0][1] for s in ("cfd", "bench", "vendor", "openfoam") if values.get(s)), math.nan)
         if not base > 0:
@@ -81,7 +77,7 @@ def _comparison_plot(book: Mapping[str, Any]) -> dict[str, Any] | None:
         for source, (_, _, lane) in SOURCES.items():
             for label, T, u in values.get(source, []):
                 found[source].append((T / base, len(names) + lane, u / base, f"{label}: {T:.4g} N"))
-        names.append(str(page["result"]["name"]))
+        names.append(page.result.name)
     traces = [points(word, found[source], source, shape, True) for source, (word, shape, _) in SOURCES.items()]
     return figure(Plot("Thrust of all sources over the recorded value", "thrust / recorded thrust [-]", "", traces,
                        [Mark(1.0, "recorded")], NOTE, names, wide=True, x_limits=SHOWN))  # fmt: skip
@@ -91,18 +87,17 @@ COLUMNS = ("case", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m]", "K1/K2 
            "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
 
 
-def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, Any] | None:
+def _comparison_table(book: Book, ids: Sequence[str]) -> dict[str, Any] | None:
     rows = []
-    for page, key in zip(book["cases"], ids, strict=True):
-        result = page["result"]
+    for page, key in zip(book.cases, ids, strict=True):
         kind, word, _ = page_verdict(page)
         v = {source: items[0][1:] for source, items in _values(page).items()}
-        own: Mapping[str, Any] = next((r for r in result.get("rows", []) if r["source"] == "bemt"), {})
+        own = page.result.first("bemt")
         T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))
         off = [100 * (x / cfd - 1) if x is not None and cfd else None for x in (T, simple)]
         rows.append([
-            Cell(str(result["name"]), link=key), num(own.get("M_tip"), 3), num(T), num(v.get("bemt", (0, None))[1], 2),
-            num(own.get("torque_Nm")), num(simple), num(cfd),
+            Cell(page.result.name, link=key), num(own and own.M_tip, 3), num(T), num(v.get("bemt", (0, None))[1], 2),
+            num(own and own.torque_Nm), num(simple), num(cfd),
             *(num(v.get(source, (None,))[0]) for source in ("openfoam", "bench", "vendor")),
             *(num(x, signed=True) for x in off), Cell(word, badge=kind),
         ])  # fmt: skip
@@ -110,10 +105,10 @@ def _comparison_table(book: Mapping[str, Any], ids: Sequence[str]) -> dict[str, 
     return table([COLUMNS[k] for k in used], [[r[k] for k in used] for r in rows])
 
 
-def front_parts(book: Mapping[str, Any], ids: Sequence[str]) -> list[Part]:
+def front_parts(book: Book, ids: Sequence[str]) -> list[Part]:
     """Give the chart and the table of all cases."""
     plot = _comparison_plot(book)
-    badges = [page_verdict(page)[1] for page in book["cases"]]
+    badges = [page_verdict(page)[1] for page in book.cases]
     told = [text for lead, text in NEEDS.items() if any(badge.startswith(lead) for badge in badges)]
     return [
         ("words", " ".join(told) if plot else ""),
@@ -140,47 +135,43 @@ def _n(value: Any, digits: int = 4) -> str:
     return number_text(float(value), digits) if good else "-"
 
 
-def summary(book: Mapping[str, Any]) -> str:
+def summary(book: Book) -> str:
     """Write the summary."""
     out = [
         "# Validation report",
         "",
-        f"Made by bemt {plain_markdown(book['version'])}. Figures and tables: `report.html`.",
+        f"Made by bemt {plain_markdown(book.version)}. Figures and tables: `report.html`.",
         "",
     ]
     out += [
         "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | verdict |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for page in book["cases"]:
-        r = page["result"]
-        first: dict[str, Any] = {}
-        for row in r.get("rows", []):
-            first.setdefault(row["source"], row)
-        cells = [_n(first.get("bemt", {}).get("thrust_N")), _n(first.get("bemt", {}).get("u"), 2)]
-        cells += [_n(first.get(s, {}).get("thrust_N")) for s in ("k1k2", "cfd", "bench", "vendor")]
-        out.append(
-            "| " + " | ".join([plain_markdown(r["name"], 80), *cells, plain_markdown(page_verdict(page)[1])]) + " |"
-        )
-    for page in book["cases"]:
-        r = page["result"]
+    for page in book.cases:
+        r = page.result
+        own, *others = (r.first(s) for s in ("bemt", "k1k2", "cfd", "bench", "vendor"))
+        cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *(_n(row and row.thrust_N) for row in others)]
+        words = [plain_markdown(r.name, 80), *cells, plain_markdown(page_verdict(page)[1])]
+        out.append(f"| {' | '.join(words)} |")
+    for page in book.cases:
+        r = page.result
         out += ["", f"## {plain_markdown(headline(r), 140)}", "", plain_markdown(page_verdict(page)[2], 1500)]
-        for audit in r.get("audit", []):
+        for audit in r.audit:
             for status in ("fault", "doubtful", "not stated"):
-                topics = [line["topic"] for line in audit["lines"] if line["status"] == status]
+                topics = [line.topic for line in audit.lines if line.status == status]
                 if topics:
                     out += [
                         "",
-                        f"Audit of {plain_markdown(audit['reference'], 80)}, {status}: "
+                        f"Audit of {plain_markdown(audit.reference, 80)}, {status}: "
                         f"{plain_markdown(', '.join(topics))}.",
                     ]
-        item = page.get("diagnosis")
+        item = page.diagnosis
         if item:
             out += [
                 "",
                 f"Diagnosis: {plain_markdown(diagnosis_verdict(item)[1], 80)}. "
                 f"{plain_markdown(diagnosis_verdict(item)[2], 800)}",
             ]
-        out += [f"- {plain_markdown(fault)}" for fault in r.get("faults", [])[:20]]
-        out += ["", *(f"Note: {plain_markdown(note)}" for note in page["problems"])] if page["problems"] else []
+        out += [f"- {plain_markdown(fault)}" for fault in r.faults[:20]]
+        out += ["", *(f"Note: {plain_markdown(note)}" for note in page.problems)] if page.problems else []
     return "\n".join(out) + "\n"

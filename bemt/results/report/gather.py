@@ -1,19 +1,25 @@
-"""Everything a report shows, as plain values: results, curves, pictures, diagnoses (made here), CFD runs."""
+"""Everything a report shows, gathered: results, curves, pictures, diagnoses (made here), pages of tools."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import bemt
+from bemt.base import plugins
+from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError
+from bemt.base.page import FIRST
 from bemt.base.tables import json_text, number_of, write_atomic
 from bemt.results.report import curves, trends
-from bemt.results.report.cfd import attach, cfd_runs, fidelities
+from bemt.results.report.book import Book, CasePage, Diagnosed, Reproduced, Trends
 from bemt.results.report.found_files import read_json, safe_files
 from bemt.results.report.rotor_view import still
+from bemt.results.sweep.rows import Result
 from bemt.rotors.case import Case, find_cases, load_case
 from geometry.common import GeometryError
 from geometry.surface import surfaces
@@ -21,100 +27,77 @@ from geometry.surface import surfaces
 Progress = Callable[[str], None]
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
-REPRODUCED = {"section", "quantity", "stated", "ours", "unit", "status", "note"}
 ALL_BYTES = 4_000_000
 """Of all figures of diagnoses together, so that the report stays below 8 MB."""
 
 
-def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> dict[str, Any]:
+def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = None) -> Book:
     """Solve the cases (or take up the results of a sweep in `out`) and compute what the report plots."""
     from bemt.results.sweep import sweep
 
     tell = progress or (lambda line: None)
-    document = sweep(paths, out, progress=tell)
+    swept = sweep(paths, out, progress=tell)
     pages, solved = [], []
-    for path, result in zip(find_cases(paths), document["cases"], strict=True):
-        tell(f"report: {result['name']}")
+    for path, result in zip(find_cases(paths), swept.cases, strict=True):
+        tell(f"report: {result.name}")
         page, case = _case(path, result)
         pages.append(page)
-        if case is not None and result["rows"]:
-            solved.append((case, page))
+        if case is not None and result.rows:
+            solved.append(case)
     tell("report: trends")
-    of_thesis = any(result.get("origin") == trends.ORIGIN for result in document["cases"])
-    book = {
-        "version": bemt.__version__,
-        "cases": pages,
-        "trends": _trends(solved, document["cases"]),
-        "reproduction": _reproduction(out) if of_thesis else [],
-        "exit_code": document["exit_code"],
-        "cfd": cfd_runs(out),
-        "fidelities": fidelities(out, [str(page["result"]["name"]) for page in pages]),
-    }
-    attach(book)
-    attach_diagnoses(book, out)
-    return book
+    thesis = [result for result in swept.cases if result.origin == trends.ORIGIN]  # the robot is that of the thesis
+    reproduced = _reproduction(out) if thesis else ()
+    book = Book(bemt.__version__, tuple(pages), _trends(solved, thesis), reproduced, swept.exit_code)
+    for part in plugins.loaded("REPORT_PARTS"):
+        book = part(book, out)
+    return attach_diagnoses(book, out)
 
 
-def _case(path: Path, result: Mapping[str, Any]) -> tuple[dict[str, Any], Case | None]:
+def _case(path: Path, result: Result) -> tuple[CasePage, Case | None]:
     """Page of one case."""
-    page: dict[str, Any] = {
-        "result": result,
-        "files": [],
-        "problems": [],
-        "pictures": {},
-        "surfaces": [],
-        "geometry": {},
-        "curves": {},
-        "radial": {},
-        "refinement": {},
-    }
-    if not result["rows"]:
+    page = CasePage(result)
+    if not result.rows:
         return page, None
     try:
         case = load_case(path)
-        page["files"] = [
-            {"name": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()} for file in case.files()
-        ]
-        page["geometry"] = curves.geometry_curves(case)
-        page["curves"] = curves.case_curves(case, (result.get("drive") or {}).get("rpm", {}).get("value"))
-        page["radial"] = curves.radial_curves(case)
-        page["refinement"] = curves.refinement(case)
+        files = [(file.name, hashlib.sha256(file.read_bytes()).hexdigest()) for file in case.files()]
+        page = replace(page, files=files, blade=curves.blade_curves(case))
+        page = replace(page, curves=curves.case_curves(case, result.drive.rpm.value if result.drive else None))
+        page = replace(page, radial=curves.radial_curves(case))
+        page = replace(page, refinement=curves.refinement(case))
     except (InputError, GeometryError, ValueError) as error:
-        page["problems"].append(f"some figures could not be computed: {error}")
-        return page, None
+        return replace(page, problems=(f"some figures could not be computed: {error}",)), None
     try:
-        page["surfaces"] = surfaces(case.rotor(), case.duct())
-        page["pictures"] = {"rotor": still(page["surfaces"])}
+        found = surfaces(case.rotor(), case.duct())
+        page = replace(page, surfaces=found, picture=still(found))
     except GeometryError as error:
-        page["problems"].append(f"no picture: {error}")
+        page = replace(page, problems=(f"no picture: {error}",))
     return page, case
 
 
-def _trends(solved: Sequence[tuple[Case, dict[str, Any]]], results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    base = next((case for case, _ in solved if not case.ducted), None)
-    family: dict[str, Any] = {}
+def _trends(solved: Sequence[Case], thesis: Sequence[Result]) -> Trends:
+    base = next((case for case in solved if not case.ducted), None)
+    family = None
     if base is not None:
-        try:
+        with suppress(InputError, GeometryError, ValueError):
             family = trends.families(base)
-        except (InputError, GeometryError, ValueError):
-            family = {}
-    thesis = [result for result in results if result.get("origin") == trends.ORIGIN]  # the robot is that of the thesis
-    return {"family": family, "choice": trends.choice(thesis), "moments": trends.moments(thesis)}
+    return Trends(family, trends.choice(thesis), *trends.moments(thesis))
 
 
-def _reproduction(out: Path) -> list[Mapping[str, Any]]:
+def _reproduction(out: Path) -> Sequence[Reproduced]:
     """Numbers of the thesis beside ours, of a study in the folder of results; the database statistics left out."""
     document = read_json(out / "reproduction.json")
     if not isinstance(document, Mapping) or not str(document.get("schema", "")).startswith("bemt.reproduce/"):
         return []
-    rows = [item for item in document.get("items", []) if isinstance(item, Mapping) and item.keys() >= REPRODUCED]
-    return [item for item in rows if not str(item["status"]).startswith("not checked")]
+    rows = rows_of(Reproduced, document.get("items"), lenient=True)
+    return [item for item in rows if not item.status.startswith("not checked")]
 
 
-def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
+def attach_diagnoses(book: Book, out: Path) -> Book:
     """Put diagnoses found in the folder of results to their cases, the others on a page of their own."""
     others, room = [], ALL_BYTES
-    named = {page["result"]["name"]: page for page in book["cases"]}
+    own: dict[str, Diagnosed] = {}
+    names = {page.result.name for page in book.cases}
     files = [*sorted(out.glob("*/diagnosis/diagnosis.json")), *sorted(out.glob("diagnosis/*/diagnosis.json"))]
     for path in files:
         document = read_json(path)
@@ -125,13 +108,13 @@ def attach_diagnoses(book: dict[str, Any], out: Path) -> None:
         for figure in safe_files(path.parent):
             room -= len(figure[1])
             figures += [figure] if room > 0 else []
-        item = {"name": name, "document": document, "figures": figures}
-        page = named.get(name)
-        if page is not None and path.parent.name == "diagnosis":
-            page["diagnosis"] = item
+        item = Diagnosed(name, document, figures)
+        if name in names and path.parent.name == "diagnosis":
+            own[name] = item
         else:
             others.append(item)
-    book["diagnoses"] = others
+    cases = tuple(replace(page, diagnosis=own.get(page.result.name)) for page in book.cases)
+    return replace(book, cases=cases, diagnoses=tuple(others))
 
 
 def diagnose_into(
@@ -145,7 +128,7 @@ def diagnose_into(
     from bemt.judge.diagnose import folder
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document
-    from bemt.judge.diagnose.figures_recording import FIRST, first_picture
+    from bemt.judge.diagnose.figures_recording import first_picture
     from bemt.judge.diagnose.load import load_all
 
     cases = find_cases(paths)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import quote
 
+from bemt.base.arrays import Array
 from bemt.base.tables import number_text
 
 COLOURS = {
@@ -40,16 +41,16 @@ class Trace:
 
     name: str  # For the key
     # Points, in the units of the axes; NaN and None break a line
-    x: Sequence[Any]
-    y: Sequence[Any]
-    u: Sequence[Any] | None = None  # Standard uncertainty of y, same unit: a band round a line, bars through points
+    x: Sequence[Any] | Array
+    y: Sequence[Any] | Array
+    u: Sequence[Any] | Array | None = None  # Standard uncertainty of y: a band round a line, bars through points
     colour: str = SERIES[0]  # ``#rrggbb``
     dash: str = ""  # SVG dash pattern; empty is a full line
     shape: str = "circle"  # Marker of points: circle, square, triangle, diamond, cross, bar, star
     points: bool = False  # Points instead of a line
     labels: Sequence[str] = ()  # Words per point, shown on hovering
     horizontal: bool = False  # The uncertainty belongs to x
-    ceiling: Sequence[Any] | None = None  # What y cannot pass: a band ends there
+    ceiling: Sequence[Any] | Array | None = None  # What y cannot pass: a band ends there
 
     def top(self, x: float, y: float, u: float) -> float:
         """Upper end of the band at a point of the trace."""

@@ -8,7 +8,7 @@ arms of 0.2 m.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,41 +18,42 @@ from bemt.base.errors import InputError
 from bemt.base.page import num, table
 from bemt.base.units import G0, INCH, KGF
 from bemt.physics.k1k2 import D_OVER_P_USABLE, M_TIP_LIMIT
+from bemt.results.report.book import Book, Choice, Family, Line
 from bemt.results.report.plot import COLOURS, DASHES, Mark, Plot, Trace, figure, points
 from bemt.results.report.values import Section, sections
+from bemt.results.sweep.rows import Result
 from bemt.rotors.case import Case
 from geometry.common import GeometryError
 
 ORIGIN = "Cahill 2025"
 """What a case of the source thesis states as its ``origin``."""
-ROBOT = {"mass_kg": 6.5, "drives": 2, "wanted_kgf": 6.0, "arm_m": 0.2, "fan_mass_kg": 0.4}
-"""Of the source thesis; `fan_mass_kg` is the DS-30 (duct 100 g, motor 300 g), the only drive whose mass it gives."""
+MASS_KG, DRIVES, WANTED_KGF, ARM_M, FAN_MASS_KG = 6.5, 2, 6.0, 0.2, 0.4
+"""Robot of the source thesis; the fan is the DS-30 (duct 100 g, motor 300 g), the only drive whose mass it gives."""
 N, COARSE = 15, 20
 """Points of a family, and their blade elements: thrust within 0.2 % of the usual 40."""
 
 
-def _line(case: Case, key: str, values: Array) -> dict[str, Any]:
+def _line(case: Case, key: str, values: Array) -> Line:
     """Solve one point for each value of a key of the case."""
     from bemt.rotors.case.prepare import k1k2_case, prepare_case
 
-    out: dict[str, list[float]] = {name: [] for name in ("thrust_N", "k1k2_thrust_N", "M_tip", "power_W")}
+    rows = []
     for value in values:
         changes = {key: float(value)}
-        row = [math.nan] * 4
+        row = [math.nan] * 3
         try:
             air = case.air()
             rpm, V = np.array([case.rpm]), np.array([case.airspeed_m_s])
             points = prepare_case(case, changes, COARSE).solve(rpm, V, air)
             simple = k1k2_case(case, changes, rpm, V, air)
-            row = [float(a[0]) for a in (points.thrust_N, simple.thrust_N, points.M_tip, points.power_W)]
+            row = [float(a[0]) for a in (points.thrust_N, simple.thrust_N, points.M_tip)]
         except (InputError, GeometryError, ValueError):
             pass  # this value makes no rotor: a gap in the line
-        for name, number in zip(out, row, strict=True):
-            out[name].append(number)
-    return {name: np.array(v) for name, v in out.items()}
+        rows.append(row)
+    return Line(values, *np.array(rows).T)
 
 
-def families(case: Case) -> dict[str, Any]:
+def families(case: Case) -> Family:
     """Vary diameter, pitch and rpm of one propeller."""
     from bemt.rotors.case.prepare import k1k2_case, prepare_case
 
@@ -64,103 +65,82 @@ def families(case: Case) -> dict[str, Any]:
     rpm = np.linspace(0.1, 1.75, 2 * N) * case.rpm
     air, V = case.air(), np.full(2 * N, case.airspeed_m_s)
     points, simple = ready.solve(rpm, V, air), k1k2_case(case, None, rpm, V, air)
-    return {
-        "name": case.name,
-        "title": case.title,
-        "D_in": D_in,
-        "pitch_in": p_in,
-        "rpm_case": case.rpm,
-        "mach_per_rpm": math.pi * case.diameter_m / 60.0 / air.a_sound,
-        "mach_per_inch": math.pi * INCH * case.rpm / 60.0 / air.a_sound,
-        "mach_top": float(ready.prep.mach_top),
-        "diameter": {"diameter_in": diameters, **_line(case, "rotor.diameter_in", diameters)},
-        "pitch": {"pitch_in": pitches, **_line(case, "blade.pitch_in", pitches)},
-        "rpm": {
-            "rpm": rpm,
-            "thrust_N": points.thrust_N,
-            "k1k2_thrust_N": simple.thrust_N,
-            "M_tip": points.M_tip,
-            "power_W": points.power_W,
-        },
-    }
+    return Family(
+        case.name, case.title, D_in, p_in, case.rpm,
+        mach_per_rpm=math.pi * case.diameter_m / 60.0 / air.a_sound,
+        mach_per_inch=math.pi * INCH * case.rpm / 60.0 / air.a_sound,
+        diameter=_line(case, "rotor.diameter_in", diameters), pitch=_line(case, "blade.pitch_in", pitches),
+        rpm=Line(rpm, points.thrust_N, simple.thrust_N, points.M_tip),
+    )  # fmt: skip
 
 
-def choice(results: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def choice(results: Sequence[Result]) -> list[Choice]:
     """Compare drives on the robot by thrust over weight."""
-    weight = ROBOT["mass_kg"] * G0
+    weight = MASS_KG * G0
     out = []
     for result in results:
-        row = next((r for r in result.get("rows", []) if r["source"] == "bemt"), None)
-        if row is None or row.get("thrust_N") is None or not math.isfinite(row["thrust_N"]):
+        row = result.first("bemt")
+        if row is None or not math.isfinite(row.thrust_N):
             continue
-        T, P, u = float(row["thrust_N"]), row.get("power_W"), row.get("u")
-        D = float(result["conditions"]["diameter_m"])
-        rows = [
-            (r["label"], r["source"], ROBOT["drives"] * r["thrust_N"] / weight)
-            for r in result["rows"]
-            if r["source"] in ("cfd", "bench", "vendor") and r.get("thrust_N") is not None
-        ]
+        T, P = row.thrust_N, row.power_W
         out.append(
-            {
-                "name": result["name"],
-                "kind": result["kind"],
-                "thrust_N": T,
-                "u": u,
-                "power_W": P,
-                "disk_loading": T / (math.pi / 4.0 * D**2),
-                "g_per_W": T / KGF * 1000.0 / P if P else math.nan,
-                "robot_ratio": ROBOT["drives"] * T / weight,
-                "rows": rows,
-                "u_ratio": math.nan if u is None else ROBOT["drives"] * u / weight,
-                "needed": ROBOT["wanted_kgf"] * KGF / T if T > 0 else math.nan,
-            }
+            Choice(
+                result.name,
+                T,
+                row.u,
+                P,
+                disk_loading=T / (math.pi / 4.0 * result.at.diameter_m**2),
+                g_per_W=T / KGF * 1000.0 / P if P else math.nan,
+                robot_ratio=DRIVES * T / weight,
+                u_ratio=DRIVES * row.u / weight,
+                needed=WANTED_KGF * KGF / T if T > 0 else math.nan,
+                recorded=[
+                    (r.label, r.source, DRIVES * r.thrust_N / weight) for r in result.of("cfd", "bench", "vendor")
+                ],
+            )  # fmt: skip
         )
     return out
 
 
-def moments(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Roll moment of one drive of a pair about the middle, over its mounting distance."""
-    solved = [r for r in results if r.get("rows")]
-    chosen = next((r for r in solved if r.get("kind") == "fan"), solved[0] if solved else None)
+def moments(results: Sequence[Result]) -> tuple[str, list[tuple[str, str, float, float]]]:
+    """Name and thrusts of one drive of a pair, whose roll moment about the middle grows with its mounting distance."""
+    solved = [r for r in results if r.rows]
+    chosen = next((r for r in solved if r.kind == "fan"), solved[0] if solved else None)
     if chosen is None:
-        return {}
-    lines = [
-        (r["label"], r["source"], r["thrust_N"], r.get("u"))
-        for r in chosen["rows"]
-        if r["source"] in ("bemt", "cfd", "bench", "vendor") and r.get("thrust_N") is not None
-    ]
-    return {"name": chosen["name"], "distance_m": np.linspace(0.0, 0.4, 9), "lines": lines}
+        return "", []
+    found = [r for r in chosen.of("bemt", "cfd", "bench", "vendor") if not math.isnan(r.thrust_N)]
+    return chosen.name, [(r.label, r.source, r.thrust_N, r.u) for r in found]
 
 
 NAMES = {"bemt": "BEMT", "cfd": "CFD, recorded"}
 
 
-def _recorded(results: Sequence[Mapping[str, Any]], x: Any, keep: Any) -> Trace:
+def _recorded(results: Sequence[Result], x: Any, keep: Any) -> Trace:
     """Recorded CFD of open propellers."""
     rows = [
-        (x(r, row), row["thrust_N"], None, f"{r['name']}: {row['label']}")
+        (x(r, row), row.thrust_N, None, f"{r.name}: {row.label}")
         for r in results
-        for row in r.get("rows", [])
-        if r.get("kind") != "fan" and row["source"] == "cfd" and row.get("thrust_N") is not None and keep(row)
+        for row in r.of("cfd")
+        if r.kind != "fan" and not math.isnan(row.thrust_N) and keep(row)
     ]
     return points("recorded CFD of the cases", rows, "cfd", "diamond")
 
 
-def _pair(x: Any, line: Mapping[str, Any]) -> list[Trace]:
+def _pair(x: Array, line: Line) -> list[Trace]:
     return [
-        Trace("BEMT", x, line["thrust_N"], None, COLOURS["bemt"]),
-        Trace("K1/K2", x, line["k1k2_thrust_N"], None, COLOURS["k1k2"], "7 4"),
+        Trace("BEMT", x, line.thrust_N, None, COLOURS["bemt"]),
+        Trace("K1/K2", x, line.k1k2_thrust_N, None, COLOURS["k1k2"], "7 4"),
     ]
 
 
-def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Section:
-    if not f:
+def _families(f: Family | None, results: Sequence[Result]) -> Section:
+    if f is None:
         return "", []
-    D, p, rpm = f["D_in"], f["pitch_in"], f["rpm_case"]
-    per_inch, per_rpm = f["mach_per_inch"], f["mach_per_rpm"]
+    D, p, rpm = f.D_in, f.pitch_in, f.rpm_case
+    per_inch, per_rpm = f.mach_per_inch, f.mach_per_rpm
     low, high = D_OVER_P_USABLE
-    size = _recorded(results, lambda r, row: r["conditions"]["diameter_m"] / INCH, lambda row: row["rpm"] == rpm)
-    mach = _recorded(results, lambda r, row: row["M_tip"], lambda row: True)
+    size = _recorded(results, lambda r, row: r.at.diameter_m / INCH, lambda row: row.rpm == rpm)
+    mach = _recorded(results, lambda r, row: row.M_tip, lambda row: True)
     over, sonic = f"K1/K2: tip Mach {M_TIP_LIMIT:g}", "supersonic tip"
     narrow, wide = f"K1/K2: D/p {low:g}", f"K1/K2: D/p {high:g}"
     by_size = [
@@ -176,45 +156,45 @@ def _families(f: Mapping[str, Any], results: Sequence[Mapping[str, Any]]) -> Sec
     T, label = "thrust [N]", f"{D:.3g}x{p:.3g} in"
     plots = [
         Plot(f"Thrust over diameter, pitch {p:.3g} in, {rpm:g} rev/min", "diameter [in]", T,
-             [*_pair(f["diameter"]["diameter_in"], f["diameter"]), size], by_size,
+             [*_pair(f.diameter.x, f.diameter), size], by_size,
              note + "Shaded: outside of section theory."),
         Plot(f"Thrust over pitch, {D:.3g} in, {rpm:g} rev/min", "pitch [in]", T,
-             _pair(f["pitch"]["pitch_in"], f["pitch"]), by_pitch,
+             _pair(f.pitch.x, f.pitch), by_pitch,
              "BEMT predicts stall where the formula continues. Shaded: outside the range of the formula."),
         Plot(f"Thrust over rotational speed, {label}", "rotational speed [rev/min]", T,
-             _pair(f["rpm"]["rpm"], f["rpm"]), by_speed),
+             _pair(f.rpm.x, f.rpm), by_speed),
         Plot(f"Thrust over tip Mach number, {label}", "tip Mach number [-]", T,
-             [*_pair(f["rpm"]["M_tip"], f["rpm"]), mach], by_mach,
+             [*_pair(f.rpm.M_tip, f.rpm), mach], by_mach,
              "One propeller by speed, against the recorded propellers, which differ in size." if mach.x else ""),
     ]  # fmt: skip
-    words = f"One quantity changes, all else stays as in {f['title']}."
-    title = f"Thrust against size, pitch and speed ({f['name']})"
+    words = f"One quantity changes, all else stays as in {f.title}."
+    title = f"Thrust against size, pitch and speed ({f.name})"
     return title, [("words", words), ("figures", [figure(plot) for plot in plots])]
 
 
-def _choice(rows: Sequence[Mapping[str, Any]]) -> Section:
+def _choice(rows: Sequence[Choice]) -> Section:
     if not rows:
         return "", []
-    m, n = ROBOT["mass_kg"], ROBOT["drives"]
-    names = [str(r["name"]) for r in reversed(rows)]
+    m, n = MASS_KG, DRIVES
+    names = [r.name for r in reversed(rows)]
     at = {name: i for i, name in enumerate(names)}
-    own = [(r["robot_ratio"], at[str(r["name"])], r["u_ratio"], "") for r in rows]
+    own = [(r.robot_ratio, at[r.name], r.u_ratio, "") for r in rows]
     traces = [points("BEMT", own, "bemt", "circle", True)]
     for source, shape in (("cfd", "diamond"), ("bench", "cross"), ("vendor", "triangle")):
-        found = [(ratio, at[str(r["name"])], None, words) for r in rows for words, s, ratio in r["rows"] if s == source]
+        found = [(ratio, at[r.name], None, words) for r in rows for words, s, ratio in r.recorded if s == source]
         traces.append(points(NAMES.get(source, source), found, source, shape))
-    wanted = ROBOT["wanted_kgf"]
+    wanted = WANTED_KGF
     plot = figure(Plot(
         f"Thrust of {n} drives over the weight of a {m:g} kg robot", "thrust / weight [-]", "", traces,
         [Mark(1.0, "carries its weight"), Mark(wanted / m, f"{wanted:g} kgf wanted")],
         "At the speed of each case; the mass of propeller, motor and battery is not added.", names, x_zero=True,
         wide=True,
     ))  # fmt: skip
-    lines = [[str(r["name"]), num(r["thrust_N"]), num(r["u"], 2), num(r["power_W"]), num(r["g_per_W"], 3),
-              num(r["disk_loading"], 3), num(r["robot_ratio"], 3), num(r["needed"], 3)] for r in rows]  # fmt: skip
+    lines = [[r.name, num(r.thrust_N), num(r.u, 2), num(r.power_W), num(r.g_per_W, 3), num(r.disk_loading, 3),
+              num(r.robot_ratio, 3), num(r.needed, 3)] for r in rows]  # fmt: skip
     header = ["drive", "thrust [N]", "u [N]", "shaft power [W]", "gf per W", "disk loading [N/m²]",
               f"{n} drives over {m:g} kg", f"drives for {wanted:g} kgf"]  # fmt: skip
-    fan = ROBOT["fan_mass_kg"]
+    fan = FAN_MASS_KG
     words = (
         f"A ducted fan pays for its small diameter with power: compare thrust per watt and disk loading. Masses are "
         f"given for the DS-30 only ({fan:g} kg with motor: 27 N is {27 / (fan * 9.80665):.1f} times its weight); for "
@@ -227,33 +207,33 @@ def _choice(rows: Sequence[Mapping[str, Any]]) -> Section:
     ]
 
 
-def _moments(d: Mapping[str, Any]) -> Section:
-    if not d or not d["lines"]:
+def _moments(name: str, lines: Sequence[tuple[str, str, float, float]]) -> Section:
+    if not lines:
         return "", []
-    x, arm = d["distance_m"], ROBOT["arm_m"]
+    x, arm = np.linspace(0.0, 0.4, 9), ARM_M
     traces = []
     used: dict[str, int] = {}
-    for label, source, T, u in d["lines"]:
+    for label, source, T, u in lines:
         k = used[source] = used.get(source, -1) + 1
-        band = [v * u for v in x] if u is not None and math.isfinite(u) and source == "bemt" else None
+        band = [v * u for v in x] if math.isfinite(u) and source == "bemt" else None
         dash = DASHES[(k + list(COLOURS).index(source)) % len(DASHES)] if source in COLOURS else ""
-        name = f"{NAMES.get(source, source) if source == 'bemt' else label}, {T:.4g} N"
-        traces.append(Trace(name, x, [v * T for v in x], band, COLOURS.get(source, COLOURS["other"]), dash))
-    at = [(arm, arm * T, None, f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m") for label, _, T, _ in d["lines"]]
+        said = f"{NAMES.get(source, source) if source == 'bemt' else label}, {T:.4g} N"
+        traces.append(Trace(said, x, [v * T for v in x], band, COLOURS.get(source, COLOURS["other"]), dash))
+    at = [(arm, arm * T, None, f"{label}: {T:.4g} N at {arm:g} m = {arm * T:.3g} N m") for label, _, T, _ in lines]
     traces.append(points(f"at {arm:g} m", at, "other", "circle"))
     note = (
         f"One drive of the pair pushes, the other is off. The thesis: 27 N at 0.2 m = 5.4 N m. Here {arm:g} m gives "
-        + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in d["lines"])
+        + "; ".join(f"{label} {arm * T:.3g} N m" for label, _, T, _ in lines)
         + "."
     )
-    plot = Plot(f"Roll moment about the middle ({d['name']})", "distance from the centre of mass [m]",
+    plot = Plot(f"Roll moment about the middle ({name})", "distance from the centre of mass [m]",
                 "roll moment [N m]", traces, [Mark(arm, f"arm {arm:g} m")], note, wide=True)  # fmt: skip
     return "Moment of two drives against mounting distance", [("figures", [figure(plot)])]
 
 
-def trend_sections(book: Mapping[str, Any]) -> list[Section]:
+def trend_sections(book: Book) -> list[Section]:
     """Give how thrust moves, and what that means for the robot of the thesis."""
-    t = book["trends"]
+    t = book.trends
     return sections(
-        _families(t["family"], [page["result"] for page in book["cases"]]), _choice(t["choice"]), _moments(t["moments"])
+        _families(t.family, [page.result for page in book.cases]), _choice(t.choice), _moments(t.pair, t.moments)
     )

@@ -3,11 +3,37 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 Part = tuple[str, Any]
 """What it is, and its value: words, command, verdict, table, list, figures, more (see `templates/report.html`)."""
 Section = tuple[str, list[Part]]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A case in one sentence, with its badge and picture."""
+
+    id: str
+    title: str
+    kind: str
+    word: str
+    words: str
+    picture: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of the menu."""
+
+    id: str
+    name: str  # In the menu
+    title: str
+    top: Sequence[Part]  # Above the sections
+    sections: Sequence[Section]
+    answers: Sequence[Answer] = ()
 
 
 def sections(*found: Section) -> list[Section]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
 from bemt.results.sweep.comparison import Comparison, State
+from bemt.results.sweep.rows import Result, Row
 
 NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight", "openfoam": "own CFD"}
 """Sources in the order in which they are spoken of."""
@@ -23,11 +24,6 @@ def _n(value: Any, digits: int = 3) -> str:
 
 def _finite(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def recorded(result: Mapping[str, Any], source: str) -> list[Mapping[str, Any]]:
-    """Rows of one source."""
-    return [row for row in result.get("rows", []) if row.get("source") == source]
 
 
 def stand(c: Comparison) -> tuple[str, str]:
@@ -53,36 +49,35 @@ def _far(c: Comparison) -> float:
     return abs(c.E) / c.u_val if c.u_val else math.inf
 
 
-def _thrusts(result: Mapping[str, Any]) -> list[Comparison]:
+def _thrusts(result: Result) -> list[Comparison]:
     """Recorded thrusts that BEMT is compared with, in the order of the sources."""
-    lines = [c for c in Comparison.of(result) if c.model == "bemt" and c.quantity == "thrust_N" and math.isfinite(c.E)]
+    lines = [c for c in result.comparisons if c.model == "bemt" and c.quantity == "thrust_N" and math.isfinite(c.E)]
     return [c for source in NAMES for c in lines if c.source == source]
 
 
-def _unsolved(result: Mapping[str, Any]) -> tuple[str, str, str] | None:
-    if not result.get("rows"):
-        n = len(result.get("faults", []))
+def _solved(result: Result) -> Row | tuple[str, str, str]:
+    """BEMT at the operating point of the case, or the verdict where there is none."""
+    if not result.rows:
+        n = len(result.faults)
         return "fault", "not solved", f"{n} fault{'s' * (n != 1)} in the input; nothing was computed."
-    own = recorded(result, "bemt")
-    if not own or not _finite(own[0].get("thrust_N")):
+    own = result.first("bemt")
+    if own is None or not _finite(own.thrust_N):
         return "fault", "no result", "BEMT did not converge at the operating point of the case."
-    return None
+    return own
 
 
-def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
+def verdict(result: Result) -> tuple[str, str, str]:
     """Say how BEMT and the recordings of a case stand: kind and words of a badge, and sentences.
 
-    >>> verdict({"rows": [], "faults": ["a", "b"]})
+    >>> verdict(Result("mine", faults=("a", "b")))
     ('fault', 'not solved', '2 faults in the input; nothing was computed.')
     """
-    if (unsolved := _unsolved(result)) is not None:
-        return unsolved
-    row = recorded(result, "bemt")[0]
-    words = f"BEMT gives {_n(row['thrust_N'], 4)} N"
-    if _finite(row.get("u")):
-        words += (
-            f" ± {_n(row['u'], 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
-        )
+    row = _solved(result)
+    if isinstance(row, tuple):
+        return row
+    words = f"BEMT gives {_n(row.thrust_N, 4)} N"
+    if _finite(row.u):
+        words += f" ± {_n(row.u, 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
     lines = _thrusts(result)
     if not lines:
         return "unknown", NOTHING_RECORDED, f"{words}. There is no recorded thrust to compare it with."
@@ -96,7 +91,7 @@ def verdict(result: Mapping[str, Any]) -> tuple[str, str, str]:
     if near:
         told.append(f"Not distinguishable from noise against {', '.join(near)}: |E| is within u_val.")
     told += _open(lines)
-    told += [f"Flagged: {flag}." for flag in row.get("flags", ())]
+    told += [f"Flagged: {flag}." for flag in row.flags]
     main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *lines]))
     return (*stand(main), " ".join(told))
 
@@ -119,23 +114,22 @@ def _open(lines: Sequence[Comparison]) -> list[str]:
     return told
 
 
-def answer(result: Mapping[str, Any]) -> str:
+def answer(result: Result) -> str:
     """Answer in one sentence: both numbers, and what their agreement hangs on; then the other recordings.
 
-    >>> row = {"source": "bemt", "thrust_N": 119.1, "u": 13.0}
-    >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0).document()
-    >>> audit = {"reference": "cfd", "u_relative_known": 0.041}
-    >>> answer({"rows": [row], "comparisons": [cfd], "audit": [audit]})
+    >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
+    >>> audit = Audit("cfd", (), math.nan, 0.041)
+    >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))
     'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4.1 % or more.'
     """  # noqa: E501
-    if (unsolved := _unsolved(result)) is not None:
-        return unsolved[2]
-    own = recorded(result, "bemt")[0]
-    band = f" ± {_n(own['u'], 2)}" if _finite(own.get("u")) else ""
-    head = f"BEMT {_n(own['thrust_N'], 4)}{band} N"
+    own = _solved(result)
+    if isinstance(own, tuple):
+        return own[2]
+    band = f" ± {_n(own.u, 2)}" if _finite(own.u) else ""
+    head = f"BEMT {_n(own.thrust_N, 4)}{band} N"
     lines = _thrusts(result)
     if not lines:
-        power = f", {_n(own['power_W'])} W at the shaft" if _finite(own.get("power_W")) else ""
+        power = f", {_n(own.power_W)} W at the shaft" if _finite(own.power_W) else ""
         return f"{head}{power}; nothing is recorded to compare it with."
     c = lines[0]
     name = NAMES[c.source]
@@ -161,17 +155,17 @@ def _hangs(c: Comparison, name: str) -> str:
     return words[c.state] + c.but_flagged
 
 
-def _audited(result: Mapping[str, Any], c: Comparison) -> str:
+def _audited(result: Result, c: Comparison) -> str:
     """What the audit of a recorded CFD value knows of its uncertainty."""
-    audit = next((a for a in result.get("audit", []) if a.get("reference") == c.reference), None)
-    share: Any = audit.get("u_relative_known") if audit else None
+    audit = result.audit_of(c.reference)
+    share = audit.u_relative_known if audit else 0.0
     if not _finite(share) or share <= 0:
         return ""
     return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more"
 
 
-def headline(result: Mapping[str, Any]) -> str:
+def headline(result: Result) -> str:
     """Name a case for people."""
-    words = str(result.get("title") or result.get("name") or "case").split()
+    words = (result.title or result.name or "case").split()
     text = " ".join(words)
     return text if len(text) <= 140 else text[:139] + "…"

@@ -16,8 +16,9 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bemt
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
@@ -26,9 +27,12 @@ from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.grid.formats import FORMATS, require_extra
-from bemt.results.sweep.grid.run import Engine, run_grid
+from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.store import SCHEMA, fingerprint
 from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
+
+if TYPE_CHECKING:
+    from bemt.results.sweep.grid.run import Engine
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -57,7 +61,7 @@ def _name(path: Path) -> str:
     return whole.parent.name if whole.name == "case.toml" else whole.stem
 
 
-def _failed(path: Path, error: BaseException, name: str = "") -> dict[str, Any]:
+def _failed(path: Path, error: BaseException, name: str = "") -> Result:
     """Result of a case that has none."""
     if isinstance(error, InputError):
         faults, code = [str(fault) for fault in error.faults], EXIT_INPUT
@@ -66,8 +70,7 @@ def _failed(path: Path, error: BaseException, name: str = "") -> dict[str, Any]:
     else:
         faults = [f"{path.as_posix()}: internal error", *"".join(traceback.format_exception(error)).splitlines()]
         code = EXIT_INTERNAL
-    empty: dict[str, Any] = {key: [] for key in ("rows", "variants", "other_rows", "comparisons")}
-    return {"name": name or _name(path), "title": "", **empty, "faults": faults, "exit_code": code}
+    return Result(name or _name(path), faults=tuple(faults), exit_code=code)
 
 
 def run_case(
@@ -78,7 +81,7 @@ def run_case(
     progress: Callable[[float, str], None] | None = None,
     form: str = "csv",
     engine: Engine | None = None,
-) -> dict[str, Any]:
+) -> Result:
     """Do everything for one case; never raises but for an interrupt."""
     tell = progress or (lambda share, what: None)
     case, mark = ready
@@ -95,19 +98,22 @@ def run_case(
             store.remove_result(folder)
         share = 0.5 if case.axes() else 1.0
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
-        result["grid"] = run_grid(
-            case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
-        )
-        result["exit_code"] = EXIT_OK
-        document: dict[str, Any] = plain(result)
+        grid = None
+        if case.axes():
+            from bemt.results.sweep.grid.run import run_grid
+
+            grid = run_grid(
+                case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
+            )
+        result = Result.from_document(plain(replace(result, grid=grid).document()))  # as it will be read back
         if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
             if folder is not None:
                 store.remove_result(folder)
             got = "files that changed while they were solved"
             raise InputError(Fault(case.path.as_posix(), "", got, "files that stay", "Run it again"))
         if folder is not None:
-            store.keep(folder, mark, document)
-        return document
+            store.keep(folder, mark, result)
+        return result
     except Exception as error:
         return _failed(case.path, error, case.name)
 
@@ -138,7 +144,7 @@ def _results(
     bar: Progress,
     form: str,
     engine: Engine | None,
-) -> Iterator[tuple[int, dict[str, Any]]]:
+) -> Iterator[tuple[int, Result]]:
     """Results in the order in which they come."""
     if engine is not None or jobs is None or jobs == 1 or len(cases) == 1:  # one process; its grid may use all cores
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -164,9 +170,7 @@ def _results(
         yield i, outcome or _failed(case.path, RuntimeError("the worker process ended"), case.name)
 
 
-def _in_processes(
-    cases: Mapping[int, Ready], jobs: int, args: tuple[Any, ...]
-) -> Iterator[tuple[int, dict[str, Any] | None]]:
+def _in_processes(cases: Mapping[int, Ready], jobs: int, args: tuple[Any, ...]) -> Iterator[tuple[int, Result | None]]:
     """Results from worker processes as they come; None for those that were lost with a process."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -200,7 +204,7 @@ def _bar(share: float) -> str:
 def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
     progress: Progress | None = None, engine: str = "local", scheduler: str | None = None, grid_format: str = "csv",
-) -> dict[str, Any]:  # fmt: skip
+) -> Sweep:  # fmt: skip
     """Solve cases."""
     _check_options(engine, scheduler, grid_format, jobs)
     files = find_cases(paths)
@@ -226,16 +230,12 @@ def sweep(
         left = [ready[i] for i in todo]
         for i, result in _results(left, folder, resume, jobs, tell, grid_format, on) if left else ():
             found[todo[i]] = result
-        results = [found[i] for i in range(len(files))]
-        document = {
-            "schema": SCHEMA,
-            "version": bemt.__version__,
-            "cases": results,
-            "exit_code": max((r["exit_code"] for r in results), default=EXIT_OK),
-        }
+        results = tuple(found[i] for i in range(len(files)))
+        code = max((r.exit_code for r in results), default=EXIT_OK)
+        swept = Sweep(SCHEMA, bemt.__version__, results, code)
         if folder is not None:
-            store.keep_overview(folder, document)
-    return document
+            store.keep_overview(folder, swept)
+    return swept
 
 
 def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: int | None) -> None:
@@ -257,10 +257,10 @@ def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: i
         require_extra("--engine dask", "dask", "distributed")
 
 
-def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], dict[int, dict[str, Any]]]:
+def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], dict[int, Result]]:
     """Cases that can be solved, and results of those that cannot, by their place; each file is read once."""
     ready: dict[int, Ready] = {}
-    failed: dict[int, dict[str, Any]] = {}
+    failed: dict[int, Result] = {}
     for i, path in enumerate(files):
         try:
             case = load_case(path)
@@ -269,7 +269,7 @@ def _read(files: Sequence[Path], out: Path | None) -> tuple[dict[int, Ready], di
             failed[i] = _failed(path, error)
     taken = {case.name.casefold() for case, _ in ready.values()}
     for i, result in failed.items():
-        name = result["name"]
+        name = result.name
         if out is not None and _fit(name) and name.casefold() not in taken:
             if (out / name).resolve() != files[i].parent.resolve():
                 store.remove_result(out / name)
@@ -289,16 +289,16 @@ def _unfit_names(cases: Mapping[int, Case], kept: bool) -> dict[int, Fault]:
     return ours | repeated_names(cases)
 
 
-def off_tolerance(result: Mapping[str, Any], tolerance: float) -> list[str]:
+def off_tolerance(result: Result, tolerance: float) -> list[str]:
     """Why a case fails under --strict."""
     reasons = []
-    for row in result["rows"]:
-        if row["source"] == "bemt" and not row.get("converged", True):
-            reasons.append(f"{result['name']}: unconverged at {row['rpm']:g} rev/min, {row['airspeed_m_s']:g} m/s")
-        error = row.get("bemt_error_pct")
+    for row in result.rows:
+        if row.source == "bemt" and row.converged is False:
+            reasons.append(f"{result.name}: unconverged at {row.rpm:g} rev/min, {row.airspeed_m_s:g} m/s")
+        error = row.bemt_error_pct
         if error is not None and abs(error) > tolerance:
-            reasons.append(f"{result['name']}: BEMT thrust {error:+.1f} % off {row['label']}")
-    grid = result.get("grid")
-    if grid and grid["unconverged"]:
-        reasons.append(f"{result['name']}: {grid['unconverged']} of {grid['points']} grid points unconverged")
+            reasons.append(f"{result.name}: BEMT thrust {error:+.1f} % off {row.label}")
+    grid = result.grid
+    if grid and grid.unconverged:
+        reasons.append(f"{result.name}: {grid.unconverged} of {grid.points} grid points unconverged")
     return reasons

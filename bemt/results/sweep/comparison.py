@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import field
 from typing import Any, Literal
 
+from bemt.base.document import Documented
 from bemt.base.tables import number_text
 
 State = Literal["no result", "model unknown", "agrees", "differs", "inside", "open"]
 """`inside` the model's own band whatever the recording's uncertainty is, `open` until that is stated."""
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(Documented):
     """One channel at one point: E = S - D beside its standard uncertainties, in `unit`; NaN where unknown.
 
     >>> Comparison(S=12.0, D=7.0, u_input=3.0).needed, Comparison(S=12.0, D=7.0, u_input=3.0).state
@@ -26,45 +25,32 @@ class Comparison:
     source: str = ""
     quantity: str = "thrust_N"
     unit: str = "N"
-    # Simulated and recorded value
+    # Simulated and recorded value; their difference, also in per cent of the recording, follows where it is not given
     S: float = math.nan
     D: float = math.nan
+    E: float = field(default=math.nan, kw_only=True)
+    E_pct: float = field(default=math.nan, kw_only=True)
     # Of the model's numerics, inputs and form; of the recording
     u_num: float = 0.0
     u_input: float = 0.0
     u_model: float = 0.0
     u_D: float = math.nan
+    u_val: float = field(default=math.nan, kw_only=True)  # Of both sides, follows likewise
     doubts: tuple[str, ...] = ()  # Flags for which agreement means little here
 
-    @classmethod
-    def of(cls, result: Mapping[str, Any]) -> list[Comparison]:
-        """Comparisons of a result, in whose JSON an unknown number is null."""
-
-        def value(name: str, told: Any) -> Any:
-            return tuple(told) if name == "doubts" else math.nan if told is None else told
-
-        names = [f.name for f in fields(cls)]
-        return [cls(**{k: value(k, line[k]) for k in names if k in line}) for line in result.get("comparisons", ())]
-
-    @property
-    def E(self) -> float:
-        """Model minus recording."""
-        return self.S - self.D
-
-    @property
-    def E_pct(self) -> float:
-        """The same in per cent of the recording; NaN where that is zero."""
-        return 100.0 * self.E / self.D if self.D else math.nan
+    def __post_init__(self) -> None:
+        """Fill in what follows; a stored line keeps what was computed before its parts were rounded."""
+        E = self.S - self.D
+        follows = {"E": E, "E_pct": 100.0 * E / self.D if self.D else math.nan,
+                   "u_val": math.sqrt(self.u_num**2 + self.u_input**2 + self.u_model**2 + self.u_D**2)}  # fmt: skip
+        for name, value in follows.items():
+            if math.isnan(getattr(self, name)):
+                object.__setattr__(self, name, value)
 
     @property
     def known(self) -> float:
         """Standard uncertainty of the model's side; NaN where a part of it is unknown."""
         return math.sqrt(self.u_num**2 + self.u_input**2 + self.u_model**2)
-
-    @property
-    def u_val(self) -> float:
-        """Standard uncertainty of both sides."""
-        return math.sqrt(self.u_num**2 + self.u_input**2 + self.u_model**2 + self.u_D**2)
 
     @property
     def needed(self) -> float:
@@ -105,9 +91,5 @@ class Comparison:
         return words[self.state] + self.but_flagged
 
     def document(self) -> dict[str, Any]:
-        """Line of a result."""
-        stated = asdict(self) | {"doubts": list(self.doubts), "E": self.E, "E_pct": self.E_pct if self.D else None,
-                                 "u_val": self.u_val, "verdict": self.verdict}  # fmt: skip
-        order = ("model", "reference", "source", "quantity", "unit", "S", "D", "E", "E_pct", "u_num", "u_input",
-                 "u_model", "u_D", "u_val", "doubts", "verdict")  # fmt: skip
-        return {name: stated[name] for name in order}
+        """Line of a result, what follows from it included."""
+        return super().document() | {"verdict": self.verdict}

@@ -18,6 +18,7 @@ from typing import Any
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
 from bemt.results.sweep.grid.formats import FORMATS, program_hash
+from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.text import case_text, overview_text, rows_csv
 
 SCHEMA = "bemt.sweep/1"
@@ -35,16 +36,15 @@ def _seal(stored: Mapping[str, Any]) -> str:
     return hashlib.sha256(json_text(stored).encode(errors="backslashreplace")).hexdigest()
 
 
-def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
+def reuse(folder: Path, mark: str, form: str) -> Result | None:
     """Take up the result of an earlier sweep; its table is written anew."""
     try:
         stored = json.loads((folder / RESULT).read_text(encoding="utf-8"))
         seal = stored.pop("sha256")
         if stored["fingerprint"] != mark or seal != _seal(stored):
             return None
-        result: dict[str, Any] = stored["result"]
-        grid = result["grid"]
-        if grid is not None and file_hash(folder / f"grid.{form}") != grid["sha256"]:
+        result = Result.from_document(stored["result"])
+        if result.grid is not None and file_hash(folder / f"grid.{form}") != result.grid.sha256:
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
@@ -52,9 +52,9 @@ def reuse(folder: Path, mark: str, form: str) -> dict[str, Any] | None:
     return result
 
 
-def keep(folder: Path, mark: str, result: Mapping[str, Any]) -> None:
+def keep(folder: Path, mark: str, result: Result) -> None:
     """Write table and result; the result comes last, so its presence marks completion."""
-    stored = {"fingerprint": mark, "result": result}
+    stored = {"fingerprint": mark, "result": result.document()}
     write_atomic(folder / TABLE, case_text(result) + "\n")
     write_atomic(folder / RESULT, json_text({**stored, "sha256": _seal(stored)}))
 
@@ -72,9 +72,9 @@ def clear_overview(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def keep_overview(folder: Path, document: Mapping[str, Any]) -> None:
+def keep_overview(folder: Path, found: Sweep) -> None:
     """Write the files over all cases."""
-    texts = (rows_csv(document["cases"]), overview_text(document["cases"]) + "\n", json_text(document))
+    texts = (rows_csv(found.cases), overview_text(found.cases) + "\n", json_text(found.document()))
     for name, text in zip(OVERVIEW, texts, strict=True):
         write_atomic(folder / name, text)
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bemt.base.tables import number_text, text_table
-from bemt.results.sweep.case import ROW_SOURCES
 from bemt.results.sweep.comparison import Comparison, State
-from bemt.results.sweep.text import with_nan
+from bemt.results.sweep.rows import ROW_SOURCES, Result
 from bemt.rotors.validity import kind, serious
 
 WIDTH, ROWS, SCREEN = 80, 20, 45
@@ -22,7 +21,7 @@ class _Thrust(NamedTuple):
     """BEMT against one recorded thrust of a case, at its operating point."""
 
     c: Comparison
-    case: Mapping[str, Any]
+    case: Result
     share: float  # of the largest recorded thrust [1]
     rpm: float
     airspeed_m_s: float
@@ -33,14 +32,14 @@ class _Thrust(NamedTuple):
         return self.share if math.isfinite(self.share) else 9e9
 
 
-def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cut: bool = True) -> str:
+def summary(results: Sequence[Result], files: Sequence[Path] = (), cut: bool = True) -> str:
     """Summary of all cases, at most 45 lines of 80 columns; without `cut` long lines go on in the next one.
 
     ``files`` are those of the results: two cases may have one name.
     """
-    solved = [with_nan(r) for r in results if r["rows"]]
+    solved = [r for r in results if r.rows]
     where = [f" ({path.as_posix()})" for path in files] or [""] * len(results)
-    failed = [(r["name"] + place, len(r["faults"])) for r, place in zip(results, where, strict=True) if not r["rows"]]
+    failed = [(r.name + place, len(r.faults)) for r, place in zip(results, where, strict=True) if not r.rows]
     lines: list[str] = []
     found = sorted((c for r in solved for c in _compared(r)), key=lambda c: -c.rank)
     if solved:
@@ -56,19 +55,15 @@ def summary(results: Sequence[Mapping[str, Any]], files: Sequence[Path] = (), cu
     return "\n".join([*lines, *(["", *flags] if flags else []), *end])
 
 
-def _compared(result: Mapping[str, Any]) -> list[_Thrust]:
+def _compared(result: Result) -> list[_Thrust]:
     """BEMT against each recorded thrust of a case; equal values of one kind count once."""
-    rows = [
-        c for c in Comparison.of(result) if (c.model, c.quantity) == ("bemt", "thrust_N") and c.source in ROW_SOURCES
-    ]
+    rows = [c for c in result.comparisons if (c.model, c.quantity) == ("bemt", "thrust_N") and c.source in ROW_SOURCES]
     largest = max((abs(c.D) for c in rows), default=0.0)
     out: dict[tuple[str, str, float], _Thrust] = {}
     for c in rows:
         share = abs(c.E) / largest if largest > 0.0 else 0.0
-        row = next(r for r in result["rows"] if r["label"] == c.reference)
-        out.setdefault(
-            (c.source, number_text(c.D, 3), row["rpm"]), _Thrust(c, result, share, row["rpm"], row["airspeed_m_s"])
-        )
+        row = next(r for r in result.rows if r.label == c.reference)
+        out.setdefault((c.source, number_text(c.D, 3), row.rpm), _Thrust(c, result, share, row.rpm, row.airspeed_m_s))
     return list(out.values())
 
 
@@ -79,30 +74,30 @@ def _agreement(c: Comparison) -> str:
     return words.get(c.state, c.state) + (" !" if c.doubts else "")
 
 
-def _table(solved: Sequence[Mapping[str, Any]], found: Sequence[_Thrust]) -> list[str]:
-    moving = any(r["airspeed_m_s"] for result in solved for r in result["rows"] if r["source"] == "bemt")
+def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
+    moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
     header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
     keep = {id(t) for t in found[: max(ROWS - len(solved), 4)]}
     body: list[list[str]] = []
     for result in solved:
-        points = [r for r in result["rows"] if r["source"] == "bemt"]
-        formula = {(r["rpm"], r["airspeed_m_s"]): r for r in result["rows"] if r["source"] == "k1k2"}
+        points = result.of("bemt")
+        formula = {(r.rpm, r.airspeed_m_s): r.thrust_N for r in result.of("k1k2")}
         first = True
         for k, row in enumerate(points):
-            own = [t for t in found if t.case is result and t.rpm == row["rpm"]
-                   and t.airspeed_m_s == row["airspeed_m_s"] and id(t) in keep]  # fmt: skip
+            own = [t for t in found if t.case is result and t.rpm == row.rpm
+                   and t.airspeed_m_s == row.airspeed_m_s and id(t) in keep]  # fmt: skip
             if k and not own:
                 continue
-            u = "" if not math.isfinite(row["u"]) else f" ± {number_text(row['u'], 2)}"
-            simple = formula.get((row["rpm"], row["airspeed_m_s"]), {}).get("thrust_N")
-            at = [f"{row['rpm']:.0f}", *([f"{row['airspeed_m_s']:g}"] if moving else [])]
-            cells = [*at, f"{number_text(row['thrust_N'], 3)}{u}", number_text(simple, 3)]
+            u = "" if not math.isfinite(row.u) else f" ± {number_text(row.u, 2)}"
+            simple = formula.get((row.rpm, row.airspeed_m_s))
+            at = [f"{row.rpm:.0f}", *([f"{row.airspeed_m_s:g}"] if moving else [])]
+            cells = [*at, f"{number_text(row.thrust_N, 3)}{u}", number_text(simple, 3)]
             some: list[_Thrust | None] = [*own] or [None]
             for t in some:
                 told = ["-", "", ""] if t is None else [
                     f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g} ({100 * t.share:.0f} %)",
                     _agreement(t.c)]  # fmt: skip
-                body.append([_name(result["name"]) if first else "", *cells, *told])
+                body.append([_name(result.name) if first else "", *cells, *told])
                 cells, first = [""] * len(cells), False
     shown = body[:ROWS]
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
@@ -122,9 +117,9 @@ def _name(name: str) -> str:
     return name if len(name) <= 20 else f"{name[:19]}…"
 
 
-def _drives(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+def _drives(solved: Sequence[Result]) -> list[str]:
     """Most thrust of the cases that have a motor."""
-    told = [(r["name"], r["drive"]["text"]) for r in solved if r.get("drive")]
+    told = [(r.name, r.drive.text) for r in solved if r.drive]
     lines = [
         line for name, text in told[:4] for line in textwrap.wrap(f"{name}, {text}", WIDTH, subsequent_indent="  ")
     ]
@@ -135,25 +130,25 @@ def _worst(found: Sequence[_Thrust]) -> list[str]:
     if not found:
         return []
     c, case = found[0].c, found[0].case
-    words = f"Largest difference: {case['name']}, BEMT {number_text(c.S, 3)} N minus {c.reference}: {c.E:+.3g} N."
+    words = f"Largest difference: {case.name}, BEMT {number_text(c.S, 3)} N minus {c.reference}: {c.E:+.3g} N."
     if abs(c.E) <= c.known:
         words += " This is within the uncertainty of BEMT."
     elif c.state == "open":
         words += f" The recording states no u: they agree only if it exceeds {number_text(c.needed, 2)} N."
-    audit = next((a for a in case.get("audit", []) if a["reference"] == c.reference), None)
-    faults = [line["finding"] for line in (audit or {"lines": []})["lines"] if line["status"] == "fault"]
+    audit = case.audit_of(c.reference)
+    faults = [line.finding for line in (audit.lines if audit else ()) if line.status == "fault"]
     if faults:
         words += f" Faults of its set-up: {'; '.join(faults)}."
     return textwrap.wrap(words, WIDTH)
 
 
-def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+def _ducts(solved: Sequence[Result]) -> list[str]:
     """Why K1/K2 is far off for a ducted fan."""
     told = []
     for result in solved:
-        own, simple = (next((r for r in result["rows"] if r["source"] == s), None) for s in ("bemt", "k1k2"))
-        if result.get("kind") == "fan" and own and simple and own["thrust_N"] > 0.0:
-            told.append(f"{number_text(simple['thrust_N'] / own['thrust_N'], 2)} of BEMT on {result['name'][:30]}")
+        own, simple = result.first("bemt"), result.first("k1k2")
+        if result.kind == "fan" and own and simple and own.thrust_N > 0.0:
+            told.append(f"{number_text(simple.thrust_N / own.thrust_N, 2)} of BEMT on {result.name[:30]}")
     words = (
         f"K1/K2 gives {', '.join(told[:3])}: it is a fit to open propellers with diameter and pitch only. It ignores "
         "the duct and the number of blades."
@@ -161,28 +156,25 @@ def _ducts(solved: Sequence[Mapping[str, Any]]) -> list[str]:
     return textwrap.wrap(words, WIDTH) if told else []
 
 
-def _unknowns(solved: Sequence[Mapping[str, Any]]) -> list[str]:
+def _unknowns(solved: Sequence[Result]) -> list[str]:
     lines = []
     for result in solved[:8]:
-        first = sorted(
-            (a for a in result["assumptions"] if math.isfinite(a["u_thrust_N"])), key=lambda a: -a["u_thrust_N"]
-        )[:3]
+        first = sorted((a for a in result.assumptions if math.isfinite(a.u_thrust_N)), key=lambda a: -a.u_thrust_N)[:3]
         if first:
-            told = [f"{a['key'].rpartition('.')[2]} {number_text(a['u_thrust_N'], 2)} N" for a in first]
+            told = [f"{a.key.rpartition('.')[2]} {number_text(a.u_thrust_N, 2)} N" for a in first]
             while len(", ".join(told)) > WIDTH - 24:
                 told.pop()
-            lines.append(f"  {_name(result['name']):<17} {', '.join(told)}")
+            lines.append(f"  {_name(result.name):<17} {', '.join(told)}")
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
 
 
-def _flags(solved: Sequence[Mapping[str, Any]], room: int) -> list[str]:
+def _flags(solved: Sequence[Result], room: int) -> list[str]:
     """Every flag of BEMT, the serious ones first; those that do not fit the lines are named in short and counted."""
     told: dict[str, list[str]] = {}
     for result in solved:
-        for row in result["rows"]:
-            if row["source"] == "bemt":
-                for flag in row["flags"]:
-                    told.setdefault(flag, []).append(result["name"])
+        for row in result.of("bemt"):
+            for flag in row.flags:
+                told.setdefault(flag, []).append(result.name)
     lines: list[str] = []
     rest: dict[str, list[str]] = {}
     for flag in sorted(told, key=lambda f: not serious([f])):
@@ -203,12 +195,12 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def _grids(solved: Sequence[Mapping[str, Any]], cut: bool) -> list[str]:
+def _grids(solved: Sequence[Result], cut: bool) -> list[str]:
     lines = []
     for result in solved:
-        if grid := result.get("grid"):
-            where = f", {grid['file']}" if grid["file"] else ", kept with --out DIR"
-            told = f"grid of {result['name']}: {grid['points']} points, {grid['unconverged']} unconverged{where}"
+        if grid := result.grid:
+            where = f", {grid.file}" if grid.file else ", kept with --out DIR"
+            told = f"grid of {result.name}: {grid.points} points, {grid.unconverged} unconverged{where}"
             lines.append(told)
     return [part for line in lines[:4] for part in _short(line, cut)]
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.tables import csv_text, number_of, number_text, text_table
-from bemt.results.sweep.case import ROW_SOURCES
-from bemt.results.sweep.comparison import Comparison
+from bemt.results.sweep.rows import ROW_SOURCES, Fan, GridResult, Pair, Result, Row
 
 WIDTH = 118
 CSV_COLUMNS = (
@@ -34,34 +33,32 @@ def _wrap(text: str, indent: str, first: str = "") -> str:
     return "\n".join(lines)
 
 
-def _u_val(row: Mapping[str, Any]) -> str:
-    if "bemt_error_pct" not in row:
-        return ""
-    value = row.get("bemt_u_val")
-    return "unknown" if value is None or math.isnan(value) else _n(value, 3)
+def _u_val(row: Row) -> str:
+    value = row.bemt_u_val
+    return "" if value is None else "unknown" if math.isnan(value) else _n(value, 3)
 
 
-def _main_table(result: Mapping[str, Any]) -> str:
+def _main_table(result: Result) -> str:
     header = ["source", "rpm", "V m/s", "T kgf", "T N", "u N", "Q N m", "CT", "CP", "M_tip", "Re75",
               "BEMT err %", "K1K2 err %", "u_val N", "flags"]  # fmt: skip
     notes: list[str] = []
     body = []
-    for row in [*result["rows"], *result["variants"], *result["other_rows"]]:
+    for row in result.all_rows:
         marks = []
-        for flag in row["flags"]:
+        for flag in row.flags:
             if flag not in notes:
                 notes.append(flag)
             marks.append(str(notes.index(flag) + 1))
         body.append([
-            row["label"], f"{row['rpm']:g}", f"{row['airspeed_m_s']:g}", _kgf(row["thrust_kgf"]), _n(row["thrust_N"]),
-            _n(row["u"], 2) if row["u"] is not None and not math.isnan(row["u"]) else "unknown", _n(row["torque_Nm"]),
-            _n(row["CT"]), _n(row["CP"]), _n(row["M_tip"], 3), _n(row["Re"], 3), _pct(row.get("bemt_error_pct")),
-            _pct(row.get("k1k2_error_pct")), _u_val(row), ",".join(marks),
+            row.label, f"{row.rpm:g}", f"{row.airspeed_m_s:g}", _kgf(row.thrust_kgf), _n(row.thrust_N),
+            _u(row.u), _n(row.torque_Nm),
+            _n(row.CT), _n(row.CP), _n(row.M_tip, 3), _n(row.Re, 3), _pct(row.bemt_error_pct),
+            _pct(row.k1k2_error_pct), _u_val(row), ",".join(marks),
         ])  # fmt: skip
-    if angle := result["conditions"].get("angle_deg"):
+    if angle := result.at.angle_deg:
         header[3:3] = ["angle deg", "H N"]
-        for cells, row in zip(body, [*result["rows"], *result["variants"], *result["other_rows"]], strict=True):
-            cells[3:3] = [f"{angle:g}", _n(row.get("H_force_N"))]
+        for cells, row in zip(body, result.all_rows, strict=True):
+            cells[3:3] = [f"{angle:g}", _n(row.H_force_N)]
     table = text_table(header, body, left=(0, len(header) - 1), indent="  ")
     return "\n".join([table, *(_wrap(note, "    ", f"{i}: ") for i, note in enumerate(notes, 1))])
 
@@ -75,11 +72,11 @@ def _ends(values: Sequence[float]) -> str:
     return " .. ".join(map(_n, values if len(values) == 2 else (min(values), max(values))))
 
 
-def _assumption_table(result: Mapping[str, Any]) -> str:
+def _assumption_table(result: Result) -> str:
     rows = [
-        [a["key"], f"{a['nominal']:g}" if isinstance(a["nominal"], (int, float)) else str(a["nominal"]), a["range"],
-         _ends(a["thrust_N"]), _n(a["u_thrust_N"], 2), a["why"]]
-        for a in result["assumptions"]
+        [a.key, f"{a.nominal:g}" if isinstance(a.nominal, (int, float)) else str(a.nominal), a.range,
+         _ends(a.thrust_N), _n(a.u_thrust_N, 2), a.why]
+        for a in result.assumptions
     ]  # fmt: skip
     header = ["assumed (not stated by the source)", "value", "range", "T N over the range", "u N", "why"]
     shown = [row[:-1] for row in rows]
@@ -88,10 +85,10 @@ def _assumption_table(result: Mapping[str, Any]) -> str:
     return "\n".join([table[0], *(f"{line}\n{why}" for line, why in zip(table[1:], reasons, strict=True))])
 
 
-def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
+def _comparison_lines(result: Result) -> list[str]:
     """BEMT against every recorded value, with uncertainties."""
     rows = []
-    for c in Comparison.of(result):
+    for c in result.comparisons:
         if c.model != "k1k2" and c.source in ROW_SOURCES:
             error = "-" if math.isnan(c.E) else f"{c.E:+.4g}"
             us = [_n(c.u_num, 2), _n(c.u_input, 2), _n(c.u_model, 2), _u(c.u_D), _u(c.u_val)]
@@ -103,16 +100,16 @@ def _comparison_lines(result: Mapping[str, Any]) -> list[str]:
     return ["", text_table(header, rows, left=(0, 1, 2, 12), indent="  ")]
 
 
-def _audit_lines(result: Mapping[str, Any]) -> list[str]:
+def _audit_lines(result: Result) -> list[str]:
     """How the set-up of every recorded CFD value affects its uncertainty."""
     out: list[str] = []
-    for item in result.get("audit", []):
-        whole, known = _share(item["u_relative"]), item["u_relative_known"]
+    for item in result.audit:
+        whole, known = _share(item.u_relative), item.u_relative_known
         rest = f"known parts together {_share(known)}" if known else "no part known"
-        out += ["", _wrap(f"audit of {item['reference']}: u of its thrust {whole}; {rest}", "  ")]
-        for line in item["lines"]:
-            words = f"{line['status']}, u {_share(line['u_relative'])}: {line['finding']}; {line['consequence']}"
-            out.append(_wrap(words, "    ", f"{line['topic']}: "))
+        out += ["", _wrap(f"audit of {item.reference}: u of its thrust {whole}; {rest}", "  ")]
+        for line in item.lines:
+            words = f"{line.status}, u {_share(line.u_relative)}: {line.finding}; {line.consequence}"
+            out.append(_wrap(words, "    ", f"{line.topic}: "))
     return out
 
 
@@ -124,118 +121,108 @@ def _u(value: float) -> str:
     return "unknown" if math.isnan(value) else _n(value, 2)
 
 
-def _fan_lines(fan: Mapping[str, Any] | None) -> list[str]:
+def _fan_lines(fan: Fan | None) -> list[str]:
     if fan is None:
         return []
     return [
         "",
-        f"  duct: rotor {_n(fan['rotor_thrust_N'])} N + duct {_n(fan['duct_thrust_N'])} N + stator "
-        f"{_n(fan['stator_thrust_N'])} N; duct share {_n(100 * fan['duct_share'], 3)} %; blade solidity of the annulus "
-        f"{_n(fan['annulus_solidity'], 3)}",
-        f"  mass flow {_n(fan['mass_flow_kg_s'])} kg/s; exhaust {_n(fan['exhaust_speed_m_s'])} m/s "
-        f"(u {_n(fan['u_exhaust_speed_m_s'], 2)}); momentum through the exit {_n(fan['exit_momentum_N'])} N; "
-        f"pitch speed {_n(fan['geometric_pitch_speed_m_s'])} m/s",
+        f"  duct: rotor {_n(fan.rotor_thrust_N)} N + duct {_n(fan.duct_thrust_N)} N + stator "
+        f"{_n(fan.stator_thrust_N)} N; duct share {_n(100 * fan.duct_share, 3)} %; blade solidity of the annulus "
+        f"{_n(fan.annulus_solidity, 3)}",
+        f"  mass flow {_n(fan.mass_flow_kg_s)} kg/s; exhaust {_n(fan.exhaust_speed_m_s)} m/s "
+        f"(u {_n(fan.u_exhaust_speed_m_s, 2)}); momentum through the exit {_n(fan.exit_momentum_N)} N; "
+        f"pitch speed {_n(fan.geometric_pitch_speed_m_s)} m/s",
     ]
 
 
-def _pair_lines(pair: Mapping[str, Any] | None) -> list[str]:
+def _pair_lines(pair: Pair | None) -> list[str]:
     if pair is None:
         return []
-    turns = "turns against the first" if pair["turns"] == "opposite" else "turns as the first"
-    sides = ("first", "upper"), ("second", "lower")
+    turns = "turns against the first" if pair.turns == "opposite" else "turns as the first"
     loads = "; ".join(
-        f"{name} rotor {_n(pair[f'{side}_thrust_N'])} N (u {_n(pair[f'u_{side}_thrust_N'], 2)}), "
-        f"{_n(pair[f'{side}_torque_Nm'])} N m, {_n(100 * pair[f'{side}_thrust_ratio'], 3)} % of its thrust alone "
-        f"(u {_n(100 * pair[f'u_{side}_thrust_ratio'], 2)})"
-        for name, side in sides
-    )
-    head = f"second rotor: {pair['rotor']}, {turns}, {_n(pair['lower_rpm'])} rev/min, z/D {_n(pair['z_over_D'], 3)}"
-    rest = f"torque about the axis {_n(pair['reaction_torque_Nm'])} N m. T, Q, CT and CP above are of both"
+        f"{name} rotor {_n(T)} N (u {_n(u_T, 2)}), {_n(Q)} N m, {_n(100 * ratio, 3)} % of its thrust alone "
+        f"(u {_n(100 * u_ratio, 2)})"
+        for name, T, u_T, Q, ratio, u_ratio in (
+            ("first", pair.upper_thrust_N, pair.u_upper_thrust_N, pair.upper_torque_Nm, pair.upper_thrust_ratio,
+             pair.u_upper_thrust_ratio),
+            ("second", pair.lower_thrust_N, pair.u_lower_thrust_N, pair.lower_torque_Nm, pair.lower_thrust_ratio,
+             pair.u_lower_thrust_ratio),
+        )
+    )  # fmt: skip
+    head = f"second rotor: {pair.rotor}, {turns}, {_n(pair.lower_rpm)} rev/min, z/D {_n(pair.z_over_D, 3)}"
+    rest = f"torque about the axis {_n(pair.reaction_torque_Nm)} N m. T, Q, CT and CP above are of both"
     return ["", _wrap(f"{head}; {loads}; {rest}", "  ")]
 
 
-def _grid_lines(grid: Mapping[str, Any] | None) -> list[str]:
+def _grid_lines(grid: GridResult | None) -> list[str]:
     if grid is None:
         return []
-    axes = ", ".join(f"{k} {v['num']} x {v['min']:g} .. {v['max']:g}" for k, v in grid["axes"].items())
-    low, high = grid["thrust_N"]
-    where = f"; {grid['file']}" if grid["file"] else "; saved with --out DIR"
-    slow, fast = grid["M_tip"]
+    axes = ", ".join(f"{k} {v.num} x {v.min:g} .. {v.max:g}" for k, v in grid.axes.items())
+    low, high = grid.thrust_N
+    where = f"; {grid.file}" if grid.file else "; saved with --out DIR"
+    slow, fast = grid.M_tip
     line = (
-        f"grid: {axes}: {grid['points']} points, {grid['unconverged']} unconverged, "
+        f"grid: {axes}: {grid.points} points, {grid.unconverged} unconverged, "
         f"thrust {_n(low)} .. {_n(high)} N, tip Mach {_n(slow, 3)} .. {_n(fast, 3)}{where}"
     )
     return ["", _wrap(line, "  ")]
 
 
-def case_text(result: Mapping[str, Any]) -> str:
+def case_text(result: Result) -> str:
     """Table of one case."""
-    if not result["rows"]:
-        return "\n".join([f"{result['name']}: not solved", *(f"  {fault}" for fault in result["faults"])])
-    result = with_nan(result)
-    c = result["conditions"]
+    if not result.rows:
+        return "\n".join([f"{result.name}: not solved", *(f"  {fault}" for fault in result.faults)])
+    c = result.at
     head = (
-        f"D {_n(c['diameter_m'])} m, hub {_n(c['hub_diameter_m'])} m, {c['blades']} blades, pitch at 0.75 R "
-        f"{_n(c['pitch_075R_m'])} m, solidity {_n(c['solidity'], 3)}; {_n(c['density_kg_m3'])} kg/m3, "
-        f"{_n(c['temperature_C'], 3)} degC; {c['convention']}; {c['stations']} stations, n_crit {c['n_crit']:g}, "
-        f"section drag x {c['drag_level']:g}"
+        f"D {_n(c.diameter_m)} m, hub {_n(c.hub_diameter_m)} m, {c.blades} blades, pitch at 0.75 R "
+        f"{_n(c.pitch_075R_m)} m, solidity {_n(c.solidity, 3)}; {_n(c.density_kg_m3)} kg/m3, "
+        f"{_n(c.temperature_C, 3)} degC; {c.convention}; {c.stations} stations, n_crit {c.n_crit:g}, "
+        f"section drag x {c.drag_level:g}"
     )
     lines = [
-        f"{result['name']}: {result['title']}",
+        f"{result.name}: {result.title}",
         _wrap(head, "  "),
-        _wrap("effects: " + ", ".join(c["effects"]), "  "),
+        _wrap("effects: " + ", ".join(c.effects), "  "),
     ]
-    if result.get("drive"):
-        lines += ["", _wrap(result["drive"]["text"], "  "), ""]
+    if result.drive:
+        lines += ["", _wrap(result.drive.text, "  "), ""]
     lines += [
         _main_table(result),
-        *_fan_lines(result["fan"]),
-        *_pair_lines(result.get("pair")),
+        *_fan_lines(result.fan),
+        *_pair_lines(result.pair),
         *_comparison_lines(result),
         *_audit_lines(result),
     ]
-    if result["assumptions"]:
-        bemt = result["rows"][0]
-        low, high = bemt["thrust_N_range"]
+    if result.assumptions:
+        bemt = result.rows[0]
+        low, high = bemt.thrust_N_range or (math.nan, math.nan)
         lines += ["", _assumption_table(result)]
-        parts = ", ".join(f"{k} {_n(bemt[k], 3)} N" for k in ("u_input", "u_model", "u_num"))
+        parts = ", ".join(f"{k} {_n(getattr(bemt, k), 3)} N" for k in ("u_input", "u_model", "u_num"))
         lines += [f"  together: {parts}; varied one at a time, thrust is {_n(low)} to {_n(high)} N"]
-    lines += _grid_lines(result.get("grid"))
-    lines += [_wrap(note, "  ", "note: ") for note in result["notes"]]
+    lines += _grid_lines(result.grid)
+    lines += [_wrap(note, "  ", "note: ") for note in result.notes]
     return "\n".join(lines)
 
 
-def with_nan(value: Any, key: str = "") -> Any:
-    """Numbers that JSON holds as null become NaN again, so that a reused result prints like a fresh one."""
-    if isinstance(value, Mapping):
-        return {k: with_nan(v, k) for k, v in value.items()}
-    if isinstance(value, list):
-        return [with_nan(v, key) for v in value]
-    numeric = key.startswith(
-        ("thrust", "u_", "torque", "E", "S", "D", "exhaust", "rotor_", "duct_", "stator_", "exit_")
-    )
-    return math.nan if value is None and (numeric or key in ("M_tip", "E_pct")) else value
-
-
-def overview_text(results: Sequence[Mapping[str, Any]]) -> str:
+def overview_text(results: Sequence[Result]) -> str:
     """Table over all cases."""
     header = ["case", "source", "T kgf", "T N", "CT", "CP", "M_tip", "Re75", "BEMT err %", "K1K2 err %", "flags"]
     body = []
-    for result in map(with_nan, results):
-        if not result["rows"]:
-            body.append([result["name"], "not solved", *[""] * 8, number_of(len(result["faults"]), "fault")])
-        for row in [*result["rows"], *result["variants"], *result["other_rows"]]:
-            count = len(row["flags"])
+    for result in results:
+        if not result.rows:
+            body.append([result.name, "not solved", *[""] * 8, number_of(len(result.faults), "fault")])
+        for row in result.all_rows:
+            count = len(row.flags)
             body.append([
-                result["name"], row["label"], _kgf(row["thrust_kgf"]), _n(row["thrust_N"]), _n(row["CT"]),
-                _n(row["CP"]), _n(row["M_tip"], 3), _n(row["Re"], 3),
-                _pct(row.get("bemt_error_pct")), _pct(row.get("k1k2_error_pct")),
+                result.name, row.label, _kgf(row.thrust_kgf), _n(row.thrust_N), _n(row.CT),
+                _n(row.CP), _n(row.M_tip, 3), _n(row.Re, 3),
+                _pct(row.bemt_error_pct), _pct(row.k1k2_error_pct),
                 f"{count} flags" if count > 1 else "1 flag" if count else "",
             ])  # fmt: skip
     return text_table(header, body, left=(0, 1, 10))
 
 
-def rows_csv(results: Sequence[Mapping[str, Any]]) -> str:
+def rows_csv(results: Sequence[Result]) -> str:
     """All rows of all cases as CSV."""
-    rows = [{"case": r["name"], **row} for r in results for row in [*r["rows"], *r["variants"], *r["other_rows"]]]
+    rows = [{"case": r.name, **row.document()} for r in results for row in r.all_rows]
     return csv_text(CSV_COLUMNS, rows)

@@ -12,7 +12,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
 from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
 from bemt.rotors.population import label_angle_deg, population

@@ -111,11 +111,11 @@ def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.nd
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
     blade = case.blade
     if blade.stations is not None:
-        from bemt.data.readers._stations import read_stations
+        from bemt.data.readers.stations import read_stations
 
         return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
     if blade.uiuc is not None:
-        from bemt.data.readers._uiuc_tables import read_geometry
+        from bemt.data.readers.uiuc_tables import read_geometry
 
         table = read_geometry(path.parent / blade.uiuc)
         return table.r_R, table.c_R, np.radians(table.beta_deg)

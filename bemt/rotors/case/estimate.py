@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.given import numbers
 from bemt.base.tables import number_text, text_table
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import find_family
+from bemt.data.readers.uiuc_names import find_family
+from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import k1k2_case
@@ -104,10 +108,11 @@ def document(
             faults += length_fault(option, value, unit, D, POSSIBLE[name])
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
         hint = "In g/m3? Divide by 1000" if 10.0 < density < 2000.0 else ""
-        faults.append(Fault("--density", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
+        faults.append(Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
     rows: tuple[tuple[str, Sequence[float], float, float, str], ...] = (
-        ("--rpm", speeds, RPM.low, RPM.high, "rev/min"), ("--airspeed", airspeeds, AIRSPEED.low, AIRSPEED.high, "m/s"),
-        ("--angle", angles, ANGLE.low, ANGLE.high, "deg"),
+        ("--rpm", speeds, RPM.low, RPM.high, "rev/min"),
+        ("--airspeed-m-s", airspeeds, AIRSPEED.low, AIRSPEED.high, "m/s"),
+        ("--angle-deg", angles, ANGLE.low, ANGLE.high, "deg"),
     )  # fmt: skip
     faults += [
         Fault(option, "", f"{value:g}", f"{low:g} to {high:g} {unit}")
@@ -170,3 +175,57 @@ def text(doc: dict[str, Any]) -> str:
     if more:
         notes.append(f"for narrower bands give {' and '.join(more)} (at 0.75 R)")
     return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate(Dataset):
+    """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
+
+    Examples
+    --------
+    >>> from bemt import estimate
+    >>> print(estimate("10x5", rpm=6000).text.splitlines()[-1])
+    for narrower bands give --chord-mm and --measured-pitch-in (at 0.75 R)
+    """
+
+    found: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """The rows as a table, with what not to trust below."""
+        return text(self.found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of schema ``bemt.estimate/2``."""
+        return self.found
+
+
+def of_label(
+    label: str,
+    rpm: Any,
+    airspeed_m_s: Any = 0.0,
+    blades: int | None = None,
+    chord_mm: float | None = None,
+    measured_pitch_in: float | None = None,
+    series: str | None = None,
+    density: float | None = None,
+    angle_deg: Any = 0.0,
+) -> Estimate:
+    """`document` as a Dataset, standard uncertainties in ``u``."""
+    asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
+    n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
+    try:
+        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
+    except InputError as error:
+        if not Path(label).exists():
+            raise
+        hint = f"A case? bemt sweep {label} solves it"
+        raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
+    rows = found["rows"]
+    columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
+    u = {k[2:]: v for k, v in columns.items() if k.startswith("u_")}
+    values = {k: v for k, v in columns.items() if not k.startswith(("u_", "u95_"))}
+    if (sideslip := np.radians(values.pop("angle_deg"))).any():
+        values["sideslip_rad"] = sideslip
+    flags = tuple(tuple(r["flags"]) for r in rows)
+    return Estimate("bemt", found["case"], values, u, flags=flags, found=found)

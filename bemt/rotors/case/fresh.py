@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import class_of, family_of
+from bemt.data.readers.uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
 from geometry.common import GeometryError
@@ -58,7 +58,7 @@ def read_label(label: str, blades: int | None = None) -> Designation:
     try:
         found = parse_designation(label)
     except GeometryError as error:
-        raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from None
+        raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
         raise InputError(Fault("--blades", "", str(blades), f"{found.blades}, as in {label}"))
     return replace(found, blades=blades or found.blades or 2)
@@ -293,7 +293,7 @@ def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
     head = load_text(file).text[:4000]
     first = head.lstrip().partition("\n")[0]
     if "," in first:
-        from bemt.data.readers._stations import read_stations
+        from bemt.data.readers.stations import read_stations
 
         return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
     if re.match(r"\s*r/R\b", first):

@@ -11,11 +11,11 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table, write_atomic
 from bemt.data.readers import HEAD_BYTES, importers
-from bemt.data.readers._blade import case_text
+from bemt.data.readers.blade import case_text
 from bemt.rotors.case.from_solid import SCHEMA, refuse_other
 
 if TYPE_CHECKING:
-    from bemt.data.readers._blade import BladeFile
+    from bemt.data.readers.blade import BladeFile
 
 
 def read_blade(path: Path, unit: str | None = None) -> BladeFile | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
-from bemt.data.readers._uiuc_names import find_family
+from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
 
 
@@ -134,9 +134,9 @@ def _faults(w: Wanted) -> list[Fault]:
     if w.stations is not None and w.scan is not None:
         faults.append(Fault("", "--scan, --stations", "both", "one of them"))
     if w.label is None and w.stations is None and w.scan is None and not (w.fan and w.diameter_mm):
-        faults.append(Fault("", "LABEL, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
+        faults.append(Fault("", "label, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
     if w.fan and (w.stations is not None or w.scan is not None):
-        faults.append(Fault("", "--fan", "together with a blade file", "--fan with the diameter as LABEL"))
+        faults.append(Fault("", "--fan", "together with a blade file", "--fan with the diameter as label"))
     if w.scan is not None and w.blades is not None:
         faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
     if w.unit is not None and w.scan is None:
@@ -150,7 +150,7 @@ def _faults(w: Wanted) -> list[Fault]:
         expected = "5 to 10000 mm" if sized else "nothing without --stations or --fan"
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
-        faults.append(Fault("LABEL", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
+        faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
     if w.kv is not None and w.scan is not None:
         faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
@@ -191,7 +191,7 @@ def _label_text(w: Wanted, label: str) -> str:
             told = fresh.read_label(label, w.blades)
             blades = told.blades if (told.blades or 2) > 2 else w.blades
             return fresh.fan_text(told.diameter_in * INCH, told.pitch_in, blades, w.rpm, w.motor)
-        raise InputError(Fault("LABEL", "", repr(label), "a diameter, as in 70mm",
+        raise InputError(Fault("label", "", repr(label), "a diameter, as in 70mm",
                                "A name goes with --diameter-mm or --diameter-in"))  # fmt: skip
     value = float(size[1])
     return fresh.fan_text(value * INCH if size[2] == "in" else value * 1e-3, None, w.blades, w.rpm, w.motor)

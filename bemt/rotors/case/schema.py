@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -284,6 +285,13 @@ class OperatingTable(Table):
     rpm: float = entry("speed of rotation", RPM, required=True)
     airspeed_m_s: float = entry("flight speed, along the shaft unless angle_deg is given", AIRSPEED, default=0.0)
     angle_deg: float = entry("angle between wind and shaft: 0 climb, 90 edgewise, 180 descent", ANGLE, default=0.0)
+
+
+class PointTable(Table):
+    """An operating point that is asked for beside that of the case."""
+
+    rpm: float | None = entry("speed of rotation", RPM)
+    airspeed_m_s: float | None = entry("speed of flight", replace(AIRSPEED, low=0.0))  # backward flight has no inlet
 
 
 class AirTable(Table):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import textwrap
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -50,7 +51,22 @@ class Source:
     source: str
 
 
-def sources(case: Case) -> tuple[Source, ...]:
+class Sources(tuple[Source, ...]):
+    """Sources of an answer, returned by :func:`bemt.cite`."""
+
+    case = ""  # name of the case
+
+    @property
+    def text(self) -> str:
+        """As a list, at the width of the terminal."""
+        return text(self, min(100, shutil.get_terminal_size((100, 24)).columns))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of schema ``bemt.sources/1``."""
+        return {"schema": SCHEMA, "case": self.case, "sources": [asdict(s) for s in self]}
+
+
+def sources(case: Case) -> Sources:
     """Everything that takes part in the answer for a case, the method first.
 
     Effects are those that are switched on; one that is inert for this rotor (a tip gap without a duct) is left out.
@@ -59,7 +75,7 @@ def sources(case: Case) -> tuple[Source, ...]:
     from bemt.rotors.case.prepare import prepare_case
 
     effects = [e for e in prepare_case(case).effects if case.ducted or e.id not in ("duct", "tip_gap")]
-    return (
+    found = Sources((
         Source("method", "program", BEMT.format(__version__)),
         Source("method", "blade element momentum", METHOD),
         *(Source("effect", e.id, source_of(type(e)) or "declared by this project") for e in effects),
@@ -67,7 +83,9 @@ def sources(case: Case) -> tuple[Source, ...]:
         *_bands(case),
         Source("comparison", "k1k2", K1K2),
         *_data(case),
-    )
+    ))  # fmt: skip
+    found.case = case.name
+    return found
 
 
 def _sections(case: Case) -> list[Source]:
@@ -102,17 +120,11 @@ def _data(case: Case) -> list[Source]:
     return found + [Source("data", kind, source) for kind, source in told]
 
 
-def document(case: Case) -> dict[str, Any]:
-    """Plain values of schema ``bemt.sources/1``."""
-    return {"schema": SCHEMA, "case": case.name, "sources": [asdict(s) for s in sources(case)]}
-
-
-def text(case: Case, width: int = 100) -> str:
+def text(found: Sources, width: int = 100) -> str:
     """Sources for a terminal, in groups."""
     titles = {"method": "Method", "effect": "Effects that are switched on", "sections": "Section tables",
               "band": "Uncertainty band", "comparison": "Comparison", "data": "Recorded values"}  # fmt: skip
-    found = sources(case)
-    lines = [f"What the answer for {case.name} stands on:"]
+    lines = [f"What the answer for {found.case} stands on:"]
     for kind, title in titles.items():
         rows = [s for s in found if s.kind == kind]
         lines += ["", title] if rows else []

@@ -1,4 +1,1 @@
-"""BEMT against folders of measured propellers.
-
-``bemt.validate(folder)`` runs it: ``help(bemt.app.library.validate)``.
-"""
+"""BEMT against folders of measured propellers."""

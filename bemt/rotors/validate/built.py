@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.mixture import LEVELS, half_width, inside

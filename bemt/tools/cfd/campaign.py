@@ -9,7 +9,7 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.cfd.record import CampaignRecord
+from bemt.tools.cfd.rows import COLUMNS, TEXTS, RunRow
 from bemt.tools.cfd.schema import Campaign, load_campaign
 from bemt.tools.cfd.worker import Worker, point_key
 
@@ -74,11 +75,11 @@ def run_campaign(
         say(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
         outcome = worker.run(point, key)
         record.add(outcome, order)
-        v = outcome.values
-        state = "" if v["converged"] else f"  NOT CONVERGED {v['note']}"
-        say(f"  T {number_text(v['thrust_N'])} N, Q {number_text(v['torque_Nm'])} N m, {v['cells']} cells, "
-             f"{v['seconds']:.0f} s{state}")  # fmt: skip
-        if not v["iterations"]:
+        v = outcome.row
+        state = "" if v.converged else f"  NOT CONVERGED {v.note}"
+        say(f"  T {number_text(v.thrust_N)} N, Q {number_text(v.torque_Nm)} N m, {v.cells} cells, "
+             f"{v.seconds:.0f} s{state}")  # fmt: skip
+        if not v.iterations:
             say(f"  nothing was computed: it will be tried again; logs below {work}")
     record.write(order)
     if not keep and only is None:  # a single point is tried again and again: its grid waits for the whole campaign
@@ -99,22 +100,21 @@ def text(record: CampaignRecord) -> str:
     head = ["run", "rpm", "V [m/s]", "T [N]", "u [N]", "Q [N m]", "solver", "level", "cells", "drift T [%]", "y+", "s"]
     rows = []
     for r in record.rows:
-        drift = 100 * r["drift_thrust"]
-        rows.append([r["run"], number_text(r["rpm"], 6), number_text(r["airspeed_m_s"]), number_text(r["thrust_N"]),
-                     number_text(r["u_thrust_N"], 2), number_text(r["torque_Nm"]), r["solver"], number_text(r["level"]),
-                     f"{r['cells']:.0f}", number_text(drift, 2), number_text(r["yplus_avg"], 3),
-                     number_text(r["seconds"], 3)])  # fmt: skip
+        rows.append([r.run, number_text(r.rpm, 6), number_text(r.airspeed_m_s), number_text(r.thrust_N),
+                     number_text(r.u_thrust_N, 2), number_text(r.torque_Nm), r.solver, number_text(r.level),
+                     f"{r.cells:.0f}", number_text(100 * r.drift_thrust, 2), number_text(r.yplus_avg, 3),
+                     number_text(r.seconds, 3)])  # fmt: skip
     lines = [f"{record.campaign.name}: {record.campaign.title}", text_table(head, rows, left=(0, 6))]
     return "\n".join([*lines, *_audit_lines(record)])
 
 
 def _audit_lines(record: CampaignRecord) -> list[str]:
     """What the audit of other people's CFD says of our own, and what u is where there is no grid study."""
-    solved = [row for row in record.rows if row["converged"] == 1]
+    solved = [row for row in record.rows if row.settled]
     if not solved:
         return []
     case = record.campaign.case
-    flies = [row["airspeed_m_s"] > 0 for row in solved]
+    flies = [row.airspeed_m_s > 0 for row in solved]
     out = [] if record.studies() else [floor_note(any(flies), all(flies))]
     found = named_rows(solved[:1])
     pitch = float(prepare_case(case).pitch_m)
@@ -123,17 +123,21 @@ def _audit_lines(record: CampaignRecord) -> list[str]:
     return [*out, *(f"audit, {x.status}: {x.topic}: {x.finding}: {x.consequence}" for x in faults_first(lines))]
 
 
-def named_rows(rows: Sequence[Mapping[str, Any]]) -> Dataset:
+def named_rows(rows: Sequence[RunRow]) -> Dataset:
     """Rows of a campaign as a recording."""
-    texts = {k: tuple(str(r[k]) for r in rows) for k in rows[0] if isinstance(rows[0][k], str)}
-    numbers = {k: np.array([float(r[k]) for r in rows]) for k in rows[0] if k not in texts}
+    texts = {k: tuple(str(getattr(r, k)) for r in rows) for k in COLUMNS if k in TEXTS}
+    numbers = {k: np.array([float(getattr(r, k)) for r in rows]) for k in COLUMNS if k not in TEXTS}
     units = {k: "" for k in numbers if channel_fault(k)}
     return Dataset("cfd", "campaign", numbers, units=units, texts=texts)
 
 
 def document(record: CampaignRecord) -> dict[str, Any]:
     """Give a record as ``bemt.cfd-run/1``."""
-    return {"schema": "bemt.cfd-run/1", "campaign": record.campaign.name, "rows": record.rows}
+    return {
+        "schema": "bemt.cfd-run/1",
+        "campaign": record.campaign.name,
+        "rows": [row.document() for row in record.rows],
+    }
 
 
 def is_folder_of_campaigns(path: str | Path) -> bool:

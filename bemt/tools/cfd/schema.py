@@ -16,13 +16,13 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, limits_of, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.rotors.case import Case, check_name, load_case
-from bemt.tools.cfd.openfoam.settings import DOMAINS, GASES, SECTORS, TURBULENCE, ZONES
-from bemt.tools.cfd.openfoam.write import Run, RunRanges
+from bemt.tools.cfd.openfoam.settings import GASES, ZONES
+from bemt.tools.cfd.openfoam.write import Run, RunTable
 
 __all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 
 
-class PointTable(RunRanges):
+class PointTable(RunTable):
     """[defaults], [[points]] and, as lists, [axes]: one CFD run; omitted values come from the case."""
 
     J: float | None = entry("advance ratio, with rpm and instead of airspeed_m_s", low=0, high=5)
@@ -30,11 +30,7 @@ class PointTable(RunRanges):
     tip_gap_pct_R: float | None = entry("tip gap, with a duct", "% of R", 0.1, 10)
     wall_distance_over_R: float | None = entry("round plate behind the rotor", "R", 0.2, 20)
     plate_radius_over_R: float | None = entry("radius of that plate", "R", 0.5, 5)
-    solver: Literal["incompressible", "compressible"] | None = entry("by the tip Mach number if omitted")
     gas: str | None = entry("gas model of the compressible solver", choices=GASES)
-    sector: str | None = entry("meshed part of the disk; the smallest possible if omitted", choices=SECTORS)
-    domain: str | None = entry("free air, or a pipe of the rotor's diameter", choices=DOMAINS)
-    turbulence: str | None = entry("model", choices=TURBULENCE)
     iterations: int | None = entry("iterations of the solver", low=20, high=100_000)
     average: int | None = entry("number of last iterations to average", low=10, high=100_000)
     start: Literal["neighbour", "slipstream"] | None = entry("initial flow: run on the same grid, or momentum theory")

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from bemt.tools.cfd.balance import balance_of
 from bemt.tools.cfd.openfoam import Settings, case_files
 from bemt.tools.cfd.openfoam.run import BINS, control
 from bemt.tools.cfd.openfoam.write import settings_of, write_openfoam
+from bemt.tools.cfd.rows import RunRow
 from bemt.tools.cfd.schema import CampaignPoint
 from bemt.tools.cfd.start import StartField, splice
 
@@ -68,7 +69,7 @@ def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
 class Outcome:
     """What a run gave."""
 
-    values: dict[str, Any]  # Columns of the recording
+    row: RunRow  # Line of the recording
     history: Array | None = None  # (N, 3) iteration, thrust [N], torque [N m] of the whole rotor
     radial: Array | None = None  # (M, 3) radius [m], thrust and torque of all blades per radius [N/m, N m/m]
 
@@ -262,20 +263,21 @@ class Worker:
         """Run one point."""
         name, grid, settings = keys or point_key(point)
         begin = time.monotonic()
-        values = _columns(point, settings, name)
+        row = _row(point, settings, name)
         history, radial, note, failed = None, None, "", ""
         try:
-            folder, values["start"] = self._prepare(point, name, grid, settings)
-            values["cells"], note = _grid_report(folder)
+            folder, start = self._prepare(point, name, grid, settings)
+            cells, note = _grid_report(folder)
+            row = replace(row, start=start, cells=cells)
             code = self._program(folder, "solve")
             if code != 0:  # said before the loads are read: there may be none
                 failed = _last_words(folder / "out.solve")
             history = history_of(folder, settings)
-            said = _balanced(values, folder, settings, len(history))
+            row, said = _balanced(row, folder, settings, len(history))
             failed = " ".join(words for words in (failed, said) if words)
-            moving = _means(values, history, settings, code, not said)
+            row, moving = _means(row, history, settings, code, not said)
             failed = " ".join(words for words in (failed, moving) if words)
-            values["yplus_avg"] = _y_plus(folder)
+            row = replace(row, yplus_avg=_y_plus(folder))
             radial = radial_of(folder, settings, settings.average)
             if code == 0:
                 about = {"grid": grid, "ranks": self.ranks, **asdict(_state(settings))}
@@ -284,63 +286,59 @@ class Worker:
             failed = failed or str(error)[: NOTE_LENGTH + 100]
             (self.work / f"run-{name}" / TEMPORARY).unlink(missing_ok=True)  # its logs stay to be read
         note = " ".join(words for words in (note, failed) if words)
-        values |= {"seconds": round(time.monotonic() - begin, 1), "note": note.replace("\n", " ")}
-        return Outcome(values, history, radial if values["converged"] else None)
+        row = replace(row, seconds=round(time.monotonic() - begin, 1), note=note.replace("\n", " "))
+        return Outcome(row, history, radial if row.converged else None)
 
 
 def _state(s: Settings) -> StartField:
     return StartField(s.rpm, s.wind, s.pressure if s.compressible else 0.0, s.compressible)
 
 
-def _columns(point: CampaignPoint, s: Settings, name: str) -> dict[str, Any]:
+def _row(point: CampaignPoint, s: Settings, name: str) -> RunRow:
     """What is known of a run beforehand; results are NaN until they are there."""
     nan = math.nan
-    return {
-        "run": name, "rpm": s.rpm, "airspeed_m_s": s.V, "J": s.V / (s.rpm / 60 * 2 * s.R), "thrust_N": nan,
-        "torque_Nm": nan, "u_thrust_N": nan, "u_torque_Nm": nan, "thrust_rotor_N": nan, "thrust_standing_N": nan,
-        "density_kg_m3": s.rho, "temperature_C": s.temperature - 273.15, "pressure_Pa": s.pressure,
-        "wall_distance_m": nan if s.plate_z is None else -s.plate_z,
-        "tip_gap_mm": nan if s.duct is None else 1e3 * s.gap,
-        "sideslip_deg": point.run.sideslip_deg, "pitch_offset_deg": point.values.get("pitch_offset_deg", 0.0),
-        "solver": "compressible" if s.compressible else "incompressible", "gas": s.gas if s.compressible else "",
-        "domain": s.domain, "sector": s.sector, "turbulence": s.turbulence, "level": s.level, "cells": 0,
-        "iterations": 0, "averaged": s.average, "drift_thrust": nan, "drift_torque": nan, "scatter_thrust": nan,
-        "scatter_torque": nan, **dict.fromkeys(RESIDUALS, nan),
-        "yplus_avg": nan, "seconds": nan, "start": "", "converged": 0, "note": "",
-    }  # fmt: skip
+    return RunRow(
+        name, s.rpm, s.V, s.V / (s.rpm / 60 * 2 * s.R), density_kg_m3=s.rho, temperature_C=s.temperature - 273.15,
+        pressure_Pa=s.pressure, wall_distance_m=nan if s.plate_z is None else -s.plate_z,
+        tip_gap_mm=nan if s.duct is None else 1e3 * s.gap, sideslip_deg=point.run.sideslip_deg,
+        pitch_offset_deg=point.values.get("pitch_offset_deg", 0.0),
+        solver="compressible" if s.compressible else "incompressible", gas=s.gas if s.compressible else "",
+        domain=s.domain, sector=s.sector, turbulence=s.turbulence, level=s.level, cells=0, iterations=0,
+        averaged=s.average, converged=0,
+    )  # fmt: skip
 
 
-def _balanced(values: dict[str, Any], folder: Path, s: Settings, done: int) -> str:
+def _balanced(row: RunRow, folder: Path, s: Settings, done: int) -> tuple[RunRow, str]:
     """Fill in the residuals; say what keeps the run from balancing, empty when it does."""
     if done < s.iterations:
-        return f"stopped after {done} of {s.iterations} iterations"
+        return row, f"stopped after {done} of {s.iterations} iterations"
     try:
         found = balance_of(folder, s)
     except InputError as error:
-        return f"not balanced: {str(error)[:NOTE_LENGTH]}"
-    residuals = (found.mass, found.momentum, found.angular_momentum, found.swirl)
-    values |= dict(zip(RESIDUALS, residuals, strict=True))
-    return f"does not balance: {'; '.join(found.leaks)}" if found.leaks else ""
+        return row, f"not balanced: {str(error)[:NOTE_LENGTH]}"
+    row = replace(row, balance_mass=found.mass, balance_momentum=found.momentum,
+                  balance_angular_momentum=found.angular_momentum, swirl_out=found.swirl)  # fmt: skip
+    return row, f"does not balance: {'; '.join(found.leaks)}" if found.leaks else ""
 
 
-def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balanced: bool) -> str:
+def _means(row: RunRow, history: Array, s: Settings, code: int, balanced: bool) -> tuple[RunRow, str]:
     """Fill in means, drift and scatter; the means stay NaN unless the run converged and balances. Says what moves."""
-    values["iterations"] = len(history)
+    row = replace(row, iterations=len(history))
     if len(history) < s.average:
-        return ""
+        return row, ""
     share = s.average / len(history)
     total = history[:, 1] + history[:, 3]
     why: list[str] = []
-    means = {}
+    means = []
     for key, series in (("thrust", total), ("torque", history[:, 2])):
         average = steady_average(series, share)
         if average.mean is None:
-            return f"{key}: {average.problem}"
+            return row, f"{key}: {average.problem}"
         scale = max(abs(average.mean), 1e-12)
         drift = math.nan if average.drift is None else average.drift
         scatter = float(np.std(series[-s.average :])) / scale
-        values[f"drift_{key}"], values[f"scatter_{key}"] = drift, scatter
-        means[key] = average.mean
+        row = replace(row, **{f"drift_{key}": drift, f"scatter_{key}": scatter})  # type: ignore[arg-type]
+        means.append(average.mean)
         if not abs(drift) <= DRIFT_LIMIT:
             why.append(f"{key} drifts by {drift:+.1%} over the last {s.average} iterations (limit {DRIFT_LIMIT:.0%})")
         if not scatter <= SCATTER_LIMIT:
@@ -348,7 +346,7 @@ def _means(values: dict[str, Any], history: Array, s: Settings, code: int, balan
                 f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})"
             )
     if code == 0 and balanced and not why:
-        parts = {"thrust_rotor_N": 1, "thrust_standing_N": 3}
-        values |= {"thrust_N": means["thrust"], "torque_Nm": means["torque"], "converged": 1}
-        values |= {key: float(history[-s.average :, k].mean()) for key, k in parts.items()}
-    return "; ".join(why)
+        rotor, standing = (float(history[-s.average :, k].mean()) for k in (1, 3))
+        row = replace(row, thrust_N=means[0], torque_Nm=means[1], converged=1, thrust_rotor_N=rotor,
+                      thrust_standing_N=standing)  # fmt: skip
+    return row, "; ".join(why)

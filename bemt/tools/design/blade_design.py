@@ -150,7 +150,7 @@ def design_blade(
     section: str | None = None, hub_ratio: float | None = None, density_kg_m3: float | None = None,
     duct: Case | None = None, robust: bool = False, progress: Progress | None = None, **limits: Any,
 ) -> Design:  # fmt: skip
-    """Design a blade; parameters as `bemt.app.library.design`."""
+    """Design a blade; parameters as `bemt.design`."""
     faults: list[Fault] = []
     base: Case | None = None
     try:

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
-from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
+from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
@@ -109,6 +109,11 @@ class DriveResult:
         return as_html(repr(self)[1:-1], self.text)
 
     @property
+    def exit_code(self) -> int:
+        """1 if hover or airspeed is beyond the drive, or a point is unconverged."""
+        return EXIT_OK if self.reached else EXIT_UNCONVERGED
+
+    @property
     def text(self) -> str:
         """The result for a terminal."""
         return text(self)
@@ -137,13 +142,6 @@ class DriveResult:
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def case_for(what: str | None, **given: float | None) -> Case:
-    """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names."""
-    path = Path(what or ".")
-    case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
-    return with_drive(case, **given)
-
-
 def with_drive(case: Case, **given: float | None) -> Case:
     """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
     changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
@@ -151,7 +149,7 @@ def with_drive(case: Case, **given: float | None) -> Case:
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
         raise InputError([Fault("", name, "nothing", "--kv and --cells together", hint) for name in missing])
-    names = {key: f"--{name.split('_')[0]}" for name, key in OPTIONS.items()}
+    names = {key: f"--{name.replace('_', '-')}" for name, key in OPTIONS.items()}
     try:
         return with_changes(case, changes) if changes else case
     except InputError as error:
@@ -166,7 +164,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
     if not AIRSPEED.low <= airspeed_m_s <= AIRSPEED.high:
         hint = "" if not AIRSPEED.high < airspeed_m_s < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
         expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
-        wrong.append(Fault("", "--airspeed", f"{airspeed_m_s:g}", expected, hint))
+        wrong.append(Fault("", "--airspeed-m-s", f"{airspeed_m_s:g}", expected, hint))
     if wrong:
         raise InputError(wrong)
     drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
@@ -191,11 +189,9 @@ def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> 
     return {key.partition(".")[2]: band for key, band in found.items()}
 
 
-def full_document(case: Case) -> dict[str, Any] | None:
-    """Full throttle as plain values with its line of text, None for a case without a motor."""
-    if case.file.drive is None:
-        return None
-    full, t = full_throttle(case), case.file.drive
+def full_document(case: Case) -> dict[str, Any]:
+    """Full throttle of a case that has a motor, as plain values with its line of text."""
+    full, t = full_throttle(case), case_drive.drive_table(case)
     return {"kv": t.kv, "cells": t.cells, "soc": t.soc, "text": _line(case, full),
             **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
 
@@ -360,7 +356,7 @@ def text(found: DriveResult) -> str:
             f"            the motor's sheet, in [drive.motor] of a case, the current is known to {b:.0f} % instead of "
             f"{a:.0f} %",
         ]
-    ask = [name for name, v in (("--mass", mass), ("--capacity", t.battery.capacity_Ah)) if v is None]
+    ask = [name for name, v in (("--mass-kg", mass), ("--capacity-Ah", t.battery.capacity_Ah)) if v is None]
     if ask:
         lines.append(f"for more results give {' and '.join(ask)}, or mass_kg and capacity_Ah in [drive]")
     return "\n".join(lines) + "\n"

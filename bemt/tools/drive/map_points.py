@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
-from bemt.data.readers._recording import FULL_THROTTLE
+from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.data.recordings import plateaus
 from bemt.data.recordings.channels import THROTTLE_IS_PULSE, pulse_of
 from bemt.physics.dataset import Dataset, concat

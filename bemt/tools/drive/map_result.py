@@ -125,11 +125,11 @@ def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name
     faults = []
     if thrust is not None and not 0.0 <= thrust < math.inf:
         hint = "--sign -1 reverses the recorded thrust" if thrust < 0.0 else ""
-        faults.append(Fault("", "--thrust", f"{thrust:g}", "a finite number of 0 or more [N]", hint))
+        faults.append(Fault("", "--thrust-N", f"{thrust:g}", "a finite number of 0 or more [N]", hint))
     if voltage is not None and not 0.0 < voltage < math.inf:
-        faults.append(Fault("", "--voltage", f"{voltage:g}", "a finite number above 0 [V]"))
+        faults.append(Fault("", "--voltage-V", f"{voltage:g}", "a finite number above 0 [V]"))
     if voltage is not None and thrust is None:
-        faults.append(Fault("", "--voltage", f"{voltage:g}", "none without --thrust, which it belongs to"))
+        faults.append(Fault("", "--voltage-V", f"{voltage:g}", "none without --thrust-N, which it belongs to"))
     if nodes < 2:
         faults.append(Fault("", "--nodes", str(nodes), "2 or more: between them the tables are read"))
     if name is not None and (not name.strip(" .") or any(c in "/\\:" or c < " " for c in name)):

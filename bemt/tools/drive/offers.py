@@ -1,3 +1,4 @@
 """What the drive offers to the house (:mod:`bemt.base.plugins`)."""
 
 CASE_PARTS = {"drive": "bemt.tools.drive.drive_result:full_document"}
+ACTIONS = {name: f"bemt.tools.drive.actions:{name}" for name in ("drive", "map", "motor", "thrusters")}

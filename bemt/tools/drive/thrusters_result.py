@@ -78,7 +78,7 @@ def share(
     """Allocate what is wanted (by the file, unless said): ``bemt.thrusters.result/1``, its text, whether it is met."""
     wrong = [
         Fault("", option, f"{value:g}", f"a number from {-MOST:g} to {MOST:g} {unit}")
-        for option, value, unit in (("--force", wanted_N, "N"), ("--moment", wanted_Nm, "N m"))
+        for option, value, unit in (("--force-N", wanted_N, "N"), ("--moment-Nm", wanted_Nm, "N m"))
         if value is not None and not -MOST <= value <= MOST
     ]
     try:

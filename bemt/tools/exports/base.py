@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from bemt.base import plugins
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import plain, write_atomic
+from bemt.base.toml import Table
+from bemt.rotors.case.schema import PointTable
 from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
 from bemt.tools.exports.performance import (
     Loading,
@@ -28,9 +33,9 @@ from bemt.tools.exports.performance import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from bemt.rotors.case import Case
+    from bemt.tools.exports.printing import Print, Shape
+    from geometry.mesh import Options
 
 __all__ = [
     "FEATURES",
@@ -79,12 +84,24 @@ class Job:
         Axial speed of a disk and of frozen polars; None: from the case. [m/s]
     hold : tuple of str
         Keys of :data:`FEATURES` that the target must support.
+    unit : str
+        Unit of solids, ``mm`` or ``m``.
+    solid : geometry.mesh.Options or None
+        Fillet, least thickness and tessellation of solids.
+    printed : Print or None
+        What a solid for a printer is to be; None is the rotor as its sections say.
+    own : mapping
+        Options of single targets by name, as :attr:`Export.options` declares them; what is missing is its default.
     """
 
     case: Case
     rpm: float | None = None
     airspeed_m_s: float | None = None
     hold: tuple[str, ...] = ()
+    unit: str = "mm"
+    solid: Options | None = None
+    printed: Print | None = None
+    own: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def rpm_top(self) -> float:
@@ -107,6 +124,13 @@ class Job:
         """Speed and thrust at full throttle with their u, where the case has a motor."""
         found: dict[str, Any] | None = plugins.part("drive", self.case)
         return found
+
+    @cached_property
+    def shapes(self) -> list[Shape]:
+        """Solids to write; meshed once. Raises geometry.common.GeometryError."""
+        from bemt.tools.exports.printing import shapes
+
+        return shapes(self.case, self.solid, self.printed)
 
     @cached_property
     def performance(self) -> Performance:
@@ -155,13 +179,15 @@ class Job:
 class Export(ABC):
     """A target: a simulator, a disk of a flow solver, a design tool, a solid.
 
-    A subclass in a module of ``bemt/tools/exports/`` is found by scanning; its ``id`` is the value of ``--format``.
+    A subclass in a module of ``bemt/tools/exports/`` is found by scanning, one of another tool by its ``offers``; its
+    ``id`` is the value of ``--format``.
 
     A class defines ``id`` (name on the command line) and ``title``; ``kind``: ``solid``, ``loads`` (thrust and
     torque of a simulator), ``disk`` (a flow solver) or ``blade`` (a design tool); ``holds``: the model class, as a
     formula where there is one; ``features``: keys of :data:`FEATURES`; ``conventions``: signs, axes and units of the
-    written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``uses``:
-    fields of `bemt.tools.cfd.openfoam.write.Run` that it reads.
+    written numbers; ``source`` of format and formula; ``needs``: Python packages beyond the installation; ``options``:
+    the options that it declares beside the operating point; ``uses``: which of them it reads; ``turn``: 0 has a folder
+    of its own, 1 stands beside others, 2 makes the folder itself a case and comes last.
     """
 
     id: ClassVar[str]
@@ -172,7 +198,59 @@ class Export(ABC):
     conventions: ClassVar[str] = CONVENTION
     source: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
+    options: ClassVar[type[Table]] = PointTable
     uses: ClassVar[frozenset[str]] = frozenset()
+    turn: ClassVar[int] = 0
+
+    def put(self, job: Job, out: Path) -> dict[str, Any]:
+        """Write the files into a folder.
+
+        Parameters
+        ----------
+        job : Job
+            The request.
+        out : Path
+            The folder of the export.
+
+        Returns
+        -------
+        dict
+            Its part of the manifest.
+
+        Raises
+        ------
+        InputError
+            If the request cannot be met; nothing is written then.
+        """
+        from bemt.tools.exports.manifest import entry
+        from geometry.export import MANIFEST, SCHEMA
+
+        if found := self.faults(job):
+            raise InputError(found)
+        files = self.write(job)
+        made = plain(entry(self, job, files))
+        (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
+        for name, data in files.items():
+            path = out / self.id / name
+            write_atomic(path, data)
+            if str(data)[:2] == "#!":
+                os.chmod(path, 0o755)
+        return {"schema": SCHEMA, "name": job.case.name, "files": [], "targets": [made]}
+
+    def text(self, part: Mapping[str, Any]) -> list[str]:
+        """Lines for a terminal on its own part of the manifest.
+
+        Parameters
+        ----------
+        part : mapping
+            What the manifest holds under `id`.
+
+        Returns
+        -------
+        list of str
+            Lines.
+        """
+        return [str(note) for note in part.get("notes", [])]
 
     def faults(self, job: Job) -> list[Fault]:
         """Requests that the target cannot meet; overriding methods add to this list.
@@ -400,16 +478,35 @@ class SolidExport(Export):
     holds = "shape"
     conventions = "z along the shaft towards thrust, x the pitch axis of blade 1; unit in the manifest"
 
-    def write(self, job: Job) -> Files:
-        """The files that `geometry.export` makes, in millimetres."""
-        import tempfile
-        from pathlib import Path
+    turn = 1
 
+    def put(self, job: Job, out: Path) -> dict[str, Any]:
+        """The files that `geometry.export` makes."""
+        from bemt.tools.exports.manifest import joined
+        from geometry.common import GeometryError
         from geometry.export import export
 
+        found: dict[str, Any] = {}
+        try:
+            for s in job.shapes:
+                made = export(s.rotor, s.duct, out, [self.id], name=job.case.name + s.end, unit=job.unit,
+                              options=s.options, model=s.model)  # fmt: skip
+                found = joined(found, made | {"name": job.case.name})
+        except GeometryError as error:
+            raise InputError([Fault(job.file, *fault) for fault in error.faults]) from error
+        return found
+
+    def write(self, job: Job) -> Files:
+        """What `put` leaves in a folder."""
+        import tempfile
+
+        from geometry.export import MANIFEST
+
         with tempfile.TemporaryDirectory() as folder:
-            made = export(job.case.rotor(), job.case.duct(), Path(folder), [self.id], name=job.case.name)
-            return {item["path"]: (Path(folder) / item["path"]).read_bytes() for item in made["files"]}
+            home = Path(folder)
+            self.put(job, home)
+            files = [path for path in sorted(home.rglob("*")) if path.is_file() and path.name != MANIFEST]
+            return {path.relative_to(home).as_posix(): path.read_bytes() for path in files}
 
     def faults(self, job: Job) -> list[Fault]:
         """Nothing of a case is too much for a solid; loads are."""
@@ -444,8 +541,7 @@ class BladeExport(Export):
         """
         import importlib
 
-        from bemt.base.tables import write_atomic
-        from bemt.data.readers._blade import case_text
+        from bemt.data.readers.blade import case_text
         from bemt.rotors.case import load_case
 
         name, data = next(iter(files.items()))

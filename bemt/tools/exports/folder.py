@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import file_hash, number_text, plain, text_table, write_atomic
-from bemt.base.toml import shown
+from bemt.base.plugins import missing, tool_of
+from bemt.base.tables import file_hash, number_text, text_table, write_atomic
+from bemt.base.toml import check_field, shown
+from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case, find_cases, load_case, repeated_names
-from bemt.tools.cfd.openfoam.write import Run, check_run, settings_of, write_openfoam
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
-from bemt.tools.exports.manifest import entry
-from bemt.tools.exports.printing import Print, faults_of, printable
+from bemt.tools.exports.manifest import joined
+from bemt.tools.exports.printing import Print, faults_of
 from geometry.common import GeometryError
-from geometry.export import MANIFEST, SCHEMA, export
+from geometry.export import MANIFEST, SCHEMA
 from geometry.mesh import Options
-
-NAMES = {
-    "rpm": "--rpm",
-    "airspeed_m_s": "--airspeed",
-    "sideslip_deg": "--sideslip-deg",
-    "level": "--level",
-    "domain": "--domain",
-    "sector": "--sector",
-    "turbulence": "--turbulence",
-    "solver": "--compressible",
-}
-"""Options that say at which point and what a target is to compute."""
 
 
 class PartlyRefused(InputError):
@@ -42,45 +30,22 @@ class PartlyRefused(InputError):
         self.manifest = manifest
 
 
-def export_case(
-    case: Case,
-    out: Path,
-    formats: list[str],
-    unit: str = "mm",
-    options: Options | None = None,
-    flow: Run | None = None,
-    hold: tuple[str, ...] = (),
-    request: Print | None = None,
-) -> dict[str, Any]:
+def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     """Write one case for one or more targets; each is whole or not there.
 
     Formats of an earlier export of the same case stay, in the folder and in its manifest: the answer has those in
     ``kept``, and in ``stale`` the ones written from another state of the case. If some targets were refused, the others
     are written (`PartlyRefused`); if all were, or the folder holds another case, nothing is.
     """
-    run, before = flow or Run(), _manifest(out)
+    case, before = job.case, _manifest(out)
     if before.get("name", case.name) != case.name:
         got, wanted = f"the export of {before['name']!r}", f"a folder without an export, or with one of {case.name!r}"
         raise InputError(Fault((out / MANIFEST).as_posix(), "name", got, wanted, "Give each case an --out of its own"))
-    words = list(dict.fromkeys(formats))
-    solid = [word for word in words if exports()[word].kind == "solid" and word != "openfoam"]
-    manifest, faults = _targets(case, out, words, run, hold)
-    if solid:
+    manifest: dict[str, Any] = {}
+    faults: list[Fault] = []
+    for target in sorted((exports()[word] for word in dict.fromkeys(formats)), key=lambda target: target.turn):
         try:
-            if request is None:
-                made = export(case.rotor(), case.duct(), out, solid, name=case.name, unit=unit, options=options)
-                manifest = _joined(manifest, made)
-            else:
-                rotors, options = printable(case, request)
-                for end, rotor in rotors:
-                    made = export(rotor, None, out, solid, name=case.name + end, unit=unit, options=options)
-                    manifest = _joined(manifest, made | {"name": case.name})
-        except GeometryError as error:
-            faults += [Fault(case.path.as_posix(), *fault) for fault in error.faults]
-    if "openfoam" in words:
-        try:
-            settings_of(case, run, options)  # its faults come before anything is written
-            manifest = _joined(manifest, write_openfoam(case, out, run, options))
+            manifest = joined(manifest, target.put(job, out))
         except InputError as error:
             faults += error.faults
     if manifest:
@@ -88,8 +53,8 @@ def export_case(
         kept = _kept(before, manifest, out)
         stale = sorted(word for word, digest in kept["case_sha256"].items() if digest != content)
         manifest["case_sha256"] = dict.fromkeys(_formats(manifest), content)
-        write_atomic(out / MANIFEST, json.dumps(_joined(kept, manifest), indent=1) + "\n")
-        now = _hashes(_joined(kept, manifest))
+        write_atomic(out / MANIFEST, json.dumps(joined(kept, manifest), indent=1) + "\n")
+        now = _hashes(joined(kept, manifest))
         _remove(out, {path: digest for path, digest in _listed(before).items() if path not in now})
         manifest |= {"kept": sorted(kept["case_sha256"]), "stale": stale}
     told = list(dict.fromkeys(faults))
@@ -100,23 +65,16 @@ def export_case(
     return manifest
 
 
+def _parts(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """Targets that have a part of the manifest to themselves, with the files that they list there."""
+    return {key: v for key, v in manifest.items() if isinstance(v, dict) and isinstance(v.get("files"), dict)}
+
+
 def _formats(manifest: Mapping[str, Any]) -> list[str]:
     """Formats that a manifest speaks of."""
-    out = [item["format"] for item in manifest["files"] if item["format"] != "openfoam"]
-    out += ["openfoam"] if "openfoam" in manifest else []
-    return list(dict.fromkeys(out + [item["target"] for item in manifest.get("targets", [])]))
-
-
-def _joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
-    """Both manifests in one; the second is the newer."""
-    joined = {**first, **second}
-    for key in ("volumes_m3", "case_sha256"):
-        if key in first or key in second:
-            joined[key] = {**first.get(key, {}), **second.get(key, {})}
-    for key in ("files", "targets"):
-        if key in first or key in second:
-            joined[key] = [*first.get(key, []), *second.get(key, [])]
-    return joined
+    parts = _parts(manifest)
+    out = [item["format"] for item in manifest["files"] if item["format"] not in parts]
+    return list(dict.fromkeys([*out, *parts, *(item["target"] for item in manifest.get("targets", []))]))
 
 
 def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[str, Any]:
@@ -126,16 +84,15 @@ def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[s
     def there(files: Mapping[str, str], folder: str = "") -> bool:
         return all(_unchanged(out, folder + path, digest) for path, digest in files.items())
 
-    kept = {key: value for key, value in before.items() if key not in ("files", "targets", "openfoam", "case_sha256")}
-    flow = before.get("openfoam")
-    if flow is not None and "openfoam" not in gone and there(flow.get("files", {})):
-        kept["openfoam"] = flow
+    parts = _parts(before)
+    kept = {key: value for key, value in before.items() if key not in ("files", "targets", "case_sha256", *parts)}
+    kept |= {word: part for word, part in parts.items() if word not in gone and there(part["files"])}
     kept["files"] = [
         item
         for item in before.get("files", [])
-        if item.get("format", "openfoam") not in gone
-        and (item.get("format") != "openfoam" or "openfoam" in kept)
-        and "format" in item
+        if "format" in item
+        and item["format"] not in gone
+        and (item["format"] not in parts or item["format"] in kept)
         and there({item["path"]: item["sha256"]})
     ]
     targets = [
@@ -154,7 +111,7 @@ def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
     files |= {
         f"{t['target']}/{item['path']}": item["sha256"] for t in manifest.get("targets", []) for item in t["files"]
     }
-    return files | dict(manifest.get("openfoam", {}).get("files", {}))
+    return files | {path: digest for part in _parts(manifest).values() for path, digest in part["files"].items()}
 
 
 def listed(manifest: Mapping[str, Any]) -> list[str]:
@@ -168,7 +125,7 @@ def _manifest(out: Path) -> dict[str, Any]:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
         _hashes(manifest)
         known = manifest["schema"] == SCHEMA and all(
-            isinstance(manifest.get(key, {}), dict) for key in ("openfoam", "volumes_m3", "case_sha256")
+            isinstance(manifest.get(key, {}), dict) for key in ("volumes_m3", "case_sha256")
         )
         return dict(manifest) if known else {}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
@@ -205,64 +162,41 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
             folder.rmdir()
 
 
-def _targets(
-    case: Case, out: Path, formats: list[str], run: Run, hold: tuple[str, ...]
-) -> tuple[dict[str, Any], list[Fault]]:
-    """Write the targets that are no solids; manifest of those that could be written, and why the others were not."""
-    job = Job(case, run.rpm, run.airspeed_m_s, hold)
-    entries: list[dict[str, Any]] = []
-    faults: list[Fault] = []
-    for target in (exports()[word] for word in formats if exports()[word].kind != "solid"):
-        found = target.faults(job)
-        try:
-            if not found:
-                files = target.write(job)
-                made = plain(entry(target, job, files))
-        except InputError as error:
-            found = list(error.faults)
-        if found:
-            faults += found
-            continue
-        if not entries:
-            (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
-        for name, data in files.items():
-            path = out / target.id / name
-            write_atomic(path, data)
-            if str(data)[:2] == "#!":
-                os.chmod(path, 0o755)
-        entries.append(made)
-    if not entries:
-        return {}, faults
-    return {"schema": SCHEMA, "name": case.name, "files": [], "targets": entries}, faults
-
-
 def export_cases(
-    path: str,
+    what: str | Case,
     out: str,
-    formats: list[str],
+    formats: Sequence[str],
     unit: str = "mm",
     fillet_mm: float = 0.0,
     min_thickness_mm: float = 0.0,
-    flow: Run | None = None,
+    given: Mapping[str, Any] | None = None,
     hold: tuple[str, ...] = (),
-    request: Print | None = None,
+    printed: Print | None = None,
 ) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
+
+    `given` is the operating point (``rpm``, ``airspeed_m_s``) and the options of single targets
+    (:attr:`Export.options <bemt.tools.exports.base.Export.options>`); None is not given.
 
     Returns manifests with their folders, and why cases or targets were refused. Faults of the options are raised before
     anything is written.
     """
-    flow = flow or Run()
-    faults = check_run(flow, NAMES) + _unused(flow, formats, hold)
-    faults += faults_of(request, formats) if request is not None else []
+    known = exports()
+    unknown = [word for word in formats if word not in known]
+    faults = [Fault("", "--format", word, f"one of {', '.join(known)}", absent_target(word)) for word in unknown]
+    if faults:
+        raise InputError(faults)
+    asked = {key: value for key, value in (given or {}).items() if value is not None}
+    faults += option_faults(asked) + _unused(asked, formats, hold)
+    faults += faults_of(printed, formats) if printed is not None else []
     try:
-        options = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
+        solid = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
         faults += [Fault("", *fault) for fault in error.faults]
     if faults:
         raise InputError(faults)
-    paths = find_cases([path])
-    cases, refused, made = [], [], []
+    paths = find_cases([what]) if isinstance(what, str) else []
+    cases, refused, made = [] if isinstance(what, str) else [what], [], []
     for file in paths:
         try:
             cases.append(load_case(file))
@@ -272,10 +206,12 @@ def export_cases(
         repeated = repeated_names(dict(enumerate(cases)))
         if repeated:  # they would write into one folder
             raise InputError(list(repeated.values()))
+    rpm, airspeed = asked.pop("rpm", None), asked.pop("airspeed_m_s", None)
     for case in cases:
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
-            made.append((export_case(case, folder, formats, unit, options, flow, hold, request), folder))
+            job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked)
+            made.append((export_case(job, folder, formats), folder))
         except PartlyRefused as error:
             made.append((error.manifest, folder))
             refused.append(error)
@@ -284,20 +220,38 @@ def export_cases(
     return made, refused
 
 
-def _unused(flow: Run, formats: list[str], hold: tuple[str, ...]) -> list[Fault]:
+def absent_target(word: str) -> str:
+    """Sentence on the absent tool that a target belongs to, or nothing."""
+    return missing(tool) if (tool := tool_of(word)) else ""
+
+
+def option_faults(given: Mapping[str, Any]) -> list[Fault]:
+    """Find the options of targets that are out of range or unknown words.
+
+    >>> for fault in option_faults({"rpm": float("nan")}): print(fault)
+    --rpm: got nan; expected a number from 10 to 300000 rev/min.
+    """
+    out = Collector("")
+    for key, value in given.items():
+        for table in [target.options for target in exports().values() if key in target.options.named()][:1]:
+            check_field(out, _option(key), table, key, value)
+    return out.faults
+
+
+def _option(key: str) -> str:
+    return f"--{key.replace('_', '-')}"
+
+
+def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, ...]) -> list[Fault]:
     """Options that no chosen format reads: what they ask for would not be done."""
-    plain, faults = Run(), []
+    faults = []
     used = {word for name in formats for word in exports()[name].uses}
-    for key, option in NAMES.items():
-        value = getattr(flow, key)
-        if value != getattr(plain, key) and key not in used:
-            option, got = (f"--{value}", "the option") if key == "solver" else (option, shown(value).strip("'"))
-            readers = ", ".join(name for name, target in exports().items() if key in target.uses)
-            faults.append(
-                Fault(
-                    "", option, got, f"nothing with the format {', '.join(formats)}", f"Formats that read it: {readers}"
-                )
-            )
+    wanted = f"nothing with the format {', '.join(formats)}"
+    for key, value in given.items():
+        if key not in used:
+            readers = [name for name, target in exports().items() if key in target.uses]
+            hint = f"Formats that read it: {', '.join(readers) or 'none here'}"
+            faults.append(Fault("", _option(key), shown(value).strip("'"), wanted, hint))
     if hold and all(exports()[name].kind == "solid" for name in formats):
         faults.append(
             Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")
@@ -378,11 +332,7 @@ def text(manifest: dict[str, Any], out: Path) -> str:
     else:
         words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
     lines.append(", ".join(words))
-    if "openfoam" in manifest:
-        about = manifest["openfoam"]
-        lines.append(
-            f"OpenFOAM case: {about['solver']}, {about['turbulence']}, {about['domain']}, {about['sector']}, "
-            f"level {about['level']:g}; run it with ./Allrun"
-        )
-        lines += about["notes"]
+    for word, part in _parts(manifest).items():
+        if word in exports():
+            lines += exports()[word].text(part)
     return "\n".join(lines + targets)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
+from bemt.base.plugins import missing_for
 from bemt.tools.exports.base import Export, Files, Job
 from bemt.tools.exports.performance import THINNER
 
@@ -21,6 +22,7 @@ def _lost(export: Export, job: Job) -> list[str]:
         out.append(f"the direction of rotation is not in the file: this rotor is {job.rotation}")
     if export.kind != "loads":
         return out
+    out += missing_for(job.case)
     if "hub" not in export.features:
         out.append("loads across the shaft are not in the file: no H force, no hub moments, thrust as in axial flow")
     elif job.case.ducted:
@@ -62,3 +64,15 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
         for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
     ]
     return found
+
+
+def joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Both manifests in one; the second is the newer."""
+    joined = {**first, **second}
+    for key in ("volumes_m3", "case_sha256"):
+        if key in first or key in second:
+            joined[key] = {**first.get(key, {}), **second.get(key, {})}
+    for key in ("files", "targets"):
+        if key in first or key in second:
+            joined[key] = [*first.get(key, []), *second.get(key, [])]
+    return joined

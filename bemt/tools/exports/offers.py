@@ -1,1 +1,3 @@
-"""What this tool offers to the house (:mod:`bemt.base.plugins`)."""
+"""What exports offer to the house (:mod:`bemt.base.plugins`)."""
+
+ACTIONS = {"export": "bemt.tools.exports.actions:export"}

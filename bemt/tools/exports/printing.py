@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from bemt.base.errors import Fault
+from bemt.base.errors import Fault, InputError
 from bemt.rotors.case import Case
 from geometry.common import GeometryError
-from geometry.mesh import Options
+from geometry.duct import Duct
+from geometry.mesh import MeshModel, Options, build
 from geometry.printed import ADAPTERS, Printed
 from geometry.rotor import Rotor
 
@@ -41,7 +43,18 @@ def asked(request: Print) -> list[str]:
     return [f"--{f.name.replace('_', '-')}" for f in fields(request) if getattr(request, f.name) is not None]
 
 
-def faults_of(request: Print, formats: list[str]) -> list[Fault]:
+def request_of(printable: bool, **given: Any) -> Print | None:
+    """What the options ask of a printer, None without ``printable``; InputError where one of its own comes alone."""
+    request = Print(**given)
+    if printable:
+        return request
+    alone = asked(replace(request, min_thickness_mm=None, flare_mm=None))  # those are options of any solid
+    if alone:
+        raise InputError([Fault("", name, "given", "nothing without --printable") for name in alone])
+    return None
+
+
+def faults_of(request: Print, formats: Sequence[str]) -> list[Fault]:
     """What the options alone say that cannot be printed."""
     wrong = [word for word in formats if word not in SOLIDS]
     found = [Fault("", "--printable", f"the format {word}", f"one of {', '.join(SOLIDS)}") for word in wrong]
@@ -72,13 +85,27 @@ def _printed(request: Print, ducted: bool) -> Printed:
     )
 
 
-def printable(case: Case, request: Print) -> tuple[list[tuple[str, Rotor]], Options]:
-    """Rotors with what their file names end in, and how they are made; GeometryError where none can be made."""
-    rotor = case.rotor()
+@dataclass(frozen=True)
+class Shape:
+    """A solid to write: what its file name ends in, the rotor and its duct, how it is made, its mesh."""
+
+    end: str
+    rotor: Rotor
+    duct: Duct | None
+    options: Options | None
+    model: MeshModel
+
+
+def shapes(case: Case, options: Options | None, request: Print | None) -> list[Shape]:
+    """Solids of a case, as its sections say or for a printer; GeometryError where one cannot be made."""
+    rotor, duct = case.rotor(), case.duct()
+    if request is None:
+        return [Shape("", rotor, duct, options, build(rotor, duct, options))]
     if request.hub_diameter_mm is not None:
         rotor = replace(rotor, blade=replace(rotor.blade, Rhub=0.5e-3 * request.hub_diameter_mm))
     if request.hub_height_mm is not None:
         rotor = replace(rotor, hub_length=1e-3 * request.hub_height_mm)
     made = {"right": ("_right", replace(rotor, rotation=1)), "left": ("_left", replace(rotor, rotation=-1))}
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
-    return rotors, Options(printed=_printed(request, case.duct() is not None))
+    options = Options(printed=_printed(request, duct is not None))
+    return [Shape(end, rotor, None, options, build(rotor, None, options)) for end, rotor in rotors]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.cfd.openfoam.text import dictionary, vector
+from bemt.base.foam_text import dictionary, vector
 from bemt.tools.exports.base import DiskExport, Files, Job
 from bemt.tools.exports.performance import Loading
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.judge.diagnose.explanation import NONE
 from bemt.judge.diagnose.suggest import Suggestion
@@ -24,12 +25,16 @@ from bemt.tools.flight.mass import mass_faults
 from bemt.tools.flight.motor_speed import speed_changes
 from bemt.tools.flight.repeat import flight_scatter
 from bemt.tools.flight.rules import BesideBalance
+from bemt.tools.flight.sessions import Sessions, sessions
 from bemt.tools.flight.simulator import simulator_constants
+from bemt.tools.flight.speed_sensor import checked
+from bemt.tools.flight.thrust_curve import thrust_curve
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
 from bemt.tools.flight.wind import Wind, wind
 
 _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]
+_NEAR_LIMIT = 0.5  # demand in yaw that few mixers can give in full [1]
 
 SPEED_POWER = 0.1
 """Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
@@ -71,6 +76,11 @@ class FlightAnswer:
     predicted: Predicted | None = None  # The case in this flight
     # Constants in the units of simulators; the band of the thrust constant holds what flights differ by
     simulator: dict[str, Constant] = field(default_factory=dict)
+    curve: dict[str, Constant] = field(default_factory=dict)  # Parameters of the autopilot's thrust curve
+    days: Sessions = field(default_factory=lambda: Sessions((), "", ""))  # Sessions of the flights
+    # Usual demand in roll to the right, nose up and yaw to the right, and share of the time near the limit in yaw; as
+    # shares of full; empty where it was not logged [1]
+    demand: tuple[float, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """JSON of schema bemt.flight/1."""
@@ -80,9 +90,12 @@ class FlightAnswer:
             "readings": {
                 "file": log.file, "format": log.format, "rotors": log.rotors, "samples": int(log.t.size),
                 "flying_s": float(log.flying.mean() * np.ptp(log.t)), "command_unit": log.command_unit,
+                "stated_rotors": log.stated_rotors, "mixed": log.mixed, "date": log.date,
                 "layout": log.layout, "join_s": log.join_s, "ends": log.ends,
             },
+            "sensors": [asdict(s) for s in log.sensors],
             "constants": {k: asdict(c) for k, c in f.constants.items()},
+            "thrust_curve": {k: asdict(c) for k, c in self.curve.items()},
             "simulator": {k: asdict(c) for k, c in self.simulator.items()},
             "rotors": {k: list(v) for k, v in f.rotors.items()},
             "balance": dict(zip(("left_right", "front_rear", "left_turning_right_turning"), self.balance,
@@ -98,7 +111,11 @@ class FlightAnswer:
             "ranking": [{"effect": str(e), "probability": p, **(asdict(j.found[e]) if e in j.found else {})}
                         for e, p in sorted(j.probability.items(), key=lambda kv: -kv[1])[:12]],
             "next_measurement": j.next.document(),
-            "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95)},
+            "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95),
+                           "left_out": "session" if j.sessions > 1 else "flight"},
+            "sessions": {"of_healthy": list(self.days.days), "by": self.days.by, "of_this":
+                         "unknown" if self.days.day == "" else "another" if self.days.day is None else self.days.day},
+            "demand": dict(zip(("roll", "pitch", "yaw", "yaw_near_limit"), self.demand, strict=False)),
             "visible": j.visible,
             "share_change": j.readings.tolist(),
             "total_change": j.total,
@@ -134,34 +151,41 @@ def answer_on(
     layout: str = "",
     healthy_mass_kg: float | None = None,
     false_alarm: float = FALSE_ALARM,
+    stated_days: Sequence[str] = (),
+    day: str = "",
 ) -> FlightAnswer:
     """Identify and judge one flight, with healthy flights of the same vehicle.
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
-    `false_alarm` is the accepted probability that a healthy flight is accused [1]. InputError when logs have another
-    number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a mass
+    `false_alarm` is the accepted probability that a healthy flight is accused [1]; `stated_days` and `day` are as
+    :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have another number of rotors, or the
+    layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a mass
     cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
-    if others:
+    if log.rotors and others:
         expected = f"{log.rotors} rotors and the same channels as {log.file}"
         raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
-    faults = mass_faults(log, mass_kg, "--mass")
+    faults = mass_faults(log, mass_kg, "--mass-kg")
     for h in healthy:
         faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass")
     if faults:
         raise InputError(faults)
     if layout:
         log = replace(log, layout=layout)
+    log, healthy = checked(log), [checked(replace(h, layout=layout or h.layout)) for h in healthy]
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
     found, air = identify(log, mass_kg), wind(log, healthy)
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
-    mine, changed = features(log), change_in(log, placed)
+    mine, changed, days = features(log), change_in(log, placed), sessions(log, healthy, stated_days, day)
     if mine is None:
         why = "the log shows no flight with all motors running"
+        if not log.rotors:
+            why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
         said = Decision("insufficient", (), NONE, 1.0, float("nan"), (), why, "no flight")
-        step = "log a flight of 10 s or more with the commands of the motors"
+        step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
+               "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
         judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
     else:
         kept = [(x, k) for k, h in enumerate(healthy) if (x := features(h)) is not None]
@@ -171,7 +195,8 @@ def answer_on(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
         )  # fmt: skip
-        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), beside)
+        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), beside,
+                       [days.days[k] for _, k in kept], days.day)  # fmt: skip
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:
         same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
@@ -181,13 +206,31 @@ def answer_on(
     balance: tuple[float, ...] = ()
     limited: tuple[float, ...] = ()
     if mine is not None and placed is not None:
-        balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ mine)
+        balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
     if log.command is not None and log.command_unit == "1" and log.flying.any():
         limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
         log, found, judged, air, balance, limited, changed, shake, moved,
-        turned, inflow(log), mass, simulator=simulator_constants(log, found),
+        turned, inflow(log), mass, simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days,
+        demand=_demand(log),
     )  # fmt: skip
+
+
+def _usual(log: FlightLog) -> Array:
+    """Log of the drives at their usual: the median of twenty means over the flight, so a spin of seconds is none."""
+    drive = log.drive
+    assert drive is not None
+    parts = np.array([p.mean(axis=0) for p in np.array_split(drive[log.flying], 20)])
+    return np.asarray(np.log(np.maximum(np.median(parts, axis=0), 1e-9)), dtype=float)
+
+
+def _demand(log: FlightLog) -> tuple[float, ...]:
+    """Usual demand in roll, pitch and yaw, and the share of the time near the limit in yaw [1]."""
+    if log.torque is None or not log.flying.any():
+        return ()
+    torque = log.torque[log.flying]
+    usual = np.median([p.mean(axis=0) for p in np.array_split(torque, 20)], axis=0)
+    return (*map(float, usual), float(np.mean(np.abs(torque[:, 2]) > _NEAR_LIMIT)))
 
 
 def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.tools.flight.layout import LAYOUTS
+from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
 from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 KIND = "ArduPilot DataFlash"
@@ -39,10 +39,17 @@ _WANTED: dict[str, tuple[str, ...]] = {
     "NKF1": ("C", "VN", "VE", "VD", "PN", "PE", "PD"),
     "ISBH": ("N", "type", "instance", "mul", "smp_cnt", "SampleUS", "smp_rate"),
     "ISBD": ("N", "seqno", "x", "y", "z"),
+    "RATE": ("ROut", "POut", "YOut", "AOut"),
+    "VIBE": ("IMU", "VibeX", "VibeY", "VibeZ"),
+    "MOTB": ("ThrAvMx",),
+    "CTUN": ("ThO",),
+    "GPS": ("I", "GMS", "GWk"),
     "PARM": ("Name", "Value"),
 }
-_FIRST = {"IMU": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("C",)}  # of these the first is read
+# Of these the first instance is read.
+_FIRST = {"IMU": ("I",), "VIBE": ("IMU",), "GPS": ("I",), "BAT": ("Instance", "Inst"), "XKF1": ("C",), "NKF1": ("C",)}
 _FLIP = np.array([1.0, -1.0, -1.0])
+_IDLE = 0.5  # share of the hover throttle below which nothing flies [1]
 _FUNCTIONS = {**{33 + i: i for i in range(8)}, **{82 + i: 8 + i for i in range(4)}}
 _FRAMES = {
     (1, 0): "quad-plus", (1, 1): "quad-x", (1, 2): "quad-x", (1, 3): "quad-h", (1, 12): "betaflight-x",
@@ -195,6 +202,19 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     if command is not None:
         low, high = (low, high) if high - low >= 100.0 else (1000.0, 2000.0)
         command = command[0], np.clip((command[1] - low) / (high - low), 0.0, None)
+    frame = (int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0)))
+    layout = _FRAMES.get(frame, "")
+    stated = len(LAYOUTS[layout].split()) if layout and "FRAME_CLASS" in params else 0
+    rate, said = take("RATE", ("ROut", "POut", "YOut", "AOut")), ""
+    thrust = (rate[0], rate[1][:, 3:]) if rate else take("CTUN", ("ThO",)) or take("MOTB", ("ThrAvMx",))
+    if command is None and rate is not None and stated:
+        placed = layout_of(layout, stated)
+        assert placed is not None
+        command, said = (rate[0], mixed(placed, rate[1][:, 3], rate[1][:, :3], (0.5, 0.5, 0.5))), "RATE"
+        channels = list(range(1, stated + 1))
+    hover = whole("MOT_THST_HOVER", 0.0)
+    if thrust is not None and thrust[1].size and not np.nanmax(thrust[1]) > _IDLE * hover:
+        thrust = thrust[0], 0.0 * thrust[1]
     esc = found.get("ESC", {})
     speeds, currents = None, None
     if "Instance" in esc:
@@ -222,14 +242,31 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
         "position": flipped(take(state, ("PN", "PE", "PD"))),
         "voltage": (battery[0], battery[1][:, 0]) if battery else None,
         "battery_current": (battery[0], battery[1][:, 1]) if battery else None,
+        "thrust": (thrust[0], thrust[1][:, 0]) if thrust else None,
+        "torque": (rate[0], rate[1][:, :3]) if rate else None,
+        "vibe": take("VIBE", ("VibeX", "VibeY", "VibeZ")),
     }
     B = len(channels)
-    frame = (int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0)))
-    layout = _FRAMES.get(frame, "")
     layout = layout if layout and len(LAYOUTS[layout].split()) == B else ""
-    main = "command" if command else "rpm" if speeds else "acceleration"
+    main = "command" if command else "rpm" if speeds else "acceleration" if acceleration else "vibe"
     raw = _bursts(found) or acceleration
-    return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends)
+    curve = ("MOT_THST_EXPO", "MOT_THST_HOVER", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
+    kept = {k: params[k] for k in curve if np.isfinite(params.get(k, np.nan))}
+    return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends, mixed=said, date=_date(found),
+                  parameters=kept, stated_rotors=stated)  # fmt: skip
+
+
+def _date(found: Mapping[str, Mapping[str, NDArray[Any]]]) -> str:
+    """Day by the satellites (weeks from 6 January 1980), or nothing."""
+    gps = found.get("GPS", {})
+    if any(k not in gps for k in ("GMS", "GWk")):
+        return ""
+    weeks = gps["GWk"].astype(float)
+    good = np.flatnonzero((weeks > 1000.0) & (weeks < 5000.0))
+    if not good.size:
+        return ""
+    days = int(7 * weeks[good[0]] + float(gps["GMS"][good[0]]) // 86_400_000)
+    return str(np.datetime64("1980-01-06") + np.timedelta64(days, "D"))
 
 
 def _thrust_axis(angles: Array) -> Array:

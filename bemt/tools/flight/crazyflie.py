@@ -16,6 +16,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.data.readers import crazyflie_log
+from bemt.tools.flight.layout import layout_of, mixed
 from bemt.tools.flight.log import FlightLog, joined, thrust_axis
 
 KIND = "Crazyflie usdlog"
@@ -60,9 +61,16 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     command = many(*(f"motor.m{i}" for i in motors), factor=1 / 65535.0)
     command = command or many(*(f"pwm.m{i}_pwm" for i in motors), factor=1 / 65535.0)
     command = command or many(*(f"motor.m{i}req" for i in motors), factor=1 / 65535.0)
+    demand, said = many("controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw", factor=1 / 65535.0), ""
+    thrust = one("controller.cmd_thrust", 1 / 65535.0)
+    if command is None and demand is not None and thrust is not None:
+        placed = layout_of("crazyflie", 4)
+        assert placed is not None
+        command, said = (thrust[0], mixed(placed, thrust[1], demand[1], (0.5, 0.5, 1.0))), "controller.cmd_*"
     q = many(*(f"stateEstimate.q{a}" for a in "wxyz"))
     roll = many("stateEstimate.roll", "stateEstimate.pitch", factor=np.pi / 180.0)
     roll = roll or many("stabilizer.roll", "stabilizer.pitch", factor=np.pi / 180.0)
+    roll = roll or many("controller.roll", "controller.pitch", factor=np.pi / 180.0)  # what it is held to
     packed = "stateEstimateZ"  # in millimetres
     axis = (q[0], thrust_axis(q[1])) if q else None
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
@@ -78,5 +86,9 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "position": many(*(f"stateEstimate.{a}" for a in "xyz"))
         or many(*(f"{packed}.{a}" for a in "xyz"), factor=1e-3),
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
+        "thrust": thrust,
+        "torque": demand,
     }
-    return joined(name, kind, sources, "command", raw=sources["acceleration"], layout="crazyflie", ends=ends)
+    main = "command" if command else "rpm"
+    raw = sources["acceleration"]
+    return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said)

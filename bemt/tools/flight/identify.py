@@ -67,10 +67,15 @@ def identify(log: FlightLog, mass_kg: float | None = None) -> Identified:
     )
     m, per = (1.0, "/kg") if mass_kg is None else (mass_kg, "")
     weight = _balance(log, on, power.sum(axis=1) * upright)
+    if weight is not None and speeds and log.sensors:
+        # What the repair leaves open of the sum of squares.
+        open_ = [2.0 * s.u * float(power[:, s.motor - 1].mean() / power.sum(axis=1).mean()) for s in log.sensors]
+        half = np.hypot(weight.half, 1.96 * weight.value * np.linalg.norm(open_))
+        weight = Constant(weight.value, float(half), weight.unit)
     if weight is not None:
         out[word] = Constant(m * weight.value, m * weight.half, unit + per)
     if mass_kg is None:
-        unseen.append("mass: give --mass, or a healthy flight of known mass with the same propellers")
+        unseen.append("mass: give --mass-kg, or a healthy flight of known mass with the same propellers")
     if log.command is not None:
         c = log.command[on]
         rotors["mean command"] = tuple(map(float, c.mean(axis=0)))
@@ -118,6 +123,9 @@ def _per_rotor(
 ) -> None:
     assert log.rpm is not None
     text = "thrust constant of each rotor: the four move together; fly doublets in roll, pitch and yaw"
+    if log.sensors:
+        unseen.append("thrust constant of each rotor: a speed sensor is at fault")
+        return
     if log.acceleration is not None:
         k, half = _regress(log.rpm[on] ** 2, log.acceleration[on, 2])
         if np.all(k > 0.0) and np.all(half < _APART * k):
@@ -160,9 +168,11 @@ def _drive(log: FlightLog) -> Array:
 
 
 def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
-    if log.rpm is not None and log.command is not None and log.voltage is not None and log.command_unit == "1":
-        volts = (log.command[on] * log.voltage[on, None]).mean(axis=1)
-        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on].mean(axis=1))
+    speeds = log.rpm is not None and log.sound
+    if speeds and log.command is not None and log.voltage is not None and log.command_unit == "1":
+        assert log.rpm is not None
+        volts = (log.command[on] * log.voltage[on, None])[:, log.sound].mean(axis=1)
+        k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
         if half[0] < abs(k[0]):
             out["motor line, slope"] = Constant(float(k[0]), float(half[0]), "rpm/V")
             out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")

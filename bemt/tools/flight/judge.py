@@ -27,7 +27,7 @@ from bemt.judge.diagnose.rule import decide
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.diagnose.thresholds import GATE
 from bemt.judge.diagnose.verdict import CLAIMS, Decision
-from bemt.tools.flight.balance import BLADE, WIND, axes_of, directions, healthy_flight
+from bemt.tools.flight.balance import BLADE, DAY, WIND, axes_of, directions, healthy_flight
 from bemt.tools.flight.next_flight import next_flight
 from bemt.tools.flight.rules import RULES, BesideBalance, FlightEvidence, FlightQuery
 
@@ -62,6 +62,7 @@ class FlightVerdict:
     total: float = float("nan")
     total_half: float = float("nan")
     given: int = 0  # Healthy flights to compare with
+    sessions: int = 1  # Sessions of them that are known
 
 
 def judge(
@@ -71,33 +72,46 @@ def judge(
     false_alarm: float = FALSE_ALARM,
     windy: bool = False,
     beside: BesideBalance | None = None,
+    days: Sequence[int] = (),
+    day: int | None | str = "",
 ) -> FlightVerdict:
     """Judge the features of a flight, (B,), by those of healthy flights of the same vehicle [1].
 
     Without a layout no weights are tried, and every rotor stands for itself. `false_alarm` is the accepted probability
     that a healthy flight is accused [1]. `windy`: the rotors met wind that they do not meet in the healthy flights; it
     tilts the body, so roll and pitch may change in any way, and yaw does not. `beside` is what else the log shows.
+    `days` numbers the session of each healthy flight, `day` is that of this one: None where it is known to be another,
+    empty where nobody knows; then another day is an explanation, as likely as not.
     """
     from scipy import stats
 
     calm = np.array(healthy).reshape(-1, flight.size)
-    query, out = weighed(flight, calm, layout, false_alarm, windy)
+    query, out = weighed(flight, calm, layout, false_alarm, windy, days, day)
     query.beside = beside or BesideBalance()
     said = decide(query, RULES)
     out = replace(out, said=said, next=next_flight(said, layout, query.given))
     if query.few:
         return out
-    bad = []
+    bad, label = [], np.array(days if len(days) == len(calm) else [0] * len(calm))
+    several = np.unique(label).size > 1
     for k, h in enumerate(calm):
-        other, _ = weighed(h, np.delete(calm, k, axis=0), layout, false_alarm)
+        # Of several sessions each is left out; of one, each flight.
+        keep = label != label[k] if several else np.arange(len(calm)) != k
+        other, _ = weighed(h, calm[keep], layout, false_alarm, days=label[keep], day=None if several else label[k])
         moved = any(query.beside.healthy[k : k + 1])
         bad.append(moved or decide(other, RULES).verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
-    return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)))
+    return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)),
+                   sessions=int(np.unique(label).size))  # fmt: skip
+
+
+def _latest(days: Sequence[int]) -> int:
+    return int(days[-1]) if len(days) else 0
 
 
 def weighed(
-    flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False
+    flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False, days: Sequence[int] = (),
+    day: int | None | str = 0,
 ) -> tuple[FlightQuery, FlightVerdict]:
     """Weigh all explanations; gives what the rules ask, and the answer that has no decision yet."""
     from scipy import stats
@@ -105,7 +119,8 @@ def weighed(
     B, n = flight.size, len(calm)
     change = flight - (calm.mean(axis=0) if n else flight.mean())
     axes, ways = axes_of(layout, B), directions(B, layout)
-    p = healthy_flight(calm, axes, layout is not None)
+    unknown = isinstance(day, str)
+    p = healthy_flight(calm, axes, layout is not None, days, _latest(days) if isinstance(day, str) else day)
     z = (flight @ axes.T - p.mean) / p.sd
     D = np.stack([axes @ way for way in ways.values()]) / p.sd
     length = np.linalg.norm(D, axis=1)
@@ -150,11 +165,18 @@ def weighed(
         still = float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0
         tilt = float(np.exp(-0.5 * np.sum(free[:2])))
         found[Explanation.of(WIND)] = FlightEvidence(0.0, float("nan"), 0.0, still, over_nothing(still, tilt))
+    if unknown and n:
+        moved = float(np.sum(((flight @ axes.T - p.other_mean) / p.other_sd) ** 2))
+        found[Explanation.of(DAY)] = FlightEvidence(
+            0.0, float("nan"), 0.0, moved, over_nothing(moved, float(np.prod(p.sd / p.other_sd)))
+        )
     unlisted = float(np.sum(z**2 / (1.0 + scale**2)))
     log_bayes = {e: v.log_bayes for e, v in found.items()}
     log_bayes |= {NONE: 0.0, UNKNOWN: over_nothing(unlisted, float(np.exp(-0.5 * np.sum(free))))}
     # Wind is only listed where the log shows it, so it is as likely as physics that every rotor has.
-    prior = log_priors({i: LEFT_OUT if i == WIND else 1.0 for e in found if not e.pair for i in e})
+    names_ = (i for e in found if not e.pair for i in e if i != DAY)
+    prior = log_priors({i: LEFT_OUT if i == WIND else 1.0 for i in names_})
+    prior[Explanation.of(DAY)] = prior[NONE]  # as likely as not
     weight = {e: v + prior[e] for e, v in log_bayes.items()}
     top = max(weight.values())
     total = sum(float(np.exp(v - top)) for v in weight.values())

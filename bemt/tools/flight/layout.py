@@ -81,6 +81,19 @@ def layout_text(ahead: ArrayLike, left: ArrayLike, turning: Sequence[float]) -> 
     return " ".join(f"{a:.5g}@{r:.4g}{'+' if s > 0 else '-'}" for a, r, s in zip(angle, arm, turning, strict=True))
 
 
+def mixed(layout: Array, thrust: Array, torque: Array, gains: tuple[float, float, float]) -> Array:
+    """Commands (N, B) of a mixer from its demands: thrust (N,) and roll, pitch and yaw (N, 3), each times its gain.
+
+    The largest share of a motor in roll or pitch is one; in yaw all have one. So it is in ArduPilot
+    (AP_MotorsMatrix::normalise_rpy_factors, gains 1/2), in PX4 for four rotors before version 1.13 (geometry quad_x,
+    gains 0.707, 0.707, 1) and on a Crazyflie (power_distribution_quadrotor.c, gains 1/2, 1/2, 1): by memory, not
+    checked. Limits of the mixer are left out.
+    """
+    rows = effect_matrix(layout)[:3]
+    rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-12) * np.array(gains)[:, None]
+    return np.asarray(np.clip(thrust[:, None] + torque @ rows, 0.0, None), dtype=float)
+
+
 def effect_matrix(layout: Array) -> Array:
     """Loads per rotor thrust, scaled to the mean arm, (4, B) [1].
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DENSE", "SPARSE", "FlightLog", "Stretches", "joined", "thrust_axis"]
+__all__ = ["DENSE", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
 
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
@@ -21,6 +21,19 @@ _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; hei
 _MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 _LARGEST = 1e9  # value above which a number is damage: no unit here comes near
 DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
+
+
+@dataclass(frozen=True)
+class SpeedSensor:
+    """A speed sensor that cannot have read its rotor's speed, and how it was repaired."""
+
+    motor: int  # From one
+    count: str  # Blades seen over blades that pass, such as "1/2"; empty where it is no such fraction
+    # Reading over the repaired speed where it reads; share of rows in the air without a reading, and at zero [1]
+    ratio: float
+    lost: float
+    zeros: float
+    u: float  # Standard uncertainty of the repaired speed, a share of it [1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +67,27 @@ class FlightLog:
     layout: str = ""
     # Half the sample interval of each quantity's source: how far a value may lie from its time [s]
     join_s: dict[str, float] = field(default_factory=dict)
+    # Controller's demand: thrust (N,) and roll to the right, nose up, yaw to the right (N, 3), shares of full [1]
+    thrust: Array | None = None
+    torque: Array | None = None
+    vibe: Array | None = None  # (N, 3) Vibration that the autopilot states, root mean square of each axis [m/s2]
+    stated_rotors: int = 0  # Rotors by the parameters, for a log without motors
+    mixed: str = ""  # Messages whose demands make up the commands, where no output of a motor was logged
+    date: str = ""  # Day of the flight by the clock of the log, YYYY-MM-DD; may be empty
+    parameters: dict[str, float] = field(default_factory=dict)  # Of the autopilot, those of its thrust curve
     ends: str = ""  # Where a damaged log ends; empty for a whole one
+    sensors: tuple[SpeedSensor, ...] = ()  # Speed sensors at fault, whose columns of `rpm` are repaired
 
     @property
     def rotors(self) -> int:
         """Number of rotors."""
         drive = self.command if self.command is not None else self.rpm
         return 0 if drive is None else drive.shape[1]
+
+    @property
+    def sound(self) -> list[int]:
+        """Rotors (0 is the first) whose speed sensor is not at fault."""
+        return [i for i in range(self.rotors) if i + 1 not in {s.motor for s in self.sensors}]
 
     @property
     def drive(self) -> Array | None:
@@ -71,6 +98,8 @@ class FlightLog:
     def flying(self) -> NDArray[np.bool_]:
         """Samples in the air, (N,): motors on, off the ground where a height is known, without the first moments."""
         drive = self.command if self.command is not None else self.rpm
+        if drive is None and self.thrust is not None:
+            drive = self.thrust[:, None]
         if drive is None:
             return np.zeros(self.t.size, dtype=bool)
         total = np.nan_to_num(drive.sum(axis=1))
@@ -118,7 +147,7 @@ class Stretches(Generic[T]):
 
 
 def joined(
-    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: str
+    file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: Any
 ) -> FlightLog:
     """Put sources (times, values) with clocks of their own on one time base, linearly; units as in :class:`FlightLog`.
 

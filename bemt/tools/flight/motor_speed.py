@@ -24,7 +24,7 @@ degrees of freedom it counts as, and the exponent with its uncertainty (an assum
 def speed_changes(log: FlightLog, healthy: Sequence[FlightLog]) -> tuple[tuple[int, float], ...]:
     """Motors (0 is the first) that turn faster or slower at their drive than in healthy flights, by what share [1].
 
-    Empty without speeds and commands in all logs.
+    Empty without speeds and commands in all logs. A speed that was repaired accuses no motor.
     """
     from scipy import stats
 
@@ -39,7 +39,8 @@ def speed_changes(log: FlightLog, healthy: Sequence[FlightLog]) -> tuple[tuple[i
     change, moved = mine[0] - past.mean(axis=0), mine[1] - commands.mean(axis=0)
     bar = float(stats.t.ppf(1.0 - GATE / (2 * B), free))
     sd = np.sqrt(square + (_U_EXPONENT * moved) ** 2)
-    return tuple((k, float(change[k])) for k in range(B) if abs(change[k]) > bar * sd[k])
+    repaired = {s.motor - 1 for one in (log, *healthy) for s in one.sensors}
+    return tuple((k, float(change[k])) for k in range(B) if abs(change[k]) > bar * sd[k] and k not in repaired)
 
 
 def _reading(log: FlightLog) -> tuple[Array, Array] | None:

@@ -1,1 +1,3 @@
-"""What this tool offers to the house (:mod:`bemt.base.plugins`)."""
+"""What flight logs offer to the house (:mod:`bemt.base.plugins`)."""
+
+ACTIONS = {"fly": "bemt.tools.flight.actions:fly"}

@@ -31,7 +31,8 @@ def flight_picture(answer: FlightAnswer, mass_kg: float | None = None) -> bytes:
         _flow(axes[0, 1], answer)
         _drives(axes[1, 0], answer)
         _balance(axes[1, 1], answer)
-        title = f"{answer.log.format}, {answer.log.rotors} rotors\n{textwrap.fill(headline(answer.judged), 88)}"
+        rotors = f"{answer.log.rotors} rotors" if answer.log.rotors else "no output of a motor"
+        title = f"{answer.log.format}, {rotors}\n{textwrap.fill(headline(answer.judged), 88)}"
         figure.suptitle(title, fontsize=11.0)
         return canvas.png(figure, dpi=130)
 

@@ -12,6 +12,7 @@ import contextlib
 import io
 import re
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,14 +20,16 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.tools.flight.layout import LAYOUTS, layout_text
+from bemt.tools.flight.layout import LAYOUTS, layout_of, layout_text, mixed
 from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
-           "vehicle_local_position", "battery_status", "sensor_accel_fifo"]  # fmt: skip
+           "vehicle_local_position", "battery_status", "sensor_accel_fifo", "actuator_controls_0",
+           "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "vehicle_gps_position", "sensor_gps"]  # fmt: skip
 _LONG, _STRETCH = 1 << 26, 16_384  # size from which a log is reduced first [bytes]; samples of a stretch
 _AIRFRAMES = {5: "quad-plus", 6: "hexa-x", 7: "hexa-plus", 8: "octo-x", 9: "octo-plus", 12: "x8"}  # by thousands
+_X = float(np.sqrt(0.5))
 _AXIS = np.array([-1.0, 1.0, 1.0])  # the thrust is along -z of the body; NED to north-west-up
 _FLIP = np.array([1.0, -1.0, -1.0])  # forward-right-down to forward-left-up; north-east-down to north-west-up
 
@@ -106,12 +109,20 @@ def _made(name: str, found: Any) -> FlightLog:
 
     params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
     command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
+    demanded = command is not None
     if command is None:
         there = _numbered(tables, "actuator_outputs", "output")
         command, unit = _active(take("actuator_outputs", _assigned(params, there) or there)), "us"
         low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
         if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
             command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
+    thrust, torque, said = *_demand(take), ""
+    if command is None and thrust is not None and torque is not None:
+        # The older mixers scale each geometry in a way of its own; that of four rotors is known.
+        placed = layout_of(_layout(params, 4), 4) if "actuator_controls_0" in tables else None
+        if placed is not None and params.get("CA_ROTOR_COUNT", 4.0) == 4.0:
+            command, unit = (thrust[0], mixed(placed, thrust[1], torque[1], (_X, _X, 1.0))), "1"
+            said = "actuator_controls_0"
     B = command[1].shape[1] if command else 0
     escs = _escs(tables.get("esc_status", {}), B)
     speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in escs])
@@ -140,13 +151,47 @@ def _made(name: str, found: Any) -> FlightLog:
         "position": (xyz[0], xyz[1] * _FLIP) if xyz else None,
         "voltage": (volt[0], volt[1][:, 0]) if volt else None,
         "battery_current": (amp[0], amp[1][:, 0]) if amp else None,
+        "thrust": thrust,
+        "torque": torque,
     }
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
     layout = _layout(params, B)
-    main = "command" if command else "rpm" if speeds else "acceleration"
+    main = "command" if command else "rpm" if speeds else "acceleration" if acc else "thrust"
     raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
-    return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends)
+    kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
+    kept |= {"demanded": 1.0} if demanded else {}
+    return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends, mixed=said,
+                  date=_date(take), parameters=kept, stated_rotors=_stated(params))  # fmt: skip
+
+
+def _demand(take: Callable[[str, list[str]], Source | None]) -> tuple[Source | None, Source | None]:
+    """Thrust and torque demanded, shares of full: thrust along the axis, torque in roll, pitch and yaw."""
+    both = take("actuator_controls_0", [f"control[{i}]" for i in range(4)])
+    if both is not None:
+        return (both[0], both[1][:, 3]), (both[0], both[1][:, :3])
+    xyz = [f"xyz[{i}]" for i in range(3)]
+    thrust, torque = take("vehicle_thrust_setpoint", xyz), take("vehicle_torque_setpoint", xyz)
+    return (thrust[0], -thrust[1][:, 2]) if thrust else None, torque
+
+
+def _date(take: Callable[[str, list[str]], Source | None]) -> str:
+    """Day by the satellites, or nothing."""
+    for topic in ("vehicle_gps_position", "sensor_gps"):
+        found = take(topic, ["time_utc_usec"])
+        seconds = 1e-6 * found[1][found[1] > 1e15] if found is not None else np.zeros(0)
+        if seconds.size and seconds[0] < 1e11:
+            return str(np.datetime64(int(seconds[0]), "s"))[:10]
+    return ""
+
+
+def _stated(params: dict[str, float]) -> int:
+    """Rotors by the parameters."""
+    count, frame = params.get("CA_ROTOR_COUNT", 0.0), params.get("SYS_AUTOSTART", 0.0)
+    if 0.0 < count < 13.0:
+        return int(count)
+    usual = _AIRFRAMES.get(int(frame // 1000), "px4-x" if frame // 1000 == 4 else "") if np.isfinite(frame) else ""
+    return len(LAYOUTS[usual].split()) if usual else 0
 
 
 def _assigned(params: dict[str, float], there: list[str]) -> list[str]:

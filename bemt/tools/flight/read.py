@@ -2,30 +2,99 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import tempfile
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.tools.flight import ardupilot, crazyflie, px4, table
 from bemt.tools.flight.log import FlightLog
 
+MAX_BYTES = 1 << 29
+"""Largest log that is unpacked. [bytes]"""
 _READERS = (crazyflie, px4, ardupilot, table)
+_BLOCK = 1 << 16
+_BETAFLIGHT = b"H Product:Blackbox"
 
 
 def read_log(path: str | os.PathLike[str]) -> FlightLog:
-    """Read a flight log by its content: Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV.
+    """Read a flight log by its content, gzipped or not.
 
-    InputError for a file that is no flight log, or damaged before its first twenty samples.
+    Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV. InputError for a file that is no flight log,
+    damaged before its first twenty samples, or larger than :data:`MAX_BYTES` once unpacked.
     """
+    name = os.fspath(path)
     if Path(path).is_dir():
-        raise InputError(Fault(os.fspath(path), "", "a folder", "one flight log", "Name the file in it"))
+        raise InputError(Fault(name, "", "a folder", "one flight log", "Name the file in it"))
     try:
         with Path(path).open("rb") as file:
             head = file.read(4096)
-        reader = next((r for r in _READERS if r.sniff(head)), None)
-        if reader is None:
-            raise InputError(Fault(os.fspath(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
-        found: FlightLog = reader.read(Path(path))
-        return found
+        if head[:2] != b"\x1f\x8b":
+            return _read(Path(path), head)
+        with tempfile.TemporaryDirectory() as folder:
+            inside = Path(folder) / "log"
+            data, damage = _gunzip(Path(path).read_bytes(), name)
+            inside.write_bytes(data)
+            head = data[:4096]
+            del data
+            try:
+                found = _read(inside, head)
+            except InputError as error:
+                raise InputError([replace(f, file=name) for f in error.faults]) from error
+        ends = f"damaged gzip ({damage}); read as far as it goes" if damage else found.ends
+        return replace(found, file=name, ends=ends)
     except OSError as error:
         raise InputError(system_fault(error)) from error
+
+
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """Format of a file that only this tool reads (ULog, DataFlash, Betaflight's own, packed or not); empty for others.
+
+    So that whoever meets such a file can hand it over.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(1 << 16)
+    except OSError:
+        return ""
+    if head[:2] == b"\x1f\x8b":
+        with contextlib.suppress(zlib.error):
+            head = zlib.decompressobj(31).decompress(head, 4096)
+    if head.startswith(_BETAFLIGHT):
+        return "Betaflight blackbox"
+    return next((r.KIND for r in (px4, ardupilot) if r.sniff(head)), "")
+
+
+def _read(path: Path, head: bytes) -> FlightLog:
+    if head.startswith(_BETAFLIGHT):
+        hint = f"Decode it: blackbox_decode {path.name} (or Blackbox Explorer, Export CSV), then fly the CSV"
+        raise InputError(Fault(str(path), "", "a Betaflight log as the flight controller packs it", "its CSV", hint))
+    reader = next((r for r in _READERS if r.sniff(head)), None)
+    if reader is None:
+        raise InputError(Fault(str(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
+    found: FlightLog = reader.read(path)
+    return found
+
+
+def _gunzip(raw: bytes, name: str) -> tuple[bytes, str]:
+    """What can be unpacked, and what is damaged; InputError beyond the limit."""
+    out, at, view = bytearray(), 0, memoryview(raw)
+    try:
+        while at < len(raw) and (at == 0 or bytes(view[at : at + 2]) == b"\x1f\x8b"):
+            stream = zlib.decompressobj(31)
+            while not stream.eof:
+                block = view[at : at + _BLOCK]
+                some = stream.decompress(block, _BLOCK)
+                out += some
+                at += len(block) - len(stream.unconsumed_tail) - len(stream.unused_data)
+                if len(out) > MAX_BYTES:
+                    got, expected = f"more than {MAX_BYTES >> 20} MB, unpacked", f"at most {MAX_BYTES >> 20} MB"
+                    raise InputError(Fault(name, "", got, expected, "Unpack it, and give the log itself"))
+                if not block and not some:
+                    return bytes(out), "it ends early"
+    except zlib.error as error:
+        return bytes(out), str(error)
+    return bytes(out), ""

@@ -33,7 +33,7 @@ def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Ident
         c = flight.constants.get("thrust constant")
         if c is None or c.unit != "N/rpm^2":
             got = "no speeds of the rotors" if c is None else "no mass"
-            faults.append(Fault(file, "", f"{got}, so no thrust", "a flight with rotor speeds, and --mass"))
+            faults.append(Fault(file, "", f"{got}, so no thrust", "a flight with rotor speeds, and --mass-kg"))
             continue
         k.append(c.value)
         own.append(c.half / c.value / 2.0)

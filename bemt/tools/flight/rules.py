@@ -12,7 +12,7 @@ from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.diagnose.rule import Rule
 from bemt.judge.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, LIKE, MOST, NAMED, NEAR, RARE, SMALL, SURE
 from bemt.judge.diagnose.verdict import BESIDE_IT, Decision, credible_sets
-from bemt.tools.flight.balance import BLADE, WEIGHT, blade
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, blade
 from bemt.tools.flight.change import FlightChange
 
 __all__ = ["BUILD", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery"]
@@ -20,6 +20,7 @@ __all__ = ["BUILD", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "Fl
 BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 IN_FLIGHT = "a change within the flight"
 """Rule whose size is that of the change, not of the whole flight."""
+_EVEN = 0.5  # probability from which another day is the reason [1]
 _LEAST = 3  # healthy flights from which a cause is named
 _POSITIVE = 1.0  # log odds from which evidence is positive (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995) [1]
 
@@ -76,10 +77,12 @@ class FlightQuery:
     @property
     def leading(self) -> Explanation:
         """Likeliest listed explanation; a pair only where it earned its second member."""
+        day = Explanation.of(DAY)
         first = max(self.found, key=lambda e: self.P[e])
-        single = max((e for e in self.found if not e.pair), key=lambda e: self.P[e])
+        single = max((e for e in self.found if not e.pair and e != day), key=lambda e: self.P[e])
         earned = first.pair and self.log_bayes[first] - self.log_bayes[single] >= EARNED
-        return first if earned else single
+        lead = first if earned else single
+        return day if self.P.get(day, 0.0) > self.P[lead] else lead
 
     @property
     def same(self) -> tuple[Explanation, ...]:
@@ -152,6 +155,17 @@ def _few(a: FlightQuery) -> Decision | None:
     why = "more than healthy vehicles show; three or more healthy flights of this one (--healthy) would tell"
     left = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading] > LEFT_OVER
     return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
+
+
+def _day(a: FlightQuery) -> Decision | None:
+    """Declared: what days do to a trim is no fault, and only a flight of the same day tells."""
+    day = Explanation.of(DAY)
+    if a.leading != day:
+        return None
+    why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
+    if a.P[day] < _EVEN:
+        why = "more than one rotor or weight, or another day, would do this; healthy flights of the same day would tell"
+    return a.says("insufficient", why)
 
 
 def _rest(a: FlightQuery) -> Decision | None:
@@ -269,6 +283,7 @@ RULES: list[Rule] = [
     Rule("healthy flights look like it", _within, "GATE"),
     Rule("too few healthy flights", _few_and_within, "GATE"),
     Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
+    Rule("days differ", _day),
     Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
     Rule(BESIDE_IT, _another, "NAMED, LIKE, MOST"),
     Rule("one is sure", _one, "NAMED"),

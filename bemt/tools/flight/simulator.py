@@ -62,15 +62,16 @@ def motor_lag(log: FlightLog) -> Constant | None:
     """
     from scipy.optimize import minimize_scalar
 
-    if log.rpm is None or log.command is None:
+    if log.rpm is None or log.command is None or not log.sound:
         return None
     on = np.flatnonzero(log.flying)
     if on.size < 50 * BATCHES:
         return None
     # From the first sample in flight to the last: a lag needs unbroken time.
     whole = slice(on[0], on[-1] + 1)
-    t, rpm = log.t[whole], log.rpm[whole]
+    t, rpm = log.t[whole], log.rpm[whole][:, log.sound]
     drive = log.command[whole] if log.voltage is None else log.command[whole] * log.voltage[whole, None]
+    drive = drive[:, log.sound]
     step = float(np.median(np.diff(t)))
     if np.ptp(drive) == 0.0 or not step > 0.0:
         return None

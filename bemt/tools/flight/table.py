@@ -7,11 +7,8 @@ used only with a row motor_poles before the headings, accSmooth with acc_1G.
 
 from __future__ import annotations
 
-import gzip
-import io
 import json
 import re
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -30,13 +27,18 @@ KIND = "CSV"
 
 
 def sniff(head: bytes) -> bool:
-    """Whether it is gzip or begins as text."""
-    return head[:2] == b"\x1f\x8b" or (bool(head) and b"\0" not in head)
+    """Whether it begins as text."""
+    return bool(head) and b"\0" not in head
 
 
-_CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time")
-_USED = re.compile(r"t|t_s|time|p|v|R|w|fa|pwm|(motor|pwm|rpm|acc|gyro|pm|stateEstimate)\..+|(vbat|amperage)(Latest)?"
+_CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time", "time_s", "timestamp")
+_USED = re.compile(r"t|t_s|time|time_s|timestamp|p|v|R|w|fa|pwm"
+                   r"|(motor|pwm|rpm|acc|gyro|pm|stateEstimate|controller)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
+_SPEED = re.compile(r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?"
+                    r"|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm", re.IGNORECASE)
+"""Headings of the speed of one rotor: rpm1, rpm_1, motor_1_rpm, esc.rpm[0]."""
+_CLOCK = r"\btime\b|\btime_s\b|\bt\b|\bt_s\b|loopIteration|\btimestamp\b"
 _HEAD_BYTES = 1 << 18  # within which the headings stand
 _ROWS = 20_000  # of a piece
 
@@ -48,22 +50,14 @@ def read(path: Path) -> FlightLog:
     name, ends = str(path), ""
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
-    source: Path | io.BytesIO = path
-    if head[:2] == b"\x1f\x8b":
-        raw = path.read_bytes()
-        try:
-            raw = gzip.decompress(raw)
-        except (OSError, EOFError, zlib.error):
-            raw, ends = _partly(raw), "damaged gzip; read as far as it goes"
-        source, head = io.BytesIO(raw), raw[:_HEAD_BYTES]
     lines = head.decode("utf-8", errors="replace").split("\n")
-    start = next((k for k, line in enumerate(lines[:400]) if re.search(r"\btime\b|\bt\b|\bt_s\b|loopIteration", line)
-                  and re.search(r"motor\[|motor\.|pwm|rpm", line)), None)  # fmt: skip
+    start = next((k for k, line in enumerate(lines[:400]) if re.search(_CLOCK, line)
+                  and re.search(r"motor\[|motor\.|pwm|rpm|controller\.cmd", line, re.IGNORECASE)), None)  # fmt: skip
     if start is None:
         raise InputError(Fault(name, "", "no row of headings with a time and motors", "a flight log"))
     said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?(\w+)"?,"?([^"]*)"?\s*$', line))}
     try:
-        with path.open("rb") if isinstance(source, Path) else source as rows:
+        with path.open("rb") as rows:
             for _ in range(start):
                 rows.readline()
             frame = _frame(rows)
@@ -71,13 +65,16 @@ def read(path: Path) -> FlightLog:
         raise InputError(Fault(name, "", f"a damaged table ({error})", "rows of equal length")) from error
     if {"pwm", "v", "R", "t"} <= set(frame.columns):
         return _cells(name, frame, ends)
-    if "t_s" in frame and any(c.startswith(("motor.m", "pwm.m")) for c in frame.columns):
+    clock = next((c for c in ("t_s", "timestamp") if c in frame), "")
+    if clock and any(c.startswith(("motor.m", "pwm.m", "rpm.m", "controller.cmd")) for c in frame.columns):
         numbers = frame.apply(pd.to_numeric, errors="coerce").dropna()
-        t = numbers["t_s"].to_numpy(float)
-        columns = {c: (t, numbers[c].to_numpy(float)) for c in numbers.columns if c != "t_s"}
+        t = numbers[clock].to_numpy(float) * (1.0 if clock == "t_s" else 1e-3)  # CrazyPAD's stamps are in ms
+        columns = {c: (t, numbers[c].to_numpy(float)) for c in numbers.columns if c != clock}
         return crazyflie.from_columns(name, "Crazyflie CSV", columns, ends)
-    if any(c.startswith("motor[") for c in frame.columns):
+    if any(c.startswith(("motor[", "eRPM[")) for c in frame.columns):
         return _betaflight(name, frame, said, ends)
+    if any(_SPEED.fullmatch(c) for c in frame.columns):
+        return _speeds(name, frame, ends)
     raise InputError(Fault(name, "", "unknown headings", "Betaflight, Crazyflie, or t, v, R, pwm"))
 
 
@@ -92,7 +89,7 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
 
     kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
     pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
-                         usecols=lambda c: bool(_USED.fullmatch(_label(str(c)))))  # fmt: skip
+                         usecols=lambda c: any(p.fullmatch(_label(str(c))) for p in (_USED, _SPEED)))  # fmt: skip
     for piece in pieces:
         piece.columns = [_label(str(c)) for c in piece.columns]
         for c in piece.columns:
@@ -101,17 +98,6 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
                 piece[c] = numbers if c in _TIMES else numbers.astype(np.float32)
         kept.add(piece)
     return pd.concat(kept.parts, ignore_index=True)
-
-
-def _partly(raw: bytes) -> bytes:
-    """What of a damaged gzip can be unpacked."""
-    stream, out = zlib.decompressobj(31), bytearray()
-    try:
-        for k in range(0, len(raw), 256):
-            out += stream.decompress(raw[k : k + 256])
-    except zlib.error:
-        pass
-    return bytes(out)
 
 
 def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
@@ -151,6 +137,20 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
     return joined(name, "CSV of arrays", sources, "command", command_unit="pwm", ends=ends)
 
 
+def _speeds(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
+    """A table of time and speeds alone: hovering gives the thrust constant."""
+    clock = next((c for c in _TIMES if c in frame), None)
+    if clock is None:
+        raise InputError(Fault(name, "", "no column of time", "t_s, time or timestamp"))
+    number = {c: int(m[1] or m[2]) for c in frame.columns if (m := _SPEED.fullmatch(c))}
+    t = frame[clock].to_numpy(float)
+    step = float(np.nanmedian(np.diff(t))) if t.size > 1 else 1.0
+    # Names of clocks do not state their unit: logs of flights are taken 2 to 20,000 times a second.
+    scale = 1.0 if step < 0.5 else 1e-3 if step < 500.0 else 1e-6
+    rpm = frame[sorted(number, key=lambda c: number[c])].to_numpy(float)
+    return joined(name, "CSV of speeds", {"rpm": (scale * t, rpm)}, "rpm", ends=ends)
+
+
 def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: str) -> FlightLog:
     if "time" not in numbers:
         raise InputError(Fault(name, "time", "no such column", "time in us", "Decode with blackbox_decode"))
@@ -181,7 +181,8 @@ def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: st
     layout = f"betaflight-x{turned}" if B == 4 else ""
     raw = unfiltered or gyro
     raw = raw if raw is not None and raw[1].shape[1] == 3 else None
-    return joined(name, "Betaflight CSV", sources, "command", raw=raw, raw_unit="rad/s", layout=layout, ends=ends)
+    main = "command" if command else "rpm"
+    return joined(name, "Betaflight CSV", sources, main, raw=raw, raw_unit="rad/s", layout=layout, ends=ends)
 
 
 def _number(text: str | None) -> float:

@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bemt.judge.diagnose.verdict import BESIDE_IT, Decision
 from bemt.tools.flight.answer import FlightAnswer
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
+from bemt.tools.flight.log import SpeedSensor
 from bemt.tools.flight.rules import IN_FLIGHT
+from bemt.tools.flight.vibration import Vibration
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
+_HIGH = 30.0  # vibration up to which an autopilot does well (ArduPilot, Measuring Vibration; not checked) [m/s2]
 
 
-def text(a: FlightAnswer) -> str:
-    """One screen."""
+def text(a: FlightAnswer, details: bool = False) -> str:
+    """Three lines for the pilot, what this flight shows, and with `details` the constants."""
     log, j = a.log, a.judged
-    seconds = log.flying.mean() * np.ptp(log.t)
-    lines = [f"{log.file}: {log.format}, {log.rotors} rotors, {seconds:.1f} s in the air"]
+    lines = [*pilot(a), ""]
+    if log.rotors:
+        seconds = log.flying.mean() * np.ptp(log.t)
+        lines.append(f"{log.file}: {log.format}, {log.rotors} rotors, {seconds:.1f} s in the air")
+    else:
+        count = f"{log.stated_rotors} rotors by its parameters, " if log.stated_rotors else ""
+        lines.append(f"{log.file}: {log.format}, {count}{np.ptp(log.t):.1f} s, no output of a motor")
     if log.ends:
         lines.append(f"  {log.ends}")
-    lines += ["", f"{headline(j)}: {j.said.why}."]
+    if log.mixed:
+        lines.append(f"  No output of a motor was logged: its commands follow from the demands in {log.mixed}.")
+    lines.append(f"  {headline(j)}: {j.said.why}.")
     if j.healthy:
         low, high = j.rate95
-        lines.append(
-            f"  Error rate: {j.accused} of {j.healthy} healthy flights accused when each is judged by the others "
-            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)."
-        )
+        by = f"by the other sessions of {j.sessions}" if j.sessions > 1 else "by the others"
+        lines.append(f"  Error rate: {j.accused} of {j.healthy} healthy flights accused when each is judged {by} "
+                     f"(95 %: {100 * low:.0f} to {100 * high:.0f} %).")  # fmt: skip
+    if j.given and j.sessions < 2:
+        lines.append("  The healthy flights are one session for all that is known: what changes from day to day "
+                     "(1.2 to 3.1 % of a rotor's drive, other vehicles) they do not show.")  # fmt: skip
     if np.isfinite(j.visible):
         against = "against these healthy flights" if j.given else "without healthy flights of this vehicle"
         lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
@@ -36,9 +51,14 @@ def text(a: FlightAnswer) -> str:
         lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
                      f"±{100 * j.total_half:.1f} %): weight at the centre, battery, air, or damaged "
                      "rotors that balance each other.")  # fmt: skip
-    lines += [f"  Next: {j.next.text}."] if j.next.text else []
     lines += _seen(a)
-    lines += ["", "Identified (± 95 %)"] if a.found.constants else []
+    lines += _details(a) if details else ["", "Constants, and what the log cannot show: --details, --json."]
+    return "\n".join(lines)
+
+
+def _details(a: FlightAnswer) -> list[str]:
+    """Constants, and what is missing."""
+    lines = ["", "Identified (± 95 %)"] if a.found.constants else []
     lines += [f"  {name:<34} {_number(c)}" for name, c in a.found.constants.items()]
     lines += [f"  {name:<34} {', '.join(_figures(v, 4) for v in values)}" for name, values in a.found.rotors.items()]
     if a.mass is not None:
@@ -47,12 +67,95 @@ def text(a: FlightAnswer) -> str:
         k, u = a.predicted.constant, a.predicted.u
         lines.append(f"  {'thrust constant of the case':<34} {k:.4g} ± {2 * u:.2g} N/rpm^2 (two standard deviations)")
     lines += _flow(a)
+    if a.curve:
+        lines += ["", "For the autopilot (± 95 %)"]
+        lines += [f"  {name:<34} {_number(c)}" for name, c in a.curve.items()]
     if a.simulator:
         lines += ["", "For a simulator (± 95 %; thrust: of another flight of this vehicle)"]
         lines += [f"  {name:<34} {_number(c)}" for name, c in a.simulator.items()]
     lines += ["", "Not visible here"] if a.unseen else []
-    lines += [f"  {u}" for u in a.unseen]
-    return "\n".join(lines)
+    return lines + [f"  {u}" for u in a.unseen]
+
+
+def pilot(a: FlightAnswer) -> list[str]:
+    """Where to look, what else is certain or how small a damage would show, and the next step."""
+    j, log = a.judged, a.log
+    second = [f"{sensor_text(s)}: look at the sensor. Its readings were repaired." for s in log.sensors]
+    shake = a.vibration
+    if not second and not log.rotors:
+        second = [_level(shake) or "Nothing else in it tells of the motors."]
+    if not second and j.said.verdict == "none" and np.isfinite(j.visible):
+        second = [f"Damage shows here once it changes a rotor's drive by {100 * j.visible:.0f} %."]
+    if not second and j.given and a.days.day == "" and j.said.verdict != "insufficient":
+        second = ["Of the same day as the healthy flights? Say so (--healthy-day): days move the drives by 1 to 3 %."]
+    if not second and (level := _level(shake)):
+        second = [level]
+    if not second:
+        second = [f"{headline(j)}: {j.said.why}."]
+    return [_look(a), " ".join(second), f"Next: {j.next.text or 'nothing'}."]
+
+
+def _look(a: FlightAnswer) -> str:
+    """What is wrong, in a sentence of a mechanic."""
+    j, said = a.judged, a.judged.said
+    others = "in the healthy flights" if j.given else "the others"
+    if said.verdict == "none":
+        return "Nothing to look at: the motors share the work as in the healthy flights."
+    if not said.effects:
+        why = said.why[:1].upper() + said.why[1:]
+        known = said.verdict != "unknown"
+        return f"No verdict: {said.why}." if known else f"{why}: check arms, motor tilt and propellers."
+    first, rest = said.effects[0], [i for i in said.effects[1:]]
+    found = j.found.get(said.leading)
+    motors = sorted({int(i.removeprefix(BLADE)) for i in said.effects if i.removeprefix(BLADE).isdigit()})
+    if first.startswith("imbalance"):
+        return f"Look at {first.rpartition(', ')[2]}: it shakes more than in the healthy flights. Tape, dirt or a " \
+               "damaged blade would do this."  # fmt: skip
+    if first.startswith("weak motor"):
+        return f"Look at {first.rpartition(', ')[2]}: it turns slower than its command. A weak motor, bearing or " \
+               "controller would do this."  # fmt: skip
+    if first == WIND or first == DAY or not (first.startswith((BLADE, WEIGHT))):
+        return f"No motor stands out: {_alternatives(said.effects)} would do this."
+    size = ""
+    if found is not None and found.size and np.isfinite(found.half) and said.rule != IN_FLIGHT:
+        size = f"{100 * found.size:.0f} ± {100 * found.half:.0f} % "
+    if a.change is not None and said.rule == IN_FLIGHT:
+        size, others = f"{100 * a.change.size:.0f} ± {100 * a.change.half:.0f} % ", "before"
+        others += f" {a.change.at_s:.1f} s" if np.isfinite(a.change.at_s) else ""
+    if first.startswith(BLADE) and said.leading.pair and len(motors) > 1:
+        names = " and ".join(map(str, motors[:2])) if len(motors) == 2 else ", ".join(map(str, motors))
+        return f"Look at motors {names}: they work {size}or more harder than {others}. Damaged blades would do this."
+    if first.startswith(BLADE):
+        k = first.removeprefix(BLADE)
+        same = ["a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
+        what = _alternatives(["a damaged blade", *same])
+        return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
+    where = first.removeprefix(WEIGHT)
+    more = f" {_alternatives(rest)} would do the same." if rest else ""
+    return f"Look where battery and payload sit: the load moved {where.replace('near', 'towards')}." + \
+           (more[:1] + more[1:2].upper() + more[2:] if more else "")  # fmt: skip
+
+
+def _alternatives(names: Sequence[str]) -> str:
+    """Causes in a row, each motor once said."""
+    words = [i if i.startswith(("a ", "an ", "flights", "another", "wind", "imbalance", "weak")) else f"a {i}"
+             for i in (n.replace(", motor ", " at motor ") for n in names)]  # fmt: skip
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+def _level(shake: Vibration) -> str:
+    """Vibration with its number."""
+    if shake.stated:
+        x, y, z = shake.rms
+        fine = "below 30, which ArduPilot calls acceptable" if max(shake.rms) < _HIGH else "above the acceptable 30"
+        return f"Vibration (VIBE) {x:.2g}, {y:.2g}, {z:.2g} m/s2 in x, y, z: {fine}."
+    if not np.isfinite(shake.line) or shake.unit != "m/s2" or not shake.rms:
+        return ""
+    total = float(np.linalg.norm(shake.rms))
+    high = f"Vibration is high: {total:.2g} m/s2 above 20 Hz" if total > _HIGH else f"Vibration {total:.2g} m/s2"
+    known = np.isfinite(shake.shaft_hz)
+    what = "once a turn" if known else "in the spectrum: likely once a turn; no speed was logged to know"
+    return f"{high}, strongest at {shake.line_hz:.0f} Hz ({what})."
 
 
 def _seen(answer: FlightAnswer) -> list[str]:
@@ -71,6 +174,8 @@ def _seen(answer: FlightAnswer) -> list[str]:
     full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(answer.limited) if v > _OFTEN]
     if full:
         lines.append(f"  At full command: {', '.join(full)} of the time.")
+    for s in answer.log.sensors:
+        lines.append(f"  {sensor_text(s)}; repaired to ± {200 * s.u:.1f} % before any constant was fitted.")
     c, shake = answer.change, answer.vibration
     if c is not None and answer.judged.said.rule != IN_FLIGHT:
         when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
@@ -84,11 +189,26 @@ def _seen(answer: FlightAnswer) -> list[str]:
         who = f"Motor {k + 1} shakes" if k >= 0 else "The rotors together shake"
         lines.append(f"  {who} {ratio:.1f} times as much as {against} at the shaft frequency: "
                      "imbalance, tape or a damaged blade.")  # fmt: skip
+    if answer.demand:
+        roll, pitch, yaw, near = (100 * v for v in answer.demand)
+        spin = f"; yaw beyond half of full for {near:.1f} % of the time" if near > 0.5 else ""
+        lines.append(f"  The controller asks for {roll:+.1f} % of full roll, {pitch:+.1f} % pitch, {yaw:+.1f} % yaw "
+                     f"(right, nose up, right; trim){spin}.")  # fmt: skip
     heard = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.amplitude) if np.isfinite(v)]
     if heard:
         lines.append(f"  Vibration once a turn ({shake.shaft_hz:.0f} Hz): {', '.join(heard)} {shake.unit}.")
+        both = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.blade) if np.isfinite(v)]
+        lines += [f"  Vibration twice a turn: {', '.join(both)} {shake.unit}."] if both else []
     elif np.isfinite(shake.line):
-        lines.append(f"  Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz.")
+        known = np.isfinite(shake.shaft_hz)
+        seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
+        where = "once a turn" if known else seen
+        lines.append(f"  Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where}).")
+        if np.isfinite(shake.twice):
+            lines.append(f"  At twice that: {shake.twice:.2g} {shake.unit}.")
+    if shake.rms and np.isfinite(shake.rms[0]):
+        said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
+        lines.append(f"  Vibration {said}: {', '.join(f'{v:.2g}' for v in shake.rms)} {shake.unit} in x, y, z.")
     if np.isfinite(answer.wind.speed):
         w = answer.wind
         seen = "Wind" if w.speed > w.half else "No wind seen:"
@@ -120,6 +240,20 @@ def _flow(a: FlightAnswer) -> list[str]:
             what = f"{100 * got[0]:+.1f} ± {100 * got[1]:.1f} % at equal speed of the rotors{more}"
             lines.append(f"  {name.format(at):<34} {what}")
     return lines
+
+
+def sensor_text(s: SpeedSensor) -> str:
+    """What is wrong with a speed sensor."""
+    parts = []
+    if s.count:
+        parts.append(f"reads {s.ratio:.2f} of the speed, as if it saw {s.count.replace('/', ' blade of ')}")
+    elif s.ratio == 0.0:
+        parts.append("reads no speed")
+    elif abs(s.ratio - 1.0) > 0.1:
+        parts.append(f"reads {s.ratio:.2f} of the speed")
+    if s.lost > _OFTEN:
+        parts.append(f"drops out in {100 * s.lost:.0f} % of the flight")
+    return f"The speed sensor of motor {s.motor} {' and '.join(parts)}"
 
 
 def _number(c: Constant) -> str:

@@ -12,7 +12,7 @@ Without speeds the strongest line between 20 Hz and the Nyquist frequency is tol
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,11 +42,23 @@ class Vibration:
     # Strongest line above 20 Hz and its amplitude, for a log without speeds [Hz, `unit`]
     line_hz: float = float("nan")
     line: float = float("nan")
+    twice: float = float("nan")  # At twice that line; NaN above the Nyquist frequency [`unit`]
+    rms: tuple[float, ...] = ()  # Of each axis above 20 Hz; or as the autopilot states it, in flight [`unit`]
+    stated: bool = False  # Whether the autopilot states it (VIBE)
     unit: str = "m/s2"  # m/s2, or rad/s of a gyro
     missing: str = ""  # What the log cannot show, and why
 
 
 def vibration(log: FlightLog) -> Vibration:
+    """Vibration in flight; throughout the log where nobody knows when it flew."""
+    found = _found(log)
+    if log.vibe is None:
+        return found
+    here = log.flying if log.flying.any() else np.ones(log.t.size, dtype=bool)
+    return replace(found, rms=tuple(map(float, log.vibe[here].mean(axis=0))), stated=True)
+
+
+def _found(log: FlightLog) -> Vibration:
     """Amplitudes at the rotors' frequencies in flight, in the unit of the sensor: raw accelerations, or rates.
 
     Rotors are told apart where their speeds are logged.
@@ -75,15 +87,27 @@ def vibration(log: FlightLog) -> Vibration:
         mean = power.mean(axis=0)
         above = np.flatnonzero((f > _LOW_HZ) & (f < nyquist - 2.0 * _SIDE * f[1]))
         peak = int(above[np.argmax(mean[above])])
+        double = 2 * peak
+        seen = double < mean.size - 3 * _SIDE
+        twice_ = _line(mean, double - 2 * _SIDE, double + 2 * _SIDE) if seen else float("nan")
         return Vibration(rate, shaft, line_hz=float(f[peak]), line=_line(mean, peak - _SIDE, peak + _SIDE),
-                         unit=log.raw_unit, missing="which rotor shakes: log the speed of each")  # fmt: skip
+                         twice=twice_, rms=_rms(v, windows, step), unit=log.raw_unit,
+                         missing="which rotor shakes: log the speed of each")  # fmt: skip
     turns = np.stack([np.interp(t, log.t, s) for s in speeds.T], axis=1)
     span = np.array([[turns[w].min(), turns[w].max()] for w in windows]) / f[1]
     total = float(np.mean([_line(p, int(low) - _SIDE, int(high) + 1 + _SIDE) ** 2
                            for p, (low, high) in zip(power, span, strict=True)]))  # fmt: skip
     once, twice, why = _by_rotor(v, t, turns, [_windows(log, t, step, s) for s in _WINDOWS_S], total, rate / shaft)
     return Vibration(rate, shaft, once, twice, line_hz=shaft, line=float(np.sqrt(total)), unit=log.raw_unit,
-                     missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+                     rms=_rms(v, windows, step), missing=f"which rotor shakes: {why}" if why else "")  # fmt: skip
+
+
+def _rms(v: Array, windows: list[slice], step: float) -> tuple[float, ...]:
+    """Root mean square of each axis above 20 Hz."""
+    size = windows[0].stop - windows[0].start
+    high = np.fft.rfftfreq(size, step) > _LOW_HZ
+    squares = [2.0 * np.sum(np.abs(np.fft.rfft(v[w], axis=0)[high]) ** 2, axis=0) / size**2 for w in windows]
+    return tuple(map(float, np.sqrt(np.mean(squares, axis=0))))
 
 
 def _by_rotor(
@@ -122,9 +146,11 @@ def _tracked(v: Array, angle: Array, windows: list[slice], smooth: int) -> Array
         X = np.concatenate([np.cos(angle[w]), np.sin(angle[w])], axis=1)
         y = v[w] - np.stack([np.convolve(c, np.ones(smooth) / smooth, "same") for c in v[w].T], axis=1)
         y, X = y[smooth:-smooth], X[smooth:-smooth]
-        if y.shape[0] < 2 * X.shape[1] or np.linalg.cond(X) > _APART:
+        normal = X.T @ X
+        low, high = np.linalg.eigvalsh(normal)[[0, -1]]
+        if y.shape[0] < 2 * X.shape[1] or not high < _APART**2 * low:
             continue
-        gram = np.linalg.inv(X.T @ X)
+        gram = np.linalg.inv(normal)
         b = gram @ X.T @ y
         noise = np.sum((y - X @ b) ** 2) / max(y.shape[0] - X.shape[1], 1) * np.diag(gram)
         B = angle.shape[1]
@@ -142,7 +168,8 @@ def _windows(log: FlightLog, t: Array, step: float, length: float) -> list[slice
     size = min(int(length / step), int(np.median([r.size for r in runs])))
     if size < 16:
         return []
-    air = np.interp(t, log.t, log.flying.astype(float)) > 0.5
+    flying = log.flying if log.drive is not None or log.thrust is not None else np.ones(log.t.size, dtype=bool)
+    air = np.interp(t, log.t, flying.astype(float)) > 0.5
     out = []
     for run in runs:
         for begin in range(run[0], run[-1] + 2 - size, size):

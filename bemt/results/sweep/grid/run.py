@@ -24,6 +24,7 @@ from bemt.base.tables import plain, write_atomic
 from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.results.sweep.grid.formats import Block, encode, join
+from bemt.results.sweep.rows import Axis, GridResult, Statistics
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import prepared, solve_at
 
@@ -96,7 +97,7 @@ class Grid:
         return -(-self.size // self.chunk)
 
 
-Solved = tuple[int, bytes, dict[str, Any]]
+Solved = tuple[int, bytes, Statistics]
 Engine = Callable[[Case, Grid, Sequence[int], str | None], Generator[Solved]]
 """Solves chunks: (case, grid, numbers, format) to (number, bytes, statistics) in whatever order."""
 
@@ -163,16 +164,18 @@ class GridSolver:
         return Block(axes, columns, np.concatenate([points.converged for points in found]))
 
 
-def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, dict[str, Any]]:
+def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, Statistics]:
     """Bytes and statistics of one chunk."""
     grid = solver.grid
     block = solver.block(np.arange(number * grid.chunk, min((number + 1) * grid.chunk, grid.size)))
     fine = block.converged
-    statistics: dict[str, Any] = {"points": int(fine.size), "unconverged": int((~fine).sum())}
+    ends = []
     for name in STATISTICS:
         good = block.columns[name][np.isfinite(block.columns[name])]
-        statistics[name] = [float(good.min()), float(good.max())] if good.size else [None, None]
-    return b"" if solver.form is None else encode(block, solver.form), plain(statistics)
+        ends.append((float(good.min()), float(good.max())) if good.size else (math.nan, math.nan))
+    statistics = Statistics(int(fine.size), int((~fine).sum()), *ends)
+    told = Statistics.from_document(plain(statistics.document()))
+    return b"" if solver.form is None else encode(block, solver.form), told
 
 
 def _here(threads: int) -> Engine:
@@ -187,12 +190,12 @@ def _here(threads: int) -> Engine:
     return solve
 
 
-def _merge(statistics: list[dict[str, Any]]) -> dict[str, Any]:
-    merged: dict[str, Any] = {key: sum(s[key] for s in statistics) for key in ("points", "unconverged")}
+def _merge(statistics: list[Statistics]) -> Statistics:
+    ends = []
     for name in STATISTICS:
-        pairs = [s[name] for s in statistics if s[name][0] is not None]
-        merged[name] = [min(p[0] for p in pairs), max(p[1] for p in pairs)] if pairs else [None, None]
-    return merged
+        lows, highs = zip(*(getattr(s, name) for s in statistics), strict=True)
+        ends.append((float(np.fmin.reduce(lows)), float(np.fmax.reduce(highs))))
+    return Statistics(sum(s.points for s in statistics), sum(s.unconverged for s in statistics), *ends)
 
 
 def run_grid(
@@ -204,7 +207,7 @@ def run_grid(
     resume: bool = True,
     form: str = "csv",
     engine: Engine | None = None,
-) -> dict[str, Any] | None:
+) -> GridResult | None:
     """Solve the grid of a case."""
     grid = Grid.of(case)
     if grid is None:
@@ -215,13 +218,13 @@ def run_grid(
             if old != parts or not resume:
                 shutil.rmtree(old)
         parts.mkdir(parents=True, exist_ok=True)
-    statistics: dict[int, dict[str, Any]] = {}
+    statistics: dict[int, Statistics] = {}
     done = 0
 
-    def count(number: int, found: dict[str, Any]) -> None:
+    def count(number: int, found: Statistics) -> None:
         nonlocal done
         statistics[number] = found
-        done += found["points"]
+        done += found.points
         if progress is not None:
             progress(done, grid.size)
 
@@ -236,7 +239,8 @@ def run_grid(
             if parts is not None:
                 path = _part(parts, number, form)
                 write_atomic(path, data)
-                record = {"statistics": made, "sha256": _seal(data, made)}
+                told = plain(made.document())
+                record = {"statistics": told, "sha256": _seal(data, told)}
                 write_atomic(path.with_suffix(".json"), json.dumps(record))
             count(number, made)
     digest = None
@@ -245,10 +249,10 @@ def run_grid(
         files = [_part(parts, number, form) for number in range(grid.chunks)]
         digest = join(folder / f"grid.{form}", names, grid.names, files, form)
         shutil.rmtree(parts, ignore_errors=True)
-    axes = {n: {"num": v.size, "min": v.min(), "max": v.max()} for n, v in zip(grid.names, grid.values, strict=True)}
+    axes = {n: Axis(v.size, v.min(), v.max()) for n, v in zip(grid.names, grid.values, strict=True)}
     file = None if folder is None else f"{case.name}/grid.{form}"
     merged = _merge([statistics[number] for number in range(grid.chunks)])
-    return {"axes": axes, **merged, "columns": list(names), "file": file, "sha256": digest}
+    return GridResult(**vars(merged), axes=axes, columns=names, file=file, sha256=digest)
 
 
 def _part(parts: Path, number: int, form: str) -> Path:
@@ -260,13 +264,12 @@ def _seal(data: bytes, statistics: Mapping[str, Any]) -> str:
     return hashlib.sha256(data + json.dumps(statistics).encode()).hexdigest()
 
 
-def _finished(path: Path) -> dict[str, Any] | None:
+def _finished(path: Path) -> Statistics | None:
     """Statistics of a chunk that an earlier run finished, or None when it is not as it was written."""
     try:
         record = json.loads(path.with_suffix(".json").read_text())
-        statistics: dict[str, Any] = record["statistics"]
-        if _seal(path.read_bytes(), statistics) == record["sha256"]:
-            return statistics
+        if _seal(path.read_bytes(), record["statistics"]) == record["sha256"]:
+            return Statistics.from_document(record["statistics"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return None

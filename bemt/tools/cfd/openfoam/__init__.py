@@ -5,7 +5,6 @@ thrust, blade 1 on the x axis.
 """
 
 from bemt.tools.cfd.openfoam.settings import Body, Settings, Sweep, sector_choice
-from bemt.tools.cfd.openfoam.target import OpenfoamExport
 from bemt.tools.cfd.openfoam.write import case_files
 
-__all__ = ["Body", "OpenfoamExport", "Settings", "Sweep", "case_files", "sector_choice"]
+__all__ = ["Body", "Settings", "Sweep", "case_files", "sector_choice"]

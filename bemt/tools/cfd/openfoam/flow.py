@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from bemt.base.foam_text import dictionary, vector
 from bemt.tools.cfd.openfoam.settings import Settings
-from bemt.tools.cfd.openfoam.text import dictionary, vector
 
 CP = 1005.0
 PRANDTL = 0.71

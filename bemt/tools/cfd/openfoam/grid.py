@@ -15,8 +15,8 @@ import itertools
 import math
 from typing import Any
 
+from bemt.base.foam_text import dictionary, vector
 from bemt.tools.cfd.openfoam.settings import PIPE_RADIUS, Settings
-from bemt.tools.cfd.openfoam.text import dictionary, vector
 
 SURFACE_LEVEL = 6
 LINES = "lines.obj"

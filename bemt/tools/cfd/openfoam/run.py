@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from bemt.base.foam_text import dictionary, vector
 from bemt.tools.cfd.openfoam.settings import Settings
-from bemt.tools.cfd.openfoam.text import dictionary, vector
 
 BINS = 24
 """Bins along the radius in which the blade's loads are recorded."""

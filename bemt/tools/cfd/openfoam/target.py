@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
-import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from bemt.tools.exports.base import Files, Job, SolidExport
+from bemt.tools.cfd.openfoam.write import Run, RunTable, write_openfoam
+from bemt.tools.exports.base import Job, SolidExport
 
 
 class OpenfoamExport(SolidExport):
-    """Blades resolved: surfaces, dictionaries and ``Allrun``."""
+    """Blades resolved: surfaces, dictionaries and ``Allrun``; the folder itself becomes the case."""
 
     id = "openfoam"
     title = "OpenFOAM case with resolved blades"
     holds = "shape and an operating point; the flow solver finds the loads"
     conventions = "z along the shaft towards thrust, metres; thrust and torque as in functionObjects of the case"
     source = "OpenFOAM 1912; bemt.tools.cfd.openfoam"
-    uses = frozenset({"rpm", "airspeed_m_s", "sideslip_deg", "level", "domain", "sector", "turbulence", "solver"})
+    options = RunTable
+    uses = frozenset(RunTable.named())
+    turn = 2
 
-    def write(self, job: Job) -> Files:
-        """The whole case."""
-        from bemt.tools.cfd.openfoam.write import Run, write_openfoam
+    def put(self, job: Job, out: Path) -> dict[str, Any]:
+        """The whole case, whose faults come before anything is written."""
+        given = {"rpm": job.rpm, "airspeed_m_s": job.airspeed_m_s, **job.own}
+        run = Run(**{key: value for key, value in given.items() if key in self.uses and value is not None})
+        return write_openfoam(job.case, out, run, job.solid)
 
-        with tempfile.TemporaryDirectory() as folder:
-            home = Path(folder)
-            write_openfoam(job.case, home, Run(rpm=job.rpm, airspeed_m_s=job.airspeed_m_s))
-            return {
-                path.relative_to(home).as_posix(): path.read_bytes()
-                for path in sorted(home.rglob("*"))
-                if path.is_file() and path.name != "manifest.json"
-            }
+    def text(self, part: Mapping[str, Any]) -> list[str]:
+        """How the case is run."""
+        words = f"{part['solver']}, {part['turbulence']}, {part['domain']}, {part['sector']}, level {part['level']:g}"
+        return [f"OpenFOAM case: {words}; run it with ./Allrun", *part["notes"]]

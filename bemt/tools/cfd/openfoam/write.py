@@ -6,24 +6,32 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bemt.base.errors import Fault, InputError, needs
 from bemt.base.tables import write_atomic
-from bemt.base.toml import Table, check_field, entry
+from bemt.base.toml import check_field, entry
 from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case
-from bemt.rotors.case.schema import AIRSPEED, RPM
+from bemt.rotors.case.schema import PointTable
 from bemt.tools.cfd.openfoam.flow import constants, fields, schemes, solution
 from bemt.tools.cfd.openfoam.grid import block_mesh, create_patch, lines, set_fields, snappy, topo_set
 from bemt.tools.cfd.openfoam.run import all_run, control
-from bemt.tools.cfd.openfoam.settings import MACH_COMPRESSIBLE, Body, Settings, Sweep, sector_choice
+from bemt.tools.cfd.openfoam.settings import (
+    DOMAINS,
+    MACH_COMPRESSIBLE,
+    SECTORS,
+    TURBULENCE,
+    Body,
+    Settings,
+    Sweep,
+    sector_choice,
+)
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
@@ -53,13 +61,15 @@ def case_files(s: Settings, title: str = "") -> dict[str, str]:
 FACETS = 96  # of the centre body
 
 
-class RunRanges(Table):
-    """What the numbers of a :class:`Run` may be: those of a case file, where it has them."""
+class RunTable(PointTable):
+    """What an export may ask of a :class:`Run`; None is its default."""
 
-    rpm: float | None = entry("speed of rotation", RPM)
-    airspeed_m_s: float | None = entry("speed of flight", replace(AIRSPEED, low=0.0))  # backward flight has no inlet
     sideslip_deg: float | None = entry("angle between shaft and wind", "deg", 0, 90)
     level: float | None = entry("fineness of the grid", "", 4, 9)
+    solver: Literal["incompressible", "compressible"] | None = entry("by the tip Mach number if omitted")
+    sector: str | None = entry("meshed part of the disk; the smallest possible if omitted", choices=SECTORS)
+    domain: str | None = entry("free air, or a pipe of the rotor's diameter", choices=DOMAINS)
+    turbulence: str | None = entry("model", choices=TURBULENCE)
 
 
 @dataclass(frozen=True)
@@ -88,18 +98,18 @@ class Run:
     zone: str = "grid"  # As there; `sector` None is the smallest that fits
 
 
-def check_run(run: Run, names: Mapping[str, str] | None = None, file: str = "") -> list[Fault]:
-    """Find the numbers of a run that are not finite or out of range.
+def check_run(run: Run, file: str = "") -> list[Fault]:
+    """Find the numbers of a run that are not finite or out of range, and unknown words.
 
     >>> for fault in check_run(Run(rpm=float("nan"), level=20.0)): print(fault)
     rpm: got nan; expected a number from 10 to 300000 rev/min.
     level: got 20; expected a number from 4 to 9.
     """
     out = Collector(file)
-    for key in RunRanges.named():
+    for key in RunTable.named():
         value = getattr(run, key)
         if value is not None:
-            check_field(out, key if names is None else names[key], RunRanges, key, value)
+            check_field(out, key, RunTable, key, value)
     return out.faults
 
 

@@ -1,0 +1,182 @@
+"""The page of ``bemt ui``: what one person asks first, over the public API only. Run by streamlit."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import bemt
+from bemt.app.face import parameters
+
+FORMATS = ("stl", "qprop", "xrotor", "jsbsim", "rotor-disk", "table")
+BLUE, ORANGE = "#0072B2", "#D55E00"
+ABOUT = (
+    "Thrust and power with one standard uncertainty (band). Nothing leaves this machine. A point that does not "
+    "converge is left out, never zero."
+)
+
+
+def made(label: str, chord: float, pitch: float) -> bemt.Propeller:
+    """Propeller of a label; a chord or pitch that was moved from the label's is taken as measured.
+
+    Parameters
+    ----------
+    label : str
+        As on the propeller.
+    chord : float
+        Largest chord over radius; 0: not measured. [1]
+    pitch : float
+        Pitch at 0.75 R over that of the label. [1]
+    """
+    found = bemt.propeller(label)
+    changes: dict[str, Any] = {}
+    if chord > 0.0:
+        changes["blade.max_chord_over_R"] = chord
+    if pitch != 1.0:
+        changes["blade.pitch_in"] = found.case.get("blade.pitch_in") * pitch
+    return found.replaced(changes) if changes else found
+
+
+def archive(folder: Path) -> bytes:
+    """Files of a folder as one zip."""
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as out:
+        for file in sorted(p for p in folder.rglob("*") if p.is_file()):
+            out.write(file, file.relative_to(folder).as_posix())
+    return held.getvalue()
+
+
+def curve(st: Any, points: Any, x: str, y: str, words: tuple[str, str], measured: Any = None) -> None:
+    """Draw a curve with its band, and measured points."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2, 3.4), layout="constrained")
+    axes = figure.subplots()
+    at, value, u = points[x], points[y], points.u[y]
+    axes.fill_between(at, value - u, value + u, color=BLUE, alpha=0.2, linewidth=0, label="band, 68 %")
+    axes.plot(at, value, color=BLUE, label="BEMT")
+    if measured is not None and x in measured.values and y in measured.values:
+        axes.plot(measured[x], measured[y], "o", color=ORANGE, markersize=4, label="recording")
+    axes.set_xlabel(words[0])
+    axes.set_ylabel(words[1])
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, fontsize=8)
+    st.pyplot(figure)
+
+
+def told(name: str) -> str:
+    """What the declarations of the actions say of a parameter, as in the help of the command line."""
+    return next(p.help for action in (bemt.estimate, bemt.drive) for p in parameters(action) if p.name == name)
+
+
+def asked(st: Any) -> tuple[bemt.Propeller, dict[str, float]]:
+    """What the user sets: the propeller and its point."""
+    with st.sidebar:
+        st.header("Propeller")
+        label = st.text_input("Label", "10x5", help=told("label"))
+        known = st.checkbox("I measured the chord")
+        chord = st.slider("Largest chord / radius", 0.05, 0.40, 0.20, 0.005, disabled=not known)
+        pitch = st.slider("Pitch / pitch of the label", 0.7, 1.3, 1.0, 0.01)
+        st.header("Operating point")
+        rpm = st.slider("Speed of rotation [rev/min]", 1000, 25000, 6000, 100, help=told("rpm"))
+        airspeed = st.slider("Airspeed [m/s]", 0.0, 40.0, 0.0, 0.5, help=told("airspeed_m_s"))
+        st.header("Motor and battery")
+        motor = st.checkbox("With a motor")
+        kv = st.slider("K_v [rev/min/V]", 100, 4000, 900, 10, disabled=not motor, help=told("kv"))
+        cells = st.slider("LiPo cells", 1, 12, 3, disabled=not motor, help=told("cells"))
+    point = {"rpm": float(rpm), "airspeed_m_s": float(airspeed)}
+    return made(label, chord if known else 0.0, pitch), point | ({"kv": kv, "cells": cells} if motor else {})
+
+
+def answer(st: Any, propeller: bemt.Propeller, point: dict[str, float]) -> None:
+    """The numbers at the point, with flags beside them."""
+    rpm, V = point["rpm"], point["airspeed_m_s"]
+    one = propeller.solve(rpm, V)
+    cells = st.columns(3)
+    for cell, name, key, unit in zip(cells, ("Thrust", "Shaft power", "Torque"), ("thrust_N", "power_W", "torque_Nm"),
+                                     ("N", "W", "N m"), strict=True):  # fmt: skip
+        value = float(one[key][0])
+        cell.metric(name, f"{value:.3g} ± {float(one.u[key][0]):.2g} {unit}" if np.isfinite(value) else "no solution")
+    for flag in one.flags[0]:
+        st.warning(flag)
+    if "kv" in point:
+        found = bemt.drive(propeller, kv=point["kv"], cells=int(point["cells"]), airspeed_m_s=V)
+        st.subheader("With this motor, full throttle")
+        st.code(found.text, language=None)
+
+
+def recording(st: Any, propeller: bemt.Propeller) -> Any:
+    """The recording that was dropped, read; None without one."""
+    st.subheader("Your recording")
+    file = st.file_uploader("Drop a bench log or a table (rpm, thrust_N, torque_Nm, ...)", key="recording")
+    if file is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / Path(file.name).name
+        path.write_bytes(file.getvalue())
+        points = bemt.read(path)
+        for note in points.notes:
+            st.caption(note)
+        st.dataframe(points.to_pandas(), height=180)
+        if st.button("Diagnose", type="primary"):
+            with st.spinner("Comparing with every effect and fault ..."):
+                found = bemt.diagnose(path, propeller)
+            head, _, rest = found.text.partition("\n")
+            shown = st.success if found.verdict in ("named", "none") else st.info
+            shown(head)
+            with st.expander("The whole answer", expanded=True):
+                st.code(rest, language=None)
+    return points
+
+
+def exports(st: Any, propeller: bemt.Propeller) -> None:
+    """Buttons that write the case, exports and sources."""
+    st.subheader("Export")
+    left, right = st.columns(2)
+    left.download_button("Case (case.toml)", propeller.text, "case.toml", "text/plain")
+    chosen = right.selectbox("For another program", FORMATS)
+    if right.button("Export"):
+        with tempfile.TemporaryDirectory() as folder:
+            written = bemt.export(propeller, folder, chosen)
+            right.code(written.text.replace(folder, "."), language=None)
+            right.download_button("Download", archive(Path(folder)), f"{propeller.name}_{chosen}.zip")
+    with st.expander("Sources of this answer"):
+        for source in bemt.cite(propeller):
+            st.markdown(f"**{source.name}** ({source.kind}): {source.source}")
+
+
+def main() -> None:
+    """Draw the page."""
+    import streamlit as st
+
+    from bemt.app.served import end_with_parent
+
+    end_with_parent()
+    st.set_page_config(page_title="bemt", layout="wide")
+    st.title("Propellers with uncertainty")
+    st.caption(ABOUT)
+    try:
+        propeller, point = asked(st)
+        answer(st, propeller, point)
+        measured = recording(st, propeller)
+        rpm, V = point["rpm"], point["airspeed_m_s"]
+        left, right = st.columns(2)
+        with left:
+            over = propeller.solve(np.linspace(0.3, 1.3, 14) * rpm, V)
+            curve(st, over, "rpm", "thrust_N", ("rev/min", f"thrust [N] at {V:g} m/s"), measured)
+        with right:
+            along = propeller.curve(rpm, np.linspace(0.0, 0.8, 14))
+            curve(st, along, "J", "CT", ("advance ratio J", f"CT at {rpm:g} rev/min"))
+        exports(st, propeller)
+    except bemt.InputError as error:
+        for fault in error.faults:
+            st.error(str(fault))
+
+
+if __name__ == "__main__":
+    main()

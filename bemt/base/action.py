@@ -1,0 +1,186 @@
+"""One declaration per action: a public function with numpydoc is the library's function and the command.
+
+``@action(...)`` adds to the function only what a signature cannot say: the group and example of the help, which
+parameters are bare words on the command line, and which options people use. :mod:`bemt.app.face` makes the command,
+its help and its completion from that. A parameter and its option have one name: ``airspeed_m_s`` is
+``--airspeed-m-s``; hints are written with options, and the library reads them as parameters.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from bemt.base.errors import EXIT_OK, Fault, InputError
+
+__all__ = [
+    "About", "Count", "Told", "about", "action", "did_you_mean", "in_words_of_the_library", "options_of", "worded",
+]  # fmt: skip
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Count = int
+"""Whole number of 1 or more, in a signature."""
+
+
+@dataclass(frozen=True)
+class About:
+    """What the command line adds to a function."""
+
+    command: str  # name of the command
+    group: str  # heading of the help
+    example: str  # a line to type, without the program's name
+    words: tuple[str, ...] = ()  # parameters that are bare words
+    common: tuple[str, ...] = ()  # parameters that people use; the rest stands in --help-all
+    shown: bool = False  # among the commands of `bemt --help`; the others stand under `bemt lab`
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Answer of an action that has no object of its own: a document, its text, and how it ended."""
+
+    document: dict[str, Any]
+    text: str
+    details: str = ""  # everything, where the text is one screen
+    exit_code: int = EXIT_OK
+    complaints: tuple[str, ...] = ()  # lines of the error stream
+    files: tuple[Path, ...] = ()  # what was written
+
+    def __str__(self) -> str:
+        return self.text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return self.document
+
+
+def action(
+    group: str,
+    example: str,
+    *,
+    words: tuple[str, ...] = (),
+    common: tuple[str, ...] = (),
+    shown: bool = False,
+    command: str = "",
+) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Declare a public function as an action."""
+
+    def declare(function: Callable[P, T]) -> Callable[P, T]:
+        name = command or function.__name__.replace("_", "-")
+        found = worded(function)
+        setattr(found, "about", About(name, group, example, words, common, shown))  # noqa: B010
+        return found
+
+    return declare
+
+
+def about(function: Callable[..., Any]) -> About:
+    """What an action declares."""
+    found: About = getattr(function, "about")  # noqa: B009
+    return found
+
+
+def worded(function: Callable[P, T]) -> Callable[P, T]:
+    """Function that suggests the right keyword, checks its counts, and names parameters in its faults.
+
+    >>> @worded
+    ... def solve(rpm, airspeed_m_s=0.0): return rpm
+    >>> solve(1, airspeed=2)
+    Traceback (most recent call last):
+        ...
+    TypeError: solve() got 'airspeed'. Did you mean airspeed_m_s?
+    """
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    counts = tuple(name for name, kind in function.__annotations__.items() if "Count" in str(kind))
+
+    @functools.wraps(function)
+    def call(*args: P.args, **more: P.kwargs) -> T:
+        if unknown := [name for name in more if name not in names]:
+            near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
+            raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
+        check_counts(counts, more)
+        with in_words_of_the_library():
+            return function(*args, **more)
+
+    return call
+
+
+def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:
+    """Refuse what is not a whole number of 1 or more."""
+    faults = []
+    for name in names:
+        value = given.get(name)
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            whole = one is None or isinstance(one, bool) is False and hasattr(one, "__index__") and one >= 1
+            if not whole:
+                faults.append(Fault("", name, repr(one), "a whole number of 1 or more"))
+    if faults:
+        raise InputError(faults)
+
+
+def did_you_mean(got: str, known: Iterable[str]) -> str:
+    """`` Did you mean X?`` when a known word is near, else nothing.
+
+    >>> did_you_mean("swep", ["sweep", "report"]), did_you_mean("x", ["sweep"])
+    (' Did you mean sweep?', '')
+    """
+    near = difflib.get_close_matches(got, list(known), 2, 0.6)
+    return f" Did you mean {' or '.join(near)}?" if near else ""
+
+
+def in_words(sentence: str) -> str:
+    """A sentence with parameters in place of options; a whole line for the shell stays.
+
+    >>> in_words("As in --thrust-N 27 --cells 6"), in_words("Try bemt new --scan FILE")
+    ('As in thrust_N=27, cells=6', 'Try bemt new --scan FILE')
+    """
+    if "--" not in sentence or re.search(r"\bbemt [a-z]", sentence):
+        return sentence
+    valued = re.sub(r"(--[a-z][\w-]*) (\d[\d.]*)", lambda m: f"{_name(m[1])}={m[2]}", sentence)
+    return re.sub(r"(=[\d.]+) (?=[a-zA-Z_]+=)", r"\1, ", re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), valued))
+
+
+def _name(option: str) -> str:
+    return option.removeprefix("--").replace("-", "_")
+
+
+@contextmanager
+def in_words_of_the_library(keys: dict[str, str] | None = None, file: str = "") -> Iterator[None]:
+    """Name parameters, not options, in the faults of what runs inside.
+
+    `keys` are keys of the case `file` that a caller gave as parameters, to their names: a fault there is the
+    parameter's.
+    """
+    try:
+        yield
+    except InputError as error:
+        faults = [_named(fault, keys or {}, file) for fault in error.faults]
+        if faults == list(error.faults):
+            raise
+        raise InputError(faults) from error
+
+
+def _named(fault: Fault, keys: dict[str, str], file: str) -> Fault:
+    if fault.file == file and fault.where in keys:
+        fault = replace(fault, file="", where=keys[fault.where])
+    parts = {key: in_words(getattr(fault, key)) for key in ("file", "where", "expected", "hint")}
+    return replace(fault, **parts)
+
+
+def options_of(fault: Fault) -> Fault:
+    """A fault with the option in place of a parameter that was typed without a file.
+
+    >>> print(options_of(Fault("", "airspeed_m_s", "x", "a number")))
+    --airspeed-m-s: got x; expected a number.
+    """
+    words = fault.where if not fault.file else ""
+    if not words or not re.fullmatch(r"[a-z]\w*(, [a-z]\w*)*", words) or words in ("label", "recordings", "points"):
+        return fault
+    return replace(fault, where=re.sub(r"\w+", lambda m: "--" + m[0].replace("_", "-"), words))

@@ -1,0 +1,59 @@
+"""Checks of numbers and paths that callers pass in."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError
+
+__all__ = ["number", "numbers", "path_text"]
+
+
+def numbers(name: str, value: Any, finite: bool = True) -> Array:
+    """One or more numbers from a caller; unless finite, infinite ones are left to who knows the range."""
+    wrong = Fault("", name, f"{type(value).__name__} {value!r:.60}", "a number, or several")
+    try:
+        raw = np.asarray(value)
+        text = raw.dtype.kind in "USTbM"
+        text |= raw.dtype.kind == "O" and any(isinstance(v, (str, bytes, bool)) for v in raw.flat)
+        found = np.asarray(raw, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(wrong) from None
+    if text:  # numpy would read "6000" and True as numbers
+        raise InputError(wrong)
+    if not found.size:
+        raise InputError(Fault("", name, "no number", "one or more"))
+    if finite and not np.all(np.isfinite(found)):
+        raise InputError(Fault("", name, "a number that is not finite", "finite numbers"))
+    return found
+
+
+def path_text(name: str, value: Any) -> str:
+    """Path as text; anything else is an error."""
+    if isinstance(value, (str, os.PathLike)) and os.fspath(value):
+        return os.fspath(value)
+    raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))
+
+
+def number(name: str, value: Any, finite: bool = True) -> float:
+    """One number from a caller."""
+    found = numbers(name, value, finite)
+    if found.size != 1:
+        raise InputError(Fault("", name, f"{found.size} numbers", "one number"))
+    return float(found.ravel()[0])
+
+
+def paths_text(name: str, value: Any, least: int = 0) -> list[str]:
+    """Paths as text: one, or several.
+
+    >>> paths_text("files", "a.csv"), paths_text("files", ("a.csv", "b.csv"))
+    (['a.csv'], ['a.csv', 'b.csv'])
+    """
+    several = value if isinstance(value, (list, tuple)) else [value]
+    if len(several) < least:
+        raise InputError(Fault("", name, "none", "one or more"))
+    return [path_text(name, one) for one in several]

@@ -1,0 +1,403 @@
+r"""What the readers of CFD exports share: tables that may be damaged, histories with a clock, and values at points.
+
+The rules, once for all formats: columns are matched by the header; a row whose cells do not fit the header is never
+shifted into place but left out with a warning, and a file in which more than a few rows do not fit is refused; text
+for NaN becomes NaN with a warning; a last row that may be cut is left out; nothing is joined, scaled or turned round.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base import units
+from bemt.base.arrays import Array
+from bemt.base.averaging import Mean, keep_last, steady_average
+from bemt.base.errors import Fault
+from bemt.base.tables import number_of
+from bemt.data.readers import SourceText, head_text, load_text, number
+from bemt.data.readers.columns import Channel, dataset
+from bemt.physics.dataset import Dataset
+
+_NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
+_COMMA = re.compile(r"[+-]?\d+,\d+([eEdD][+-]?\d+)?")
+_HUGE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[eEdD]\+?\d+")
+_FIXED = re.compile(r"\d\.\d+[eEdD][+-]\d\d+")
+_UNITS = {
+    "n": "N", "newton": "N", "nm": "Nm", "pa": "Pa", "pascal": "Pa", "m": "m", "s": "s", "k": "K", "w": "W", "j": "Nm",
+    "rad": "rad", "kg": "kg", "rpm": "rpm", "kn": "kN", "kgf": "kgf", "lbf": "lbf", "hz": "rev_s", "u/min": "rpm",
+    "lb-f": "lbf", "lbf-ft": "lbf_ft", "lbf-in": "lbf_in", "lb-ft": "lbf_ft", "lb-in": "lbf_in",
+}  # fmt: skip
+"""Units as programs write them, without blanks, in small letters."""
+_POWERS = re.compile(r"(?<=[a-z])\^?(-?[1-9])$")
+_MADE_OF = {"rev_min": "rpm", "n_m": "Nm", "nm": "Nm", "pas": "Pa_s", "kgm_s2": "N", "kgm2_s2": "Nm", "kgm2_s3": "W",
+            "kg_ms2": "Pa"}  # fmt: skip
+"""Units by the units that make them."""
+_TURNS = {"rev": "rev", "revolution": "rev", "u": "rev", "r": "rev", "": "rev", "radian": "rad", "meter": "m"}
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a header: name as it will appear, unit ("" when none is stated), and its part."""
+
+    name: str
+    unit: str = ""
+    role: str = "value"
+    """value, step (counts), time (seconds) or index (a number of a node)."""
+
+
+@dataclass(frozen=True)
+class ExportRow:
+    """Cells of one line."""
+
+    line: int
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ExportTable:
+    """Numbers of a table."""
+
+    values: Array  # (N, K) naN where the file says so
+    lines: tuple[int, ...]  # Line of each row
+    warnings: tuple[str, ...] = field(default=())  # Rows left out and why
+
+
+def head_lines(head: bytes | str, count: int = 40) -> list[str]:
+    r"""First lines of a file that are not blank, stripped, for sniffers; none for binary data.
+
+    >>> head_lines(b"\n a \r\n\r\nb")
+    ['a', 'b']
+    """
+    lines = (line.strip() for line in head_text(head).splitlines())
+    return [line for line in lines if line][:count]
+
+
+def cells_of(line: str, separator: str | None) -> tuple[str, ...]:
+    """Cells of a line, stripped of blanks and quotes; ``None`` separates by blanks.
+
+    A separator at the end of the line makes no cell.
+    """
+    if separator is None:
+        return tuple(line.split())
+    cells = [cell.strip().strip('"').strip() for cell in line.split(separator)]
+    return tuple(cells[:-1] if len(cells) > 1 and not cells[-1] else cells)
+
+
+def unit_of(text: str) -> units.Unit | None:
+    """Unit as programs write it, None for one that is unknown.
+
+    >>> [unit_of(t).suffix for t in ("N m", "n-m", "rev min^-1", "radian s^-1", "kg m^-3", "m^2", "kg m s^-2")]
+    ['Nm', 'Nm', 'rpm', 'rad_s', 'kg_m3', 'm2', 'N']
+    >>> unit_of("furlong") is None and unit_of("") is None
+    True
+    """
+    plain = " ".join(text.strip().strip("[]()").split())
+    if plain in units.UNITS:
+        return units.UNITS[plain]
+    low = plain.lower()
+    word = _UNITS.get(low.replace(" ", "")) or _UNITS.get(low.replace("-", "").replace(" ", ""))
+    if word is None:
+        over: list[str] = []
+        under: list[str] = []
+        for k, part in enumerate(re.split(r"[ *.·]|(?=/)", low)):
+            below, part = part.startswith("/"), part.lstrip("/")
+            power = _POWERS.search(part)
+            size = int(power[1]) if power else 1
+            base = _TURNS.get(_POWERS.sub("", part), _POWERS.sub("", part)) if part not in ("1",) or k else "rev"
+            tail = str(abs(size)) if abs(size) > 1 else ""
+            (under if below or size < 0 else over).append(base + tail)
+        word = "_".join(["".join(over), "".join(under)]) if under else "".join(over)
+        word = _MADE_OF.get(word, word)
+    return units.UNITS.get(word)
+
+
+def si_unit(text: str) -> str | None:
+    """Suffix of an SI unit (or rpm) as programs write it, None for one that is unknown or not SI.
+
+    >>> si_unit("N m"), si_unit(" m s^-1 "), si_unit("n-m"), si_unit("lbf"), si_unit("rev min^-1")
+    ('Nm', 'm_s', 'Nm', None, 'rpm')
+    """
+    found = unit_of(text)
+    si = found is not None and (found.suffix == "rpm" or (found.factor == 1.0 and not found.offset))
+    return found.suffix if found is not None and si else None
+
+
+def slug(text: str) -> str:
+    """Name in small letters with underscores.
+
+    >>> slug("Wall Shear X")
+    'wall_shear_x'
+    """
+    return re.sub(r"\W+", "_", text.strip().lower()).strip("_") or "unnamed"
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """Make names unique by ``#2``, ``#3``.
+
+    >>> unique(["x", "y", "x"])
+    ['x', 'y', 'x#2']
+    """
+    taken = set(names)
+    out: list[str] = []
+    for name in names:
+        new, k = name, 2
+        while new in out or (k > 2 and new in taken):
+            new, k = f"{name}#{k}", k + 1
+        out.append(new)
+    return out
+
+
+def no_units(columns: Sequence[Column]) -> list[str]:
+    """Note on columns without a unit, if any."""
+    bare = [column.name for column in columns if not column.unit]
+    return [f"no unit stated for {', '.join(bare[:6])}"] if bare else []
+
+
+def _value(text: str, commas: bool) -> float | None:
+    """Number of a cell: NaN for what says so or overflows, None when it is no number."""
+    value = number(text.replace(",", ".") if commas and _COMMA.fullmatch(text) else text)
+    if value is None and (_NAN.fullmatch(text) or _HUGE.fullmatch(text)):
+        return float("nan")
+    return value
+
+
+def _maybe_cut(source: SourceText, rows: Sequence[ExportRow]) -> bool:
+    """Whether the last row may have lost its end: no line end, and not of the fixed format of the rows before it."""
+    if not rows or source.text.endswith(("\n", "\r")) or rows[-1].line != len(source.lines) or not rows[-1].cells:
+        return False
+    last = rows[-1].cells[-1].lstrip("+-")
+    before = [row.cells[-1].lstrip("+-") for row in rows[-50:-1] if row.cells]
+    fixed = before and all(_FIXED.fullmatch(cell) and len(cell) == len(before[0]) for cell in before)
+    return not (fixed and _FIXED.fullmatch(last) and len(last) == len(before[0]))
+
+
+def numeric_table(
+    source: SourceText, columns: Sequence[Column], rows: Sequence[ExportRow], commas: bool = True
+) -> ExportTable:
+    """Turn the cells of a table into numbers, by its header."""
+    width = len(columns)
+    warnings: list[str] = []
+    cut = _maybe_cut(source, rows)
+    if cut and len(rows) > 1:
+        warnings.append(f"line {rows[-1].line}: last row has no line end and may be cut; left out")
+        rows = rows[:-1]
+    elif cut:
+        warnings.append(f"line {rows[-1].line}: the only row has no line end and may be cut")
+    has_comma = commas and any(_COMMA.fullmatch(cell) for row in rows for cell in row.cells)
+    has_point = has_comma and any("." in cell and _value(cell, False) is not None for row in rows for cell in row.cells)
+    comma = has_comma and not has_point
+    good: dict[int, list[float]] = {}
+    bad: list[Fault] = []
+    widths: Counter[int] = Counter()
+    for k, row in enumerate(rows):
+        values = [_value(cell, comma) for cell in row.cells]
+        if len(values) == width and None not in values:
+            good[row.line] = [v for v in values if v is not None]
+            continue
+        if len(values) != width:
+            widths[len(values)] += 1
+            names = ", ".join(column.name for column in columns[:8])
+            fault = source.fault(row.line, number_of(len(values), "column"), f"{width} as in the header ({names})")
+        else:
+            at = values.index(None)
+            fault = source.fault(f"{row.line}:{at + 1}", repr(row.cells[at][:40]), "a number")
+        if k == len(rows) - 1 and len(rows) > 1 and not cut:
+            warnings.append(f"line {row.line}: last row is cut or damaged ({fault.got}); left out")
+        else:
+            bad.append(fault)
+    if not good or len(bad) > max(2, 0.05 * len(rows)):
+        if not bad:
+            bad.append(source.fault("", "no rows of numbers", "one row or more", "Is the file cut?"))
+        if widths and widths.most_common(1)[0][1] > 0.5 * len(rows):
+            got = f"rows of {widths.most_common(1)[0][0]} columns"
+            hint = "A column was dropped or added; export the file again"
+            source.refuse(rows[0].line, got, f"{width} as in the header", hint)
+        source.faults += bad[:5]
+        if len(bad) > 5:
+            source.add("", f"{len(bad) - 5} more damaged rows", "rows as in the header")
+        source.check()
+    warnings += [f"line {f.where}: got {f.got}, expected {f.expected}; row left out" for f in bad[:10]]
+    if len(bad) > 10:
+        warnings.append(f"{len(bad) - 10} more damaged rows left out")
+    if comma:
+        warnings.append("decimal commas read as decimal points")
+    array = np.array([*good.values()], dtype=float)
+    for column, missing in zip(columns, np.isnan(array).sum(axis=0).tolist(), strict=True):
+        if missing:
+            warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
+    return ExportTable(array, tuple(good), tuple(warnings))
+
+
+def _none(line: str) -> bool:
+    """No line is skipped."""
+    return False
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one program writes a history; reading it is the same for all."""
+
+    kind: str  # of the reader
+    example: str  # of a header, for messages
+    header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
+    cells: Callable[[str], tuple[str, ...]]  # of a row
+    column: Callable[[str], Column]  # of a name
+    skip: Callable[[str], bool] = _none  # lines that are neither headings nor rows
+    notes: tuple[str, ...] = ()
+    commas: bool = True  # whether a decimal comma is possible
+    hint: str = "Is the header damaged?"  # where a row comes before the headings
+    finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
+    within: int = 1  # first lines that may be the header, for the sniffer
+
+    def sniff(self, head: bytes | str) -> bool:
+        """Tell whether one of the first lines is a header of this program."""
+        return any(self.header(line) is not None for line in head_lines(head, self.within))
+
+    def read(self, path: str | os.PathLike[str]) -> Dataset:
+        """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
+        source = load_text(path)
+        names: list[str] = []
+        title, rows, repeated, early = "", list[ExportRow](), list[int](), False
+        for line, raw in enumerate(source.lines, 1):
+            text = raw.strip()
+            found = self.header(text) if text else None
+            if found is not None:
+                if names and list(found) != names:
+                    got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                    source.add(line, got, expected, "Split the file there")
+                    break
+                repeated += [line] if names else []
+                names = names or list(found)
+            elif not text or self.skip(text):
+                title = title or text.strip('"# ')
+            elif names:
+                rows.append(ExportRow(line, self.cells(text)))
+            elif not early:
+                early = True
+                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
+        if not names and not early:
+            source.add("", "no header", f"a line such as {self.example}")
+        if names and not rows:
+            source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
+        if not rows:
+            source.check()
+        columns = [self.column(name) for name in names]
+        table = numeric_table(source, columns, rows, self.commas)
+        source.check()
+        again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
+        notes = [*([again] if repeated else []), *self.notes]
+        if self.finish is not None:
+            columns, table = self.finish(columns, table, notes)
+        return history(self.kind, source, columns, table, notes, {"title": title})
+
+
+def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+    """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
+    counters = [k for k, c in enumerate(columns) if c.role == "counter"]
+    counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]
+    steps = counting[:1] or counters[-1:]
+    if len(counting) > 1:
+        notes.append(f"the last {columns[counting[-1]].name} of each {columns[counting[0]].name} is taken")
+    for k in counters:
+        columns[k] = Column(columns[k].name, "", "step" if k in steps else "counter")
+    return columns, table
+
+
+def _spikes(column: Column, values: Array) -> list[str]:
+    size = np.abs(values[np.isfinite(values)])
+    typical = float(np.median(size)) if size.size else 0.0
+    if size.size < 10 or typical == 0.0 or float(np.max(size)) <= 1e3 * typical:
+        return []
+    at = int(np.nanargmax(np.abs(values)))
+    note = f"{column.name}: {values[at]:.6g} in row {at + 1} is over 1000 times the usual size ({typical:.3g})"
+    return [note + (": start-up or damage" if at < 0.1 * values.size else ": damage?")]
+
+
+def history(
+    format: str, source: SourceText, columns: Sequence[Column], table: ExportTable,  # noqa: A002
+    warnings: Sequence[str] = (), provenance: Mapping[str, str] | None = None,
+) -> Dataset:  # fmt: skip
+    """Make the record of a history: repeated rows resolved, means of the channels with what they were taken over.
+
+    A history by time gets the mean of all rows (whole revolutions need the speed, which the file does not say), one
+    by iterations that of its last fifth.
+    """
+    roles = [column.role for column in columns]
+    time = _clock(table.values, roles, "time")
+    step = _clock(table.values, roles, "step")
+    notes = [*warnings, *table.warnings]
+    index: NDArray[np.intp] = np.arange(len(table.values))
+    if time is not None:
+        index, more = keep_last(table.values[:, time], columns[time].name)
+        notes += more
+    if step is not None:
+        steps = table.values[index, step]
+        if time is None or not np.any(np.diff(steps) < 0):
+            kept, more = keep_last(steps, columns[step].name)
+            index = index[kept]
+            notes += more
+        else:
+            notes.append(f"{columns[step].name} goes back while {columns[time].name} goes on: a restart")
+    clock = "time" if time is not None else "iteration"
+    names = unique([column.name for column in columns])
+    channels: dict[str, Channel] = {}
+    for k, (name, column) in enumerate(zip(names, columns, strict=True)):
+        values = table.values[index, k]
+        if column.role != "value":
+            channels[name] = Channel(values, column.unit)
+            continue
+        average = steady_average(values, 1.0) if clock == "time" else steady_average(values)
+        over = f"all {average.rows} rows, start-up included" if clock == "time" else f"last {average.rows} rows"
+        mean = None if average.mean is None else Mean(average.mean, over, average.drift)
+        channels[name] = Channel(values, column.unit, mean)
+        notes += _spikes(column, values)
+        if average.mean is None and average.problem:
+            notes.append(f"{name}: no mean: {average.problem}")
+    about = {**source.about, **(provenance or {}), "clock": clock}
+    about["clock_channels"] = "\t".join(n for n, c in zip(names, columns, strict=True) if c.role in ("time", "step"))
+    if time is not None:
+        about["time_channel"] = names[time]
+    if "value" not in roles:
+        notes.append("the file has no column of values, only its clock")
+    elif len(index) > 1 and not any(np.any(table.values[index, k]) for k, r in enumerate(roles) if r == "value"):
+        notes.append("every value is 0: did the function object, or the report, find its surfaces?")
+    return dataset(format, "cfd", channels, notes, about)
+
+
+def _clock(values: Array, roles: Sequence[str], role: str) -> int | None:
+    """First column of a role that really counts (a steady file may carry a time that stands still)."""
+    for k, own in enumerate(roles):
+        if own == role and (len(values) == 1 or len(np.unique(values[np.isfinite(values[:, k]), k])) > 1):
+            return k
+    return None
+
+
+def fields(
+    format: str, source: SourceText, columns: Sequence[Column], table: ExportTable,  # noqa: A002
+    warnings: Sequence[str] = (), provenance: Mapping[str, str] | None = None,
+) -> Dataset:  # fmt: skip
+    """Make the record of values at points: no means, since points carry no area; equal repeated columns appear once."""
+    notes = [*warnings, *table.warnings]
+    first: dict[str, Array] = {}
+    kept: list[tuple[Column, Array]] = []
+    for column, values in zip(columns, table.values.T, strict=True):
+        twin = first.setdefault(column.name, values)
+        if twin is not values and np.array_equal(twin, values, equal_nan=True):
+            notes.append(f"column {column.name} is repeated with the same values: taken once")
+        else:
+            kept.append((column, values))
+    names = unique([column.name for column, _ in kept])
+    channels = {n: Channel(values, column.unit) for n, (column, values) in zip(names, kept, strict=True)}
+    for name in names:
+        if "#" in name:
+            notes.append(f"two columns are named {name.split('#')[0]} and differ: the later one is {name}")
+    notes.append("values at points: no mean is taken, since points carry no areas")
+    about = {**source.about, **(provenance or {}), "clock": "none"}
+    return dataset(format, "cfd", channels, notes, about)

@@ -1,0 +1,422 @@
+"""Headings of columns: the name of the channel and the unit, from the text alone.
+
+A heading without a unit, or with one that has two meanings (``Hz``), gives unit None: nothing is assumed. A mass in a
+column of thrust is the force that it weighs, and a line says so.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from bemt.base import units
+from bemt.data.readers._words import english, plain, quantities
+from bemt.data.readers.unit_text import FORCES, TWO_MEANINGS, WEIGHTS, si_name, unit_for, unit_of, weight_of
+
+_PURE = re.compile(
+    r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
+    r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor"
+    r"|C_[TPQ]|C[tpq])"
+)
+_PURE_NAMES = {"Ct": "CT", "C_T": "CT", "C_P": "CP", "C_Q": "CQ"}  # Cp may be that of a pressure: the table tells
+_ALONE = {  # a heading that is the name of a unit
+    "volts": ("voltage", "V"), "volt": ("voltage", "V"), "amps": ("current", "A"), "amp": ("current", "A"),
+    "amperes": ("current", "A"), "watts": ("P", "W"), "newtons": ("F", "N"),
+}  # fmt: skip
+_WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves open -> name, dimension
+    "time": ("time", "time"), "airspeed": ("airspeed", "speed"), "throttle": ("throttle", "fraction"),
+    "esc signal": ("pulse_width", "time"), "esc": ("pulse_width", "time"), "pwm": ("pulse_width", "time"),
+    "motor optical speed": ("optical", "angular_speed"), "motor electrical speed": ("electrical", "angular_speed"),
+    "elapsed": ("time", "time"), "elapsed time": ("time", "time"), "time since start": ("time", "time"),
+    "timestamp": ("time", "time"), "air speed": ("airspeed", "speed"), "throttle input": ("throttle", "fraction"),
+    "pressure": ("pressure", "pressure"), "temperature": ("temperature", "temperature"),
+    "rotation speed": ("speed", "angular_speed"), "rotational speed": ("speed", "angular_speed"),
+    "motor speed": ("speed", "angular_speed"), "rotor speed": ("speed", "angular_speed"),
+    "propeller speed": ("speed", "angular_speed"), "force fz (thrust)": ("thrust", "force"),
+    "torque mz (torque)": ("torque", "torque"), "electrical speed": ("electrical", "angular_speed"),
+    "optical speed": ("optical", "angular_speed"), "vibration": ("vibration", "acceleration"),
+    "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
+    "accz": ("acceleration_z", "acceleration"),
+}  # fmt: skip
+USUAL: dict[str, str] = {
+    "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
+    "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
+    "mechanical_power_W": "power_W", "shaft_power_W": "power_W", "T_K": "temperature_K", "P_Pa": "pressure_Pa",
+    "air_temperature_K": "temperature_K", "air_pressure_Pa": "pressure_Pa", "rho_kg_m3": "density_kg_m3",
+    "air_density_kg_m3": "density_kg_m3", "P_el_W": "electrical_power_W", "P_in_W": "electrical_power_W",
+    "input_power_W": "electrical_power_W", "P_mech_W": "power_W", "P_shaft_W": "power_W",
+    "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
+    "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
+    "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
+    "freestream_m_s": "airspeed_m_s", "pull_N": "thrust_N", "force_N": "thrust_N", "load_N": "thrust_N",
+    "load_cell_N": "thrust_N", "loadcell_N": "thrust_N",
+}  # fmt: skip
+"""Usual name of a channel that headings of benches and of CFD name in another way."""
+_THRUSTS = re.compile(
+    r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
+    r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
+)
+_GOES: dict[str, tuple[str, ...]] = {  # what a suffix may be: T_A is rotor A's thrust, not a current
+    "thrust": ("force",), "lift": ("force",), "torque": ("torque",), "power": ("power",), "rpm": ("angular_speed",),
+    "voltage": ("voltage",), "current": ("current",), "T": ("force", "temperature", "time"), "F": ("force",),
+    "Q": ("torque",), "M": ("torque",), "P": ("power", "pressure", "length"), "I": ("current",), "U": ("voltage",),
+    "V": ("voltage", "speed"), "n": ("angular_speed",), "D": ("length",), "R": ("length",), "r": ("length",),
+}  # fmt: skip
+_QUALIFIED = re.compile(
+    r"(?:(?:static|measured|mean|average|avg|propeller|prop|motor|rotor|output) )*(thrust|torque)"
+    r"(?: (?:force|static|mean|average|avg|measured))*|(?:f|t) (thrust)|(?:q|m) (torque)|(thrust) t|(torque) q"
+)
+"""Words that a thrust or a torque goes with and that make no other quantity of it."""
+_SEPARATORS = (r"\s+[-–—]\s+", r"\s*,\s*", r"\s+in\s+", r"\s*/\s*", r"\s+")
+_SHAFT_LETTERS = {"n", "ω"}
+_SHAFT_WORDS = set("speed omega rotation rotational rev revs revolution revolutions rps rpm krpm".split())
+_SHAFT_PARTS = {"motor", "rotor", "shaft", "prop", "propeller", "fan"}
+_OTHER_SPEEDS = {
+    "air", "airspeed", "wind", "flow", "tip", "sound", "stream", "freestream", "tunnel", "flight", "ground", "vehicle",
+    "climb", "err", "error", "u", "std", "sd",
+}  # fmt: skip
+"""Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
+_THOUSANDS = re.compile(
+    r"(?P<of>.*?)[\s_]*(?:[\[(]?\s*k[ -]?rpm\s*[\])]?"
+    r"|rpm\s*(?:[\[(]\s*[x×*/]?|[x×*/])\s*(?:1000|1e3|10\^3|10³|k|thousands?)\s*[\])]?"
+    r"|[\[(]?\s*(?:1000|1e3|10\^3|10³)\s*[x×*]?\s*rpm\s*[\])]?)",
+    re.IGNORECASE,
+)
+"""Speeds in thousands: ``kRPM``, ``RPM x1000``, ``rpm (k)``, ``Speed [1000 rpm]``."""
+_TURNS = {
+    "rotation", "rotational", "rev", "revs", "revolution", "revolutions", "shaft", "prop", "propeller", "rotor", "fan",
+}  # fmt: skip
+"""Words with which a frequency counts revolutions; that of a motor may count electrical periods."""
+_AROUND = {
+    "ambient", "amb", "tamb", "pamb", "air", "room", "lab", "laboratory", "outside", "outdoor", "oat", "atmospheric",
+    "atmosphere", "atm", "baro", "barometer", "barometric", "environment", "environmental", "tunnel", "tair",
+    "umgebung", "umgebungstemperatur", "umgebungsdruck", "raumtemperatur", "ambiante", "ambiente",
+}  # fmt: skip
+"""Words that make a temperature, pressure, humidity or density that of the air around the rotor."""
+_SEA_LEVEL = "a pressure reduced to sea level: give that of the station (QFE)"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a heading says.
+
+    ``text``, ``name`` of the channel, ``unit`` (None: unknown), ``doubt`` about the unit, ``told`` what was taken for
+    granted.
+    """
+
+    text: str
+    name: str
+    unit: units.Unit | None
+    doubt: str = ""
+    told: str = ""
+
+    @property
+    def unit_name(self) -> str:
+        """Unit of the channel after conversion: SI, ``rpm``, "-" without dimension, "" unknown."""
+        if self.unit is None:
+            return ""
+        return si_name(self.unit)
+
+
+def known(text: str, base: str, unit: str) -> Heading:
+    """Heading of a column that a reader knows: its name without the unit, and the unit ("-": none).
+
+    >>> known("th", "thrust", "gf").name, known("Speed", "", "rpm").name, known("out", "throttle", "pct").name
+    ('thrust_N', 'rpm', 'throttle')
+    """
+    found = units.Unit("", "none", 1.0) if unit == "-" else unit_of(unit)
+    assert isinstance(found, units.Unit), unit
+    return Heading(text, _channel(base, found).lstrip("_"), found)
+
+
+def _channel(base: str, unit: units.Unit) -> str:
+    """Name of a channel with its unit in SI."""
+    si = si_name(unit).replace("/", "_")
+    return base if si == "-" else f"{base}_{si}"
+
+
+def _tail(core: str) -> tuple[str, units.Unit | str] | None:
+    """Name and unit of a heading that ends in its unit without brackets: ``Thrust - gf``, ``T/N``, ``torque Nm``.
+
+    A bar or a blank alone counts only where the name asks for such a unit: ``c/R`` is a ratio, ``Thrust A`` a rotor.
+    """
+    for separator in _SEPARATORS:
+        for found in reversed(list(re.finditer(separator, core))):
+            name, tail = core[: found.start()], core[found.end() :]
+            unit = unit_of(tail)
+            if not name or unit == "":
+                continue
+            if isinstance(unit, str):
+                if separator in _SEPARATORS[:3]:
+                    return name, f"{tail!r} is {unit}"
+                continue
+            word = _WORDS.get(name.lower().replace("_", " "))
+            last = re.split(r"[\s_]+", name)[-1]
+            goes = _GOES.get(last if len(last) == 1 else last.lower(), (word[1],) if word else ())
+            loose = separator in _SEPARATORS[:3] and not goes
+            letter = separator == _SEPARATORS[4] and tail in ("A", "C", "F", "in")
+            if (unit.dimension in goes or loose) and not letter:
+                return name, unit
+    return None
+
+
+def slug(text: str) -> str:
+    """Name of a channel made of words: blanks and signs become underscores."""
+    return re.sub(r"_+", "_", re.sub(r"[^\w/]+", "_", text.strip())).strip("_")
+
+
+def _spoken(text: str) -> tuple[str, set[str]]:
+    """What stands before the unit of a heading, in plain English, and its words."""
+    base = re.split(r"[(\[]", plain(text))[0].strip()
+    return base, set(english(base))
+
+
+def meanings(text: str) -> list[str]:
+    """Quantities of a recording.toml that the words of a heading may mean.
+
+    >>> meanings("Schub"), meanings("speed"), meanings("wibble")
+    (['thrust'], ['rpm', 'airspeed'], [])
+    """
+    found = [name for name, _ in quantities(english(re.split(r"[(\[]", text)[0]))]
+    return ["power" if name == "mechanical power" else name.replace(" ", "_") for name in found]
+
+
+def may_be_shaft_speed(text: str) -> bool:
+    """Tell whether the words of a heading fit a speed of rotation; its unit is not looked at.
+
+    >>> [may_be_shaft_speed(t) for t in ("speed", "n (1/s)", "Drehzahl", "motor speed [Hz]", "wind speed", "thrust")]
+    [True, True, True, True, False, False]
+    """
+    base, words = _spoken(text)
+    turning = words & _SHAFT_PARTS and words & {"hz", "freq", "frequency"}
+    return base in _SHAFT_LETTERS or bool((words & _SHAFT_WORDS or turning) and not words & _OTHER_SPEEDS)
+
+
+def surely_shaft_speed(text: str) -> bool:
+    """Tell whether such a heading names no airspeed.
+
+    >>> surely_shaft_speed("omega"), surely_shaft_speed("speed")
+    (True, False)
+    """
+    base, words = _spoken(text)
+    named = base in _SHAFT_LETTERS or words & (_SHAFT_PARTS | _SHAFT_WORDS) - {"speed"}
+    return may_be_shaft_speed(text) and bool(named)
+
+
+def heading(text: str) -> Heading:
+    """Read one heading, in English, German, French or Spanish.
+
+    >>> heading("Thrust (gf)").name, heading("Q(Nm)").name, heading("RPM").name, heading("chord_mm").name
+    ('thrust_N', 'Q_Nm', 'rpm', 'chord_m')
+    >>> heading("omega").name, heading("omega").unit is None
+    ('omega', True)
+    >>> heading("Drehzahl [1/min]").name, heading("Poussée (N)").name, heading("Thrust (g)").name
+    ('rpm', 'thrust_N', 'thrust_N')
+    >>> heading("thrust_g").name, heading("thrust_g").told
+    ('thrust_N', "'thrust_g' is read as gram-force: 1 g weighs 0.009807 N")
+    >>> heading("Ambient Temp (C)").name, heading("RPM x1000").name, heading("Prop RPM").name
+    ('temperature_K', 'rpm', 'rpm')
+    """
+    text = " ".join(text.split())
+    if re.fullmatch(r"[a-z]{2,}[A-Z]\w*", text):  # thrustGrams
+        return replace(heading(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)), text=text)
+    if thousands := _THOUSANDS.fullmatch(text):
+        found = _heading(f"{thousands['of']} (rpm)" if thousands["of"] else "rpm")
+        told = f"{text!r} is read as thousands of revolutions per minute"
+        return replace(found, text=text, unit=units.Unit("", "angular_speed", 1e3), told=told)
+    parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
+    if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in WEIGHTS:
+        parts = loose  # thrust_g, Thrust kg
+    if (by_words := _by_words(text)) is not None:
+        return by_words
+    unit = WEIGHTS.get(parts[2]) if parts else None
+    if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
+        found = heading(f"{parts[1]} ({unit})")
+        told = f"{text!r} is read as {FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
+        return replace(found, text=text, told=told)
+    if parts and parts[2] in ("Hz", "1/s") and (said := _spoken(parts[1])[1]) & _TURNS and "electrical" not in said:
+        turns = units.Unit("", "angular_speed", 60.0)
+        return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
+    if parts and re.fullmatch(r"[gG]/W", parts[2]):
+        return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
+    if parts and (qualified := _QUALIFIED.fullmatch(plain(parts[1]))):
+        name = next(word for word in qualified.groups() if word)
+        unit = weight_of(parts[2]) if name == "torque" else ""
+        found = _heading(f"{name} ({unit or parts[2]})")
+        if found.unit is not None and unit:
+            told = f"{text!r} is read as {unit.replace(' ', ' times ')}: a weight, as stands mean it"
+            return replace(found, text=text, told=told)
+        if found.unit is not None:
+            return replace(found, text=text)
+    found = _heading(text)
+    if found.unit is None and not found.doubt and not text.isascii() and quantities(words := english(text)):
+        return replace(found, name=slug(" ".join(dict.fromkeys(words))))
+    return found
+
+
+def usual(text: str, unit: str = "") -> str:
+    """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
+
+    >>> usual("V", "m s^-1"), usual("U [m/s]"), usual("Velocity", "m/s"), usual("T", "N"), usual("Q", "N m"), usual("J")
+    ('airspeed_m_s', 'airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
+    """
+    name = heading(f"{text} [{unit}]" if unit else text).name
+    return USUAL.get(name, name)
+
+
+def _splits(text: str) -> Iterator[tuple[str, str]]:
+    """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
+    for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
+        yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
+    if not re.search(r"[(\[]", text):
+        for mark in (r"\s+(?:in|en|em)\s+", r"\s+[-\u2013\u2014:]\s+", r"\s*[,;:]\s*", r"\s*/\s*", r"[\s_-]+"):
+            for found in re.finditer(mark, text):
+                unit = text[found.end() :]
+                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
+                    yield text[: found.start()], unit
+    yield text, ""
+
+
+_COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
+_LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
+
+
+def _by_words(text: str) -> Heading | None:
+    """Heading whose words are one quantity, in any of the languages, with a unit that goes with it; None: another."""
+    bare = unicodedata.normalize("NFKC", text.replace("⁻", "^-")).replace("\u2212", "-")
+    words = english(re.sub(r"[(\[] ?-? ?[)\]]", " ", bare))
+    if found := _COEFFICIENT.fullmatch(" ".join(words)):
+        return Heading(text, "J" if found[2] else _LETTER[found[1]], units.Unit("", "none", 1.0))
+    if re.fullmatch(r"t\s*[(\[]\s*\w+\s*[)\]]", bare) and isinstance(
+        unit := unit_of(bare[1:].strip(" ()[]")), units.Unit
+    ):
+        if unit.dimension == "time":
+            return Heading(text, "time_s", unit)
+    for base, unit in _splits(bare):
+        words = english(base)
+        for name, dimension in quantities(words):
+            if not unit:
+                if name == "rpm" and "rpm" in words:
+                    return Heading(text, "rpm", units.UNITS["rpm"])
+                if set(words) == {"throttle"} and not re.search(r"[\s_]", bare):
+                    return Heading(text, "throttle", units.Unit("", "none", 1.0))
+                continue
+            if (goes := unit_for(dimension, unit)) is None:
+                continue
+            made, told = goes
+            if dimension == "angular_speed":
+                if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
+                    turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
+                    return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
+                made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
+                return Heading(text, "rpm", made)
+            return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
+    return None
+
+
+def _unit_at_end(text: str) -> str:
+    """Longest end of a text that is a unit, or a mass or the like that stands for one; "" without one."""
+    parts = re.split(r"[_ (\[]+", text.strip(" )]"))
+    ends = ("_".join(parts[k:]) for k in range(len(parts)))
+    return next((end for end in ends if unit_of(end) != ""), "")
+
+
+def _either(text: str) -> str:
+    """Doubt about a heading that names two units with an "or" between them; "" for any other.
+
+    >>> _either("value_N_or_Nm")
+    'N or Nm: one column holds one unit; give each quantity a column of its own'
+    >>> _either("CT_or_CP")
+    ''
+    """
+    first, *rest = (_unit_at_end(part) for part in re.split(r"[_ ]or[_ ]", text, flags=re.IGNORECASE))
+    if not rest or not first or not all(rest):
+        return ""
+    return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"
+
+
+def _of_the_air(base: str, unit: units.Unit) -> str:
+    """Quantity of the air around the rotor that a heading names; "qnh" for a pressure that is no local one; "" none."""
+    words = set(re.findall(r"[^\W\d_]+", plain(base)))
+    if unit.dimension == "pressure" and words & {"qnh", "slp"}:
+        return "qnh"
+    if unit.dimension == "fraction" and (words & {"humidity", "rh", "luftfeuchte", "luftfeuchtigkeit", "humedad"}):
+        return "humidity"
+    if unit.dimension in ("temperature", "pressure") and (words & _AROUND or words in ({"t", "inf"}, {"p", "inf"})):
+        return unit.dimension
+    if unit.dimension == "density" and words & {"rho", "density", "luftdichte"}:
+        return "density"
+    return ""
+
+
+def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str]:
+    """Name, unit and doubt of a heading that has no unit in brackets."""
+    if alone := _ALONE.get(core.lower()):
+        return alone[0], units.UNITS[alone[1]], ""
+    if (ending := _tail(core)) is not None:
+        name, stated = ending
+        return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)
+    name, suffix = units.split_suffix(core)
+    goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
+    if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
+        return core, units.UNITS["rpm"], ""
+    if suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
+        return text, None, f"{suffix.suffix!r} does not go with {name}"
+    if suffix is not None and suffix.dimension == "mass" and not re.search(r"weight|mass", name, re.IGNORECASE):
+        return text, None, f"{suffix.suffix!r} is {TWO_MEANINGS[suffix.suffix]}"
+    if suffix is not None and (name or suffix.dimension == "mass"):
+        return name, suffix, ""
+    pure = units.Unit("", "none", 1.0)
+    if _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
+        return _PURE_NAMES.get(core, core), pure, ""
+    if re.fullmatch(r"\w+/[NAVWKCF]", core):
+        return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
+    if "rotor convention" in text and core in ("CT", "CP", "CQ"):
+        return f"{core}_rotor", pure, ""
+    if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
+        return core, units.UNITS["rpm"], ""
+    return text, None, ""
+
+
+def _heading(text: str) -> Heading:
+    if either := _either(text):
+        return Heading(text, slug(text), None, either)
+    base, unit, doubt = text, None, ""
+    found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
+    if found:
+        stated = unit_of(found[2])
+        if isinstance(stated, units.Unit):
+            base, unit = found[1], stated
+        elif stated:
+            base, doubt = found[1], f"{found[2]!r} is {stated}"
+    core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
+    if found and (found[2].strip().lower() in ("erpm", "electrical") and "rpm" in text.lower()):
+        return Heading(text, "electrical_rpm", units.UNITS["rpm"])
+    if unit is None and not doubt:
+        base, unit, doubt = _without_brackets(core, text)
+    word = _WORDS.get(base.lower().replace("_", " "))
+    if word and word[1] == "acceleration" and doubt.startswith("'g'"):
+        unit, doubt = units.Unit("m_s2", "acceleration", units.G0), ""
+    if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:
+        base, unit = "rpm", units.UNITS["rpm"]  # U/min, 1/min
+    if unit is None:
+        return Heading(text, slug(text) or "column", None, doubt)
+    if around := _of_the_air(base, unit):
+        if around == "qnh":
+            return Heading(text, slug(text), None, _SEA_LEVEL)
+        base, word = around, None
+    if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
+        unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
+    if word and word[1] == unit.dimension:
+        base = word[0]
+        if unit.dimension == "angular_speed" and unit.suffix != "rpm":
+            unit = units.Unit("", "angular_speed", unit.factor / units.RPM)
+    if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
+        flat = re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE)
+        flat = re.sub(r"^[A-Z][a-z]{2,}$", lambda word: word[0].lower(), flat)
+        flat = "electrical" if flat.lower() == "e" else flat
+        return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
+    base = re.sub(r"\b[A-Z][a-z]{2,}", lambda word: word[0].lower(), base)
+    return Heading(text, _channel(slug(base), unit), unit)

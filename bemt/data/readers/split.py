@@ -1,0 +1,415 @@
+"""Splitting the text of a table into cells: delimiter, headings, lines of another length.
+
+No line vanishes in silence: what is neither heading nor row is a fault, or a warning that names it.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base import units
+from bemt.base.errors import Fault
+from bemt.base.tables import number_of
+from bemt.data.readers import SourceText, number
+from bemt.data.readers._words import english, quantities
+from bemt.data.readers.unit_text import unit_of
+
+DELIMITERS = (";", "\t", ",", "|")
+MAX_FAULTS = 20
+SHEET_ERRORS = frozenset({"#div/0!", "#n/a", "#value!", "#ref!", "#num!", "#name?", "#null!"})
+"""What a spreadsheet writes into a cell that it could not compute."""
+NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "\u2013", "\u2014", "null", "none"}) | SHEET_ERRORS
+"""Cells that say "no value", in lower case."""
+MOST_ODD = 0.1
+"""Share of cells that are no numbers from which a column is text."""
+MISFIT_SHARE = 0.05
+"""Share of lines of another length from which a file is refused."""
+_COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:([,. '\u2019\u00a0\u202f])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+"""Digits in groups of three."""
+_SUMMARY = re.compile(
+    r"(mean|average|avg\.?|max(imum)?|min(imum)?|total|sum|std\.?( ?dev\.?)?|median|mittelwert|durchschnitt|summe"
+    r"|moyenne|moy\.?|promedio|media|prom\.?|massimo|minimo|\u5e73\u5747\u503c?|\u6700\u5927\u503c?|\u6700\u5c0f\u503c?)\W*",
+    re.IGNORECASE,
+)
+"""First cells of rows that sum up the others."""
+_LABVIEW = "***End_of_Header***"
+_COMMENT = re.compile(r"\s*[#%](?!\s*[,;|])")
+_EXCEL = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class SplitTable:
+    """Cells of a delimited file: headings (empty when it has none), rows of equal length with their line numbers."""
+
+    source: SourceText
+    delimiter: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    warnings: tuple[str, ...] = ()
+    cut: int | None = None  # index of a row that the end of the file cut off
+    headings_line: int = 1
+    misfits: tuple[int, ...] = ()  # rows of another number of cells: kept, without values
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.rows[0]) if self.rows else 0
+
+    def cell(self, row: int, column: int) -> str:
+        """One cell."""
+        return self.rows[row][column]
+
+    def cells(self, column: int) -> Sequence[str]:
+        """Cells of a column."""
+        return [row[column] for row in self.rows]
+
+    def numbers(self, column: int, decimal: str = ".") -> tuple[NDArray[np.float64], list[int], int]:
+        """Numbers of a column, rows whose cell is none, number of empty cells."""
+        return column_numbers(self.cells(column), decimal)
+
+
+def column_numbers(cells: Sequence[str], decimal: str = ".") -> tuple[NDArray[np.float64], list[int], int]:
+    """Numbers of a column."""
+    values = np.full(len(cells), np.nan)
+    bad: list[int] = []
+    empty = 0
+    for i, cell in enumerate(cells):
+        if decimal == ",":
+            value = _ungrouped(cell, ",") if "." in cell else None
+            value = number(cell.replace(",", ".") if "." not in cell else cell) if value is None else value
+        else:
+            value = number(cell)
+        if value is None and cell:
+            value = _ungrouped(cell, decimal)
+        if value is not None:
+            values[i] = value
+        elif cell.lower() in NO_VALUE:
+            empty += 1
+        else:
+            bad.append(i)
+    return values, bad, empty
+
+
+def _ungrouped(cell: str, decimal: str) -> float | None:
+    """Number whose digits are in groups of three, where the marks leave one reading.
+
+    >>> _ungrouped("1 234,5", ","), _ungrouped("1,234.5", "."), _ungrouped("1,234", ".")
+    (1234.5, 1234.5, None)
+    """
+    grouped = _GROUPED.fullmatch(cell)
+    if not grouped or grouped[1] == decimal[0]:
+        return None
+    bare = cell.replace(grouped[1], "")
+    alone = grouped[1] in ",." and bare.lstrip("+-").isdigit() and cell.count(grouped[1]) == 1
+    return None if alone and decimal == "." else number(bare.replace(",", "."))
+
+
+def split_line(line: str, mark: str) -> list[str]:
+    """Cells of one line, quotes taken off."""
+    if mark == " ":
+        return line.split()
+    if '"' in line:
+        return [c.strip() for c in next(csv.reader([line], delimiter=mark))]
+    return [c.strip() for c in line.split(mark)]
+
+
+def heading_cells(line: str, mark: str, width: int) -> list[str]:
+    """Cells of a line of headings; between blanks, parted by two or more if that makes as many as the rows have."""
+    cells = split_line(line, mark)
+    apart = re.split(r"\s{2,}", line.strip()) if mark == " " and len(cells) != width else cells
+    return apart if len(apart) == width else cells
+
+
+def _is_units(cells: Sequence[str]) -> bool:
+    """Whether a line below the headings holds nothing but units."""
+    stated = [unit_of(c.strip("()[]")) for c in cells if c.strip("-()[]")]
+    return bool(stated) and all(isinstance(u, units.Unit) or u for u in stated)
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment; ``%,A,V`` holds units.
+
+    >>> is_comment("# day 2"), is_comment("%;1/min;N")
+    (True, False)
+    """
+    return bool(_COMMENT.match(line))
+
+
+def some(items: Iterable[object], limit: int = 5) -> str:
+    """First few of many, in words.
+
+    >>> some([1, 2]), some(range(9), 3)
+    ('1, 2', '0, 1, 2 and 6 more')
+    """
+    found = list(items)
+    more = f" and {len(found) - limit} more" if len(found) > limit else ""
+    return ", ".join(map(str, found[:limit])) + more
+
+
+def find_delimiter(lines: Sequence[str]) -> str:
+    """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
+
+    >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
+    (',', ';', ' ')
+    """
+    plain = [re.sub(r'"[^"]*"', "", line) for line in lines]
+    everywhere = [mark for mark in DELIMITERS if plain and all(mark in line for line in plain)]
+    return everywhere[0] if everywhere else " "
+
+
+def find_start(lines: Sequence[str]) -> tuple[int, str]:
+    """Line of the headings and delimiter of a table that may have lines of text above it.
+
+    Lines above count as such only when they have fewer cells than the rows, and a line of headings without numbers,
+    as long as the rows, follows: a damaged line of headings is none.
+
+    >>> find_start(["Run 7", "rpm;T_N", "1;2", "3;4"]), find_start(["sep=;", "rpm;T_N", "1;2"])
+    ((1, ';'), (1, ';'))
+    """
+    ends = [k for k, line in enumerate(lines) if line.startswith(_LABVIEW)]
+    if ends and ends[-1] + 2 < len(lines):
+        return ends[-1] + 1, find_delimiter(lines[ends[-1] + 1 : ends[-1] + 4])
+    excel = _EXCEL.fullmatch(lines[0]) if lines else None
+    if excel:
+        return 1, excel[1]
+    for start in range(1, min(31, len(lines) - 2)):
+        mark = find_delimiter(lines[start : start + 3])
+        if mark == " ":
+            continue
+        above = [split_line(line, mark) for line in lines[:start]]
+        names, *body = ([c for c in split_line(line, mark)] for line in lines[start : start + 3])
+        width = len(names)
+        if any(len(cells) >= width for cells in above):
+            break
+        said = not any(number(c) is not None for c in names) and sum(map(bool, names)) >= max(2, width - 1)
+        rows = all(len(cells) == width and any(number(c) is not None for c in cells) for cells in body)
+        if said and rows and not _is_units(names):
+            return start, mark
+    usual = find_delimiter(lines[:5])
+    return _below_a_block(lines, usual) or (0, usual)
+
+
+def _reads(cell: str) -> bool:
+    """Whether a cell is a number, in whatever way it is written."""
+    return number(cell) is not None or bool(
+        cell and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell) or with_unit(cell))
+    )
+
+
+def with_unit(cell: str) -> tuple[str, str] | None:
+    """Number and unit of a cell that holds both, such as ``50 %`` or ``11.0V``."""
+    found = re.fullmatch(r"([+-]?\d[\d.,]*)\s*([^\W\d_][^\s\d]{0,7}|%|\u00b0[CF])", cell)
+    return (found[1], found[2]) if found and unit_of(found[2]) != "" else None
+
+
+def _is_row(cells: Sequence[str]) -> bool:
+    numbers, full = sum(map(_reads, cells)), sum(map(bool, cells))
+    return numbers >= 2 and 2 * numbers >= full
+
+
+def _named(cells: Sequence[str]) -> float:
+    """Share of headings that are words of a quantity."""
+    full = [cell for cell in cells if cell]
+    return sum(bool(quantities(english(re.split(r"[(\[]", cell)[0]))) for cell in full) / max(len(full), 1)
+
+
+def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
+    """Headings right above the first two rows of numbers, below titles as wide as the table; None: as usual."""
+    for mark in dict.fromkeys((usual, *DELIMITERS, " ")):
+        split = [split_line(line, mark) for line in lines]
+        if mark == " ":
+            rows = [_is_row(cells) for cells in split]
+            split = [
+                cells if row else re.split(r"\s{2,}", line.strip())
+                for cells, row, line in zip(split, rows, lines, strict=True)
+            ]
+        first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
+        if not first:
+            continue
+        wide = max(2.0, 0.6 * sum(map(bool, split[first])))
+        top = first
+        while (
+            top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4
+        ):
+            top -= 1
+        told = [k for k in range(top, first) if not _is_units(split[k])]
+        while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
+            del told[0]
+        whole = told and all(len(split[k]) >= len(split[first]) for k in told)  # a cut line of headings is none
+        if whole and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
+            return told[0], mark
+    return None
+
+
+def decimal_mark(table: SplitTable) -> str:
+    """Decimal mark of a table: a comma only where it can be nothing else; ``.,`` if commas stand between thousands."""
+    cells = {cell for row in table.rows for cell in row}
+    commas = [cell for cell in cells if re.fullmatch(r"[\d,eE+-]*\d,\d[\d,eE+-]*", cell)]
+    points = [cell for cell in cells if "." in cell and number(cell) is not None]
+    thousands = all(_THOUSANDS.fullmatch(cell) for cell in commas)
+    if commas and thousands and any(not re.fullmatch(r"[+-]?\d{1,3}\.\d{3}", cell) for cell in points):
+        return ".,"
+    if table.delimiter == "," or not table.headings:
+        return "."
+    grouped = all(_GROUPED.fullmatch(cell) for cell in points)
+    plain = all(_COMMA.fullmatch(cell) for cell in commas)
+    return "," if plain and grouped and not thousands else "."
+
+
+def _in_a_comment(
+    lines: Sequence[str], split: Sequence[tuple[int, list[str]]], mark: str
+) -> tuple[int, list[str]] | None:
+    """Headings in the comment right above the first row of numbers."""
+    at, cells = split[0]
+    above = lines[at - 2] if at > 1 else ""
+    if not _is_row(cells) or not is_comment(above):
+        return None
+    names = split_line(re.sub(r"^\s*[#%]+[ \t]*(?=\w)|^\s*[#%]", "", above), mark)
+    return (at - 1, names) if len(names) == len(cells) and not any(map(_reads, names)) else None
+
+
+def _without_ends(
+    body: list[tuple[int, list[str]]], names: Sequence[str], notes: list[str]
+) -> list[tuple[int, list[str]]]:
+    """Rows without headings that come again, sums of the rows above, and remarks at the end, all named in notes."""
+    again = [i for i, cells in body if cells == list(names)]
+    sums = [
+        (i, next(filter(None, cells), "")) for i, cells in body if _SUMMARY.fullmatch(next(filter(None, cells), ""))
+    ]
+    out = {*again, *(i for i, _ in sums)}
+    kept = [(i, cells) for i, cells in body if i not in out]
+    ends: list[tuple[int, list[str]]] = []
+    while (
+        len(kept) > 1 and not any(map(_reads, kept[-1][1])) and sum(map(bool, kept[-1][1])) <= max(1, len(names) // 3)
+    ):
+        ends.append(kept.pop())
+    if again:
+        notes.append(f"{number_of(len(again), 'line')} left out: the headings again (line {some(again)})")
+    if sums:
+        words = some((f"{word!r} in line {i}" for i, word in sums), 3)
+        notes.append(f"{number_of(len(sums), 'line')} left out: sums of others ({words})")
+    if ends:
+        words = some((f"{' '.join(filter(None, c))[:60]!r} in line {i}" for i, c in ends[::-1]), 3)
+        notes.append(f"{number_of(len(ends), 'line')} left out: remarks at the end ({words})")
+    return kept
+
+
+def split_table(
+    source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
+) -> SplitTable:
+    """Split a file into rows of equal length; refused where more lines than a share of them have another length."""
+    lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
+    comments = sum(map(is_comment, lines))
+    bare = [i for i, t in used if not t.strip(" \t;,|")]
+    used = [(i, t) for i, t in used if t.strip(" \t;,|")]
+    if not used:
+        source.refuse("", "no data", "a heading line and rows of numbers")
+    notes = [f"{comments} comment lines left out"] if comments else []
+    notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
+    mark = mark or find_delimiter([t for _, t in used[:5]])
+    labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
+    if start:
+        above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
+        notes += (
+            [] if _EXCEL.fullmatch(used[0][1]) else [f"{number_of(start, 'line')} above the headings left out: {above}"]
+        )
+        used = used[start:]
+    if any(len(t) > 100_000 for _, t in used):
+        source.refuse("", "a line of more than 100000 characters", "a table of short lines")
+    split = [(i, split_line(t, mark)) for i, t in used]
+    if header is None and (said := _in_a_comment(lines, split, mark)):
+        split.insert(0, said)
+        notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
+        notes.append(f"the headings are the comment in line {said[0]}")
+    top, first = split[0]
+    if header is None:
+        header = not any(number(c) is not None for c in first)
+    if header and len(split) > 1 and top == used[0][0]:
+        first = heading_cells(used[0][1], mark, len(split[1][1]))
+    if labview:  # units of the channels, which stand behind the time
+        first = _with_units(first, [*["s"][: len(first)], *labview[1:]])
+        first[0] = first[0].replace("X_Value", "Time")
+    closed = not lines[-1]
+    names, body = _below(first, split, closed, notes) if header else ([], split)
+    width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
+    rows, cut, misfits = _rows(source, body, width, top, closed, most_misfits)
+    return SplitTable(source, mark, tuple(names), rows, tuple(i for i, _ in body), tuple(notes), cut, top, misfits)
+
+
+def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:
+    """Headings with the units that another line has for them."""
+    filled = [*units_, *[""] * len(names)]
+    return [f"{name} ({unit})" if unit else name for name, unit in zip(names, filled, strict=False)]
+
+
+def _below(
+    first: list[str], split: list[tuple[int, list[str]]], closed: bool, notes: list[str]
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Headings, with what further lines of headings and units say, and the rows below them."""
+    width = len(first)
+    while width > 1 and not first[width - 1]:  # a heading line that ends in the delimiter
+        width -= 1
+    top, *body = split
+    while len(body) > 1:
+        line, below = body[0]
+        if _is_units(below):
+            first = _with_units(first, [unit.strip("-()[]") for unit in below])
+            notes.append(f"line {line} holds units")
+        elif sum(a == b for a, b in zip(first, below, strict=False)) > 0.5 * width:
+            notes.append(f"1 lines left out: the headings again (line {line})")
+        elif not any(map(_reads, below)) and sum(map(bool, below)) >= max(2.0, 0.6 * width) and _named(below) >= 0.5:
+            first = [" ".join(filter(None, pair)) for pair in zip(first, [*below, *[""] * width], strict=False)]
+            notes.append(f"line {line} holds more headings")
+        else:
+            break
+        del body[0]
+    last = [body.pop()] if not closed and len(body) > 1 else []  # the end of the file cut it off: no remark
+    body = [*_without_ends(body, top[1], notes), *last]
+    usual = {len(c) for _, c in body}
+    if len(usual) == 1 and (most := usual.pop()) < width and len(body) > 1:  # columns that no row fills
+        body = [(i, [*c, *[""] * (width - most)]) for i, c in body]
+    return first[:width], body
+
+
+def _rows(
+    source: SourceText, body: Sequence[tuple[int, list[str]]], width: int, top: int, closed: bool, most_misfits: float
+) -> tuple[tuple[tuple[str, ...], ...], int | None, tuple[int, ...]]:
+    """Rows of equal length, which of them the end of the file cut off, and those of another length, kept empty."""
+    rows: list[tuple[str, ...]] = []
+    faults: list[Fault] = []
+    misfits: list[int] = []
+    cut = None
+    for k, (i, cells) in enumerate(body):
+        short = len(cells) < width
+        if short and k == len(body) - 1 and not closed and k > 0:
+            cut = k
+            rows.append((*cells, *[""] * (width - len(cells))))
+        elif short or any(cells[width:]):
+            hint = "Was a line cut?" if short else "A delimiter inside a value, or a decimal comma?"
+            faults.append(source.fault(i, number_of(len(cells), "cell"), f"{width} as in line {top}", hint))
+            misfits.append(k)
+            rows.append(("",) * width)
+        else:
+            rows.append(tuple(cells[:width]))
+    if len(faults) > most_misfits * len(body):
+        source.faults += faults[:MAX_FAULTS]
+        if len(faults) > MAX_FAULTS:
+            source.add("", f"{number_of(len(faults) - MAX_FAULTS, 'more line')} of another length", f"{width} cells")
+        source.check()
+    if not rows:
+        source.refuse("", "no rows", "a heading line and rows of numbers")
+    return tuple(rows), cut, tuple(misfits)

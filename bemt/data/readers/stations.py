@@ -1,0 +1,134 @@
+"""Tables of blade stations as people write them: r, chord and blade angle, lengths or shares of R or D."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bemt.base import units
+from bemt.base.arrays import Array
+from bemt.base.tables import number_of
+from bemt.data.readers import SourceText, load_text
+from bemt.data.readers._words import plain
+from bemt.data.readers.split import decimal_mark, split_table
+from bemt.data.readers.unit_text import unit_of
+
+EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
+WIDEST = 0.8
+"""Largest chord over the tip radius that a blade has: that of the Kaplan propeller Ka 4-70 is 0.78 [1]."""
+_WORDS = {  # in English, German, French, Italian, Spanish, Chinese
+    "r": "r|radius|radial position|radial station|station|x|rayon|raggio|radio|半径",
+    "chord": "c|chord|chord length|width|blade width|sehne|profiltiefe|blatttiefe|corde|corda|cuerda|弦长",
+    "beta": "beta|b|blade angle|pitch angle|theta|einstellwinkel|blattwinkel|steigungswinkel|calage|angle de calage"
+    "|calettamento|angolo di calettamento|angulo de paso|桨叶角|安装角",
+    "pitch": "pitch|local pitch|steigung|pas|passo|paso|p",
+}
+_NAMES = {word: name for name, words in _WORDS.items() for word in words.split("|")}
+_TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
+"""What lengths are shares of, in tip radii."""
+_TWIST = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Column of a table of stations: `scale` makes shares of the tip radius, or degrees, of its values."""
+
+    at: int
+    name: str
+    scale: float
+    share: bool
+    heading: str
+
+
+def _column(at: int, text: str, R: float) -> _Column | None:
+    """What a heading stands for; None for another."""
+    words = " ".join(plain(text).split())
+    share = re.fullmatch(r"(2 ?)?(.+?) ?(?:/| over ) ?(.+?)( ?[\[(] ?[-%]? ?[\])])?", words)
+    if share and share[3] in _TIPS and (name := _NAMES.get(share[2])) in ("r", "chord", "pitch"):
+        scale = _TIPS[share[3]] * (0.5 if share[1] else 1.0) * (0.01 if "%" in (share[4] or "") else 1.0)
+        return _Column(at, str(name), scale, True, text)
+    parts = re.fullmatch(r"(.+?) ?[\[(] ?(.+?) ?[\])]|(.+) (\S+)", words)
+    whole = re.fullmatch(r".*?[\[(] ?(.+?) ?[\])]|.+[_ ](\S+)", " ".join(text.split()))
+    name = _NAMES.get(parts[1] or parts[3]) if parts else None
+    if not name or not whole:
+        return None
+    unit = unit_of(whole[1] or whole[2])
+    wanted = "angle" if name == "beta" else "length"
+    if not isinstance(unit, units.Unit) or unit.dimension != wanted:
+        return None
+    return _Column(at, name, unit.factor / units.DEG if name == "beta" else unit.factor / R, False, text)
+
+
+def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
+    """Reason why a table of stations lacks a column."""
+    bare = [h for h in headings if _NAMES.get(plain(h)) in lacking]
+    if bare:
+        unit = {"beta": "deg"}
+        told = ", ".join(f"{h} ({unit.get(_NAMES[plain(h)], 'mm')})" for h in bare)
+        return f"Write the units, such as {told}"
+    return _TWIST if "beta" in lacking else ""
+
+
+def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
+    """Columns r/R, c/R and beta [rad] of a table for a tip radius [m], others are left; faults carry line and column.
+
+    Cells are parted by commas, semicolons, tabs or blanks; decimal commas are read where they can be nothing else. A
+    column of local pitch (``pitch_mm``, ``P/D``) stands for the angle, beta = arctan(pitch / 2 pi r).
+    """
+    whole = load_text(path)
+    source = SourceText(path.as_posix(), "\n".join(line.split("#", 1)[0] for line in whole.lines), whole.sha256)
+    if not source.text.strip():
+        source.refuse("", "0 stations", "two or more")
+    table = split_table(source, header=True, most_misfits=1.0)
+    top = table.headings_line
+    found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
+    by_name = {name: [c for c in found if c.name == name] for name in ("r", "chord", "beta", "pitch")}
+    wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
+    if lacking := [name for name in wanted if not by_name[name]]:
+        header = source.lines[top - 1].strip()
+        source.refuse(top, f"the header {header!r}", EXPECTED, _hint(table.headings, lacking))
+    for name in wanted:
+        if len(by_name[name]) > 1:
+            source.add(top, " and ".join(c.heading for c in by_name[name]), "one of them")
+    for i in table.misfits:
+        source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
+    places = [by_name[name][0] for name in wanted]
+    decimal = decimal_mark(table)
+    columns = []
+    for place in places:
+        values = table.numbers(place.at, decimal)[0]
+        for i in np.flatnonzero(np.isnan(values)).tolist():
+            if i not in table.misfits:
+                source.add(f"{table.lines[i]}:{place.at + 1}", repr(table.cell(i, place.at)), "a number")
+        columns.append(values * place.scale)
+    source.faults.sort(key=lambda fault: int(fault.where.split(":")[0]))
+    if not source.faults and len(table) < 2:
+        source.add("", number_of(len(table), "station"), "two or more")
+    source.check()
+    x, c, beta = columns
+    if wanted[2] == "pitch":
+        beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
+    _limits(source, places, (x, c, beta), R)
+    source.check()
+    return np.minimum(x, 1.0), c, np.radians(beta)
+
+
+def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> None:
+    """What no blade has, each with the likely reason."""
+    x, c, beta = columns
+    is_length = not places[0].share
+    limits = ((x.max(), 0.75 if is_length else 0.0, 1.001), (c.max(), 0.0, WIDEST), (np.abs(beta).max(), 0.0, 90.0))
+    radius = f"Is the tip radius {1e3 * R:g} mm?" if is_length else "Divide the radius by the tip radius"
+    chord = "Divide the chord by the tip radius; one over the diameter is chord_over_D" if places[1].share else radius
+    hints = (radius, chord if c.max() > WIDEST else "", "")
+    for place, (value, low, high), hint in zip(places, limits, hints, strict=True):
+        if not low <= value <= high:
+            expected = f"at most {high / place.scale:.4g}"
+            expected = expected if value > high else f"{low / place.scale:.4g} or more at the outermost"
+            source.add(place.heading, f"{value / place.scale:.4g}", expected, hint)
+    if places[2].name == "beta" and places[2].scale == 1.0 and np.abs(beta).max() < 1.6:
+        source.add(places[2].heading, f"angles up to {np.abs(beta).max():g}", "degrees", "Looks like radians")

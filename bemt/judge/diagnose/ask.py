@@ -1,0 +1,226 @@
+"""A diagnosis as both doors ask for it: recordings of any kind, cases and what the user knows give an `Answer`."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.base.action import Told
+from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.face import as_html
+from bemt.base.given import path_text
+from bemt.judge.compare import one_run
+from bemt.judge.diagnose import figures as pictures
+from bemt.judge.diagnose import folder
+from bemt.judge.diagnose.along_blade import AlongBlade
+from bemt.judge.diagnose.along_blade import along as along_blade
+from bemt.judge.diagnose.answer import Diagnosis
+from bemt.judge.diagnose.chain import diagnose
+from bemt.judge.diagnose.document import document, text
+from bemt.judge.diagnose.load import cases_of, load_all
+from bemt.judge.diagnose.suggest import Given
+from bemt.rotors.case import case_of
+from bemt.rotors.case.words import sorted_out
+from bemt.rotors.propeller import Propeller, rotor_of
+
+CHANNELS = {"thrust": "thrust_N", "torque": "torque_Nm", "speed": "rpm"}
+REPEATABILITY_MAX = 20.0
+"""Beyond this runs do not repeat [%]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Result of a diagnosis, returned by :func:`diagnose`.
+
+    Parameters
+    ----------
+    diagnosis : bemt.judge.diagnose.answer.Diagnosis
+        The complete result.
+    propeller : Propeller
+        The propeller that was compared with the recording.
+    document : dict
+        Plain values of schema ``bemt.diagnosis/1``.
+    blade : dict
+        Blade loads beside the model, where they were given.
+
+    Examples
+    --------
+    The blades of this recording are 1.5 deg steeper than those of its reference:
+
+    >>> import numpy as np
+    >>> from bemt import diagnose, propeller
+    >>> p = propeller("10x5")
+    >>> rpm, J = np.repeat([5000.0, 10000.0, 15000.0], 6), np.tile(np.linspace(0.0, 0.5, 6), 3)
+    >>> turned = p.replaced({"blade.beta_offset_deg": 2.2}).solve(rpm, J=J, bands=False)
+    >>> answer = diagnose(turned, p, reference=p.solve(rpm, J=J, bands=False), only=["pitch_offset", "torque_gain"])
+    >>> answer
+    <answer on prop_10x5: named pitch_offset>
+    >>> answer.verdict, answer.effects, answer.to_dict()["schema"]
+    ('named', ('pitch_offset',), 'bemt.diagnosis/1')
+    >>> print(answer.text.splitlines()[0])
+    Cause found: wrong blade angle (+1.49 deg).
+    >>> improved = answer.improved.solve(rpm, J=J, bands=False)
+    >>> bool(np.max(np.abs(improved.thrust_N / turned.thrust_N - 1)) < 0.02)
+    True
+    >>> import tempfile
+    >>> "before_after.png" in {file.name for file in answer.plot(tempfile.mkdtemp())}
+    True
+    """
+
+    diagnosis: Diagnosis
+    propeller: Propeller
+    document: dict[str, Any]
+    blade: dict[str, AlongBlade]
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<answer on {self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects))).strip()}>"
+
+    def _repr_html_(self) -> str:
+        """Show the answer in a notebook."""
+        return as_html(f"{self.propeller.name}: {' '.join((self.verdict, ', '.join(self.effects)))}", self.text)
+
+    @property
+    def verdict(self) -> str:
+        """One of none, named, class, sensor, unknown, insufficient."""
+        return self.diagnosis.said.verdict
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the verdict; for a class, all members."""
+        return self.diagnosis.said.effects
+
+    @property
+    def text(self) -> str:
+        """The answer as text, as on the command line."""
+        return "\n\n".join([text(self.diagnosis), *(c.text() for c in self.blade.values())])
+
+    @property
+    def improved(self) -> Propeller | None:
+        """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
+        from bemt.judge.diagnose.improve import improved_case
+
+        text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
+        return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert the answer to plain values.
+
+        Returns
+        -------
+        dict
+            Schema ``bemt.diagnosis/1``.
+        """
+        return self.document
+
+    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Draw the figures of the answer.
+
+        Parameters
+        ----------
+        folder : str or path
+            Folder for the PNG files.
+
+        Returns
+        -------
+        list of Path
+            The files.
+        """
+        try:
+            return pictures.draw(self.diagnosis, Path(path_text("folder", folder)))
+        except OSError as error:
+            raise InputError(system_fault(error)) from error
+
+
+class OnePoint(Told):
+    """One point, which cannot be diagnosed, beside the model."""
+
+    verdict = "insufficient"
+    effects: tuple[str, ...] = ()
+
+
+def several(given: Any) -> list[Any]:
+    """One or more things as a list; paths as text."""
+    many = [] if given is None else list(given) if isinstance(given, (list, tuple)) else [given]
+    return [os.fspath(one) if isinstance(one, os.PathLike) else one for one in many]
+
+
+def diagnosed(
+    recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
+    off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
+    repeatability_pct: float | None, along: Any, out: Any, figures: bool, progress: Callable[[str], None] | None,
+) -> Answer | OnePoint:  # fmt: skip
+    """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
+    only = [only] if isinstance(only, str) else list(only)
+    given, files = sorted_out(several(case), several(recordings))
+    known = several(reference)
+    _both_there(given, files, known, reference_case, repeatability_pct)
+    target = None if out is None else path_text("out", out)
+    theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
+    speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
+    cases, records = load_all(files, given, known, off, only, before=lambda found: folder.check(target, found),
+                              rpm=speeds, airspeed_m_s=winds, ruled_out=ruled_out,
+                              reference_case=theirs)  # fmt: skip
+    if repeatability_pct is not None:
+        records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
+    chosen = cases * len(files) if len(cases) == 1 else cases
+    each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
+    asked = _asked(files, given, known, only=only, ruled_out=ruled_out, off=off, baseline=baseline,
+                   reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
+    heard = [CHANNELS[c] for c in channels] or None
+    try:
+        answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
+    except InputError as error:
+        if len(files) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
+            raise
+        # one point cannot be diagnosed: it is shown beside the model
+        found = one_run.compare_run(files[0], cases[0], progress) | {"verdict": "insufficient", "effects": []}
+        return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
+    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+    names = [one if isinstance(one, str) else "recording" for one in files]
+    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]}
+    if blade:
+        told["along_blade"] = {run: c.document() for run, c in blade.items()}
+    if target is not None:
+        folder.write(target, answer, told, cases, figures=figures)
+    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
+
+
+def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:
+    """Refuse a diagnosis without a recording or without a case."""
+    faults = [] if files else [Fault("", "recordings", "none", "one or more tables or logs")]
+    if theirs is not None and not known:
+        faults.append(Fault("--reference-case", "", "no reference", "--reference RECORDING beside it"))
+    faults += [] if cases else [Fault("--case", "", "no case", "the case of the rotor, as in cases/prop_8x5")]
+    if percent is not None and not 0.0 < percent <= REPEATABILITY_MAX:
+        expected = f"a percentage above 0 and up to {REPEATABILITY_MAX:g}"
+        faults.append(Fault("--repeatability-pct", "", f"{percent:g}", expected))
+    if faults:
+        raise InputError(faults)
+
+
+def _asked(
+    files: list[Any], cases: list[Any], known: list[Any], *, only: Sequence[str], ruled_out: Sequence[str],
+    off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
+) -> Given:  # fmt: skip
+    """What was asked, for the command of the next step; objects of the library have a word in place of their file."""
+
+    def quoted(given: list[Any], word: str) -> tuple[str, ...]:
+        return tuple(shlex.quote(one) if isinstance(one, str) else word for one in given)
+
+    words = ["--case", *quoted(cases, "CASE")]
+    for option, values in (("--off", off), ("--only", only)):
+        words += [option, *values] if values else []
+    if reference_case is not None:
+        words += ["--reference-case", *quoted(several(reference_case), "CASE")]
+    if repeatability_pct is not None:
+        words += ["--repeatability-pct", f"{repeatability_pct:g}"]
+    if baseline != "bemt":
+        words += ["--baseline", baseline]
+    return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out))

@@ -1,0 +1,163 @@
+"""The action ``import``: files read, checked, kept with what the user states, and set beside a case."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from bemt.base.action import Count, Told, action
+
+if TYPE_CHECKING:
+    from bemt.rotors.propeller import Propeller
+
+    File = str | os.PathLike[str]
+
+__all__ = ["import_"]
+
+
+@action(
+    "Recordings", "import log.csv", words=("files",), command="import", shown=True,
+    common=("case", "picture", "rpm", "unit", "column", "sign", "zones", "out"),
+)  # fmt: skip
+def import_(
+    files: File | Sequence[File], *, format: str | None = None, rpm: float | None = None,  # noqa: A002
+    period_s: float | None = None, revolutions: Count | None = None, case: Propeller | File | None = None,
+    picture: File | None = None, unit: Mapping[str, str] = {}, column: Mapping[str, str] = {},  # noqa: B006
+    sign: Mapping[str, str] = {}, sector: Count | None = None, zones: Sequence[str] = (),  # noqa: B006
+    axis: Literal["x", "y", "z"] | None = None, airspeed_m_s: float | None = None, density_kg_m3: float | None = None,
+    reference: Mapping[str, str] = {}, setup: Mapping[str, str] = {}, out: File | None = None,  # noqa: B006
+) -> Told:  # fmt: skip
+    r"""Read CFD, bench or vendor data: channels, means, drift, warnings.
+
+    Parameters
+    ----------
+    files : path or sequence of paths
+        Files, or folders that a reader takes as a whole.
+    format : str, optional
+        Reader to use; detected from the content by default.
+    rpm : float, optional
+        Speed, for averages over whole revolutions. [rev/min]
+    period_s : float, optional
+        Duration of a revolution, instead. [s]
+    revolutions : int, optional
+        Average the last so many revolutions; 4, or half, by default.
+    case : Propeller, str or path, optional
+        Say how the recordings lie in the prediction band of this case.
+    picture : path, optional
+        With a case: draw the recordings inside the band, to this PNG file.
+    unit : mapping
+        What the files do not say: unit of a quantity or column, thrust=N.
+    column : mapping
+        Column of a quantity: thrust=fz.
+    sign : mapping
+        Sign of a load: torque=-1; -1 alone turns all.
+    sector : int, optional
+        The model is one of so many equal sectors: loads are multiplied.
+    zones : sequence of str
+        Zones whose loads count: blade,hub,duct.
+    axis : {"x", "y", "z"}, optional
+        Axis of the shaft; that of the largest force by default.
+    airspeed_m_s : float, optional
+        Speed of flight. [m/s]
+    density_kg_m3 : float, optional
+        Density of the fluid. [kg/m3]
+    reference : mapping
+        What coefficients rest on: area=A length=L speed=V density=RHO. [m2, m, m/s, kg/m3]
+    setup : mapping
+        How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2.
+    out : path, optional
+        File that keeps what you state, run.toml or recording.toml; every command takes it in place of the files.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.import/1``; the worst file sets ``exit_code``.
+
+    Raises
+    ------
+    InputError
+        For options that do not go together.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> file = Path(tempfile.mkdtemp()) / "bench.csv"
+    >>> _ = file.write_text("rpm,thrust_gf,torque_Nm\n5000,340,0.05\n6000,490,0.07\n")
+    >>> import_(file).to_dict()["schema"]
+    'bemt.import/1'
+    """
+    from bemt.base.errors import Fault, InputError
+    from bemt.base.given import paths_text
+    from bemt.data.recordings import cfd_options, load
+    from bemt.data.recordings.choice import asked
+
+    if picture is not None and case is None:
+        raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
+    names, wrote = paths_text("files", files, 1), ""
+    choice = asked(rpm, period_s, revolutions)
+    load.check_format(format)
+    told: dict[str, Any] = {"unit": _words(unit), "column": _words(column), "sign": _words(sign)}
+    run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
+           "density_kg_m3": density_kg_m3, "reference": _words(reference), "setup": _words(setup)}  # fmt: skip
+    lines, insist = [], any(told.values()) or any(run.values()) or out is not None
+    if insist and (table := _table(names, run)):
+        from bemt.data.recordings.stated import write_recording
+
+        if out is None:
+            hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
+            raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
+        written = write_recording(table, os.fspath(out), told["unit"], told["column"], told["sign"]).as_posix()
+        lines.append(f"{written} written\n")
+        names, told, out, insist = [written], dict.fromkeys(told, []), None, False
+    speed = None if choice.period is None else 60.0 / choice.period
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
+    found = load.document(names, format, choice, made, insist)
+    if out is not None and found["runs"]:
+        made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
+        wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
+    if case is not None:
+        seen = [wrote] if wrote else names
+        sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote))
+        lines.append(f"{sentence}\n")
+    return Told(found, "\n".join([*lines, load.text(found, wrote)]), exit_code=load.exit_code(found))
+
+
+def _words(given: Mapping[str, str]) -> list[str]:
+    """``NAME=VALUE`` of a mapping; the empty name stands for all."""
+    return [f"{name}={value}" if name else str(value) for name, value in given.items()]
+
+
+def _table(files: Sequence[str], run: Mapping[str, object]) -> str | None:
+    """The one table of measurements whose columns the options are about; None where they are about a CFD run."""
+    from bemt.base.errors import InputError
+    from bemt.data import readers
+    from bemt.data.readers.cfd_run import KIND as RUN
+    from bemt.data.recordings.cfd_files import PROGRAMS
+
+    if len(files) != 1 or any(run.values()) or Path(files[0]).is_dir():
+        return None
+    try:
+        kind = readers.detect(files[0])
+    except InputError:
+        return None
+    return None if kind in PROGRAMS or kind == RUN else files[0]
+
+
+def _beside(
+    files: list[str], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
+) -> tuple[str, dict[str, Any]]:
+    """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
+    from bemt.base.tables import write_atomic
+    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.load import load_all
+
+    speed = [rpm] if rpm is not None and not stated else []
+    wind = [airspeed_m_s] if airspeed_m_s is not None and not stated else []
+    cases, records = load_all(files, [case], rpm=speed, airspeed_m_s=wind)
+    (view,) = first_picture(records, cases)
+    if picture is not None:
+        write_atomic(Path(str(picture)), view.png())
+    return view.sentence, view.document()

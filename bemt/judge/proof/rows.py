@@ -1,0 +1,232 @@
+"""What the proof keeps: key and entries, answers as far as they are read, and the document of a score."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import field, replace
+from typing import Any, Self
+
+from bemt.base.document import Documented
+
+Names = set[str]  # An entry has a field of that name
+
+
+class TrueValue(Documented):
+    """Parameter of a concealed cause."""
+
+    value: float
+    unit: str = ""
+
+
+class Entry(Documented):
+    """What the key says of an item; by cause where it is a sequence."""
+
+    folder: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 by name
+    set: str = ""
+    causes: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    strengths: tuple[float, ...] = ()
+    parameters: Mapping[str, Mapping[str, TrueValue]] = field(default_factory=dict)
+    separation: tuple[float, ...] = ()  # Over noise and nuisances, over noise alone [1]
+    separation_noise: tuple[float, ...] = ()
+    alike: tuple[tuple[str, ...], ...] = ()  # Causes that the plan cannot tell from it
+    variables: tuple[tuple[str, ...], ...] = ()  # Along which it shows
+    plan: str = ""
+    rig: str = ""
+    ducted: bool = False
+    seed: int = 0
+    referenced: bool | None = None
+    stated: bool | None = None
+    air_known: bool | None = None
+    rows: int = 0
+    stand: Mapping[str, Any] = field(default_factory=dict)
+    separation_together: tuple[float, float] | None = None  # Of a pair, when the other may take what it can
+    reason: str | None = None
+
+    @property
+    def seen(self) -> Sequence[float]:
+        """Separation of each cause beside the others. [1]"""
+        return self.separation_together or self.separation
+
+    @property
+    def allowed(self) -> list[Names]:
+        """Names that stand for each cause."""
+        return [{c, *a} for c, a in zip(self.causes, self.alike, strict=True)]
+
+
+class Key(Documented):
+    """A sealed key."""
+
+    schema: str
+    version: str
+    seed: str
+    size: str
+    items: tuple[Entry, ...] = ()
+
+
+class Estimate(Documented):
+    """Parameter that an answer tells, with its 90 % interval."""
+
+    value: Any = None
+    low: float = math.nan
+    high: float = math.nan
+
+
+class Ranked(Documented):
+    """One explanation."""
+
+    effect: str
+    probability: float = math.nan
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+
+
+class Fit(Documented):
+    """Errors of a channel."""
+
+    noise: float = math.nan
+    gp_only: float = math.nan
+    holdout_before: float = math.nan
+    holdout_after: float = math.nan
+
+
+class Location(Documented):
+    """Where the residual lies."""
+
+    variable: str = ""
+    ties: tuple[str, ...] = ()
+
+
+class Step(Documented):
+    """What an answer recommends."""
+
+    kind: str = ""
+    commands: tuple[str, ...] = ()
+    points: tuple[Mapping[str, float], ...] = ()
+    separates: tuple[str, ...] = ()
+    checks: str | None = None
+    otherwise: Step | None = None
+
+
+class Answer(Documented):
+    """A diagnosis or comparison, as far as the proof reads it; without a verdict, none."""
+
+    verdict: str = ""
+    effects: tuple[str, ...] = ()
+    ranking: tuple[Ranked, ...] = ()
+    sets: tuple[tuple[str, ...], ...] = ()
+    fit: Mapping[str, Fit] = field(default_factory=dict)
+    location: Location | None = None
+    next_measurement: Step | None = None
+    log_bayes: Mapping[str, float] | None = None
+    nearest_signature: str | None = None
+    probability: float = 0.0
+    confirmed: bool = False
+    whole: Mapping[str, Any] = field(default_factory=dict)  # As printed
+
+    def __bool__(self) -> bool:
+        """Whether there is an answer."""
+        return bool(self.verdict)
+
+    def document(self) -> dict[str, Any]:
+        """The answer as it was printed, with what a check has found since."""
+        now = {"effects": list(self.effects), "confirmed": True} if self.confirmed else {}
+        return {**self.whole, "verdict": self.verdict, **now}
+
+    @classmethod
+    def from_document(cls, document: Any, lenient: bool = True) -> Self:
+        """Answer of a printed document; what has another type counts as not said."""
+        whole = document if isinstance(document, Mapping) else {}
+        return replace(super().from_document(whole, True), whole=whole)
+
+    @property
+    def step(self) -> Step:
+        """Recommended step, an empty one where there is none."""
+        return self.next_measurement or Step()
+
+    @property
+    def sure(self) -> float:
+        """Its probability, 0 where none is told. [1]"""
+        return 0.0 if math.isnan(self.probability) else self.probability
+
+
+class Stored(Documented):
+    """File of an answer."""
+
+    answer: Answer = Answer()
+    error: str = "no answer"
+    seconds: float = math.nan
+
+
+class ScoreRow(Documented):
+    """A row of the score table."""
+
+    what: str  # Metric
+    # Count, of how many; for medians the count of values. [-]
+    hits: int
+    n: int
+    # Share or median, with its 95 % Wilson interval (NaN for medians). [-]
+    value: float
+    low: float
+    high: float
+    target: str  # Wanted
+    met: bool | None  # Whether the value meets the target; None without data
+
+
+class Risk(Documented):
+    """Share of wrong claims among the surest ones, and the probability down to which these go."""
+
+    coverage: float
+    risk: float
+    n: float
+    probability: float
+
+
+class Stratum(Documented):
+    """Single causes between two separations."""
+
+    low: float
+    high: float
+    n: int
+    top1: int
+    claims: int
+    right: int
+
+
+class Miss(Documented):
+    """An item that was not answered as it should be."""
+
+    folder: str
+    set: str
+    causes: tuple[str, ...]
+    plan: str
+    rig: str
+    separation: float
+    alike: tuple[tuple[str, ...], ...]
+    said: str
+    verdict: str | None
+    effects: tuple[str, ...]
+    ranking: tuple[tuple[str, float], ...]
+    error: str
+
+
+class Proof(Documented):
+    """Document of a proof."""
+
+    schema: str
+    version: str
+    size: str
+    seed: str
+    commit: str
+    key_sha256: str
+    items: int
+    score: tuple[ScoreRow, ...]
+    baselines: tuple[ScoreRow, ...]
+    strata: tuple[Stratum, ...]
+    risk_coverage: tuple[Risk, ...]
+    confusion: Mapping[str, Mapping[str, int]]
+    answers: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    misses: tuple[Miss, ...] = ()
+    seconds_median: float = math.nan
+    seconds: Mapping[str, float] | None = None  # Spent on concealing and on diagnosing

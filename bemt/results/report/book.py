@@ -1,0 +1,177 @@
+"""What a report shows, typed: cases with their curves, trends, numbers of the source thesis, diagnoses, pages of tools.
+
+Arrays are along the abscissa that stands first; NaN where nothing is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bemt.base.arrays import Array
+from bemt.base.document import Documented
+from bemt.data.recordings.grid_study import GridStudy
+from bemt.physics.dataset import Dataset
+from bemt.results.report.values import Page
+from bemt.results.sweep.rows import Result, Row
+from geometry.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class BladeCurves:
+    """Blade over the radius."""
+
+    r_over_R: Array
+    chord_mm: Array
+    beta_deg: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CaseCurves:
+    """BEMT with its bands and K1/K2, over J at the case's rpm and over rpm at its airspeed; flags of both."""
+
+    over_J: Dataset
+    over_rpm: Dataset
+    k1k2_CT: Array  # Over J
+    k1k2_thrust_N: Array  # Over rpm
+    flags: Sequence[str]
+
+
+@dataclass(frozen=True, eq=False)
+class RadialCurves:
+    """Loading along the blade at the case's own operating point."""
+
+    r_over_R: Array
+    dT_dr: Array
+    dQ_dr: Array
+    alpha_deg: Array
+    M: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """Thrust and torque against the number of blade elements."""
+
+    stations: Sequence[int]
+    thrust_N: Array
+    torque_Nm: Array
+    used: int
+    change_to_finest: float
+    grid_study: GridStudy | None
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis in the folder of results with its figures (name, content)."""
+
+    name: str
+    document: Mapping[str, Any]  # Of another program's hand: read by `diagnosis_block` alone
+    figures: Sequence[tuple[str, bytes]] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class CasePage:
+    """A case with what is drawn of it; the last four come from recordings beside its own."""
+
+    result: Result
+    files: Sequence[tuple[str, str]] = ()  # Name and SHA-256
+    problems: tuple[str, ...] = ()
+    surfaces: Sequence[Surface] = ()
+    picture: bytes = b""
+    blade: BladeCurves | None = None
+    curves: CaseCurves | None = None
+    radial: RadialCurves | None = None
+    refinement: Refinement | None = None
+    own_rows: Sequence[Row] = ()
+    own_points: Sequence[tuple[str, str, float, float]] = ()  # Source, label, thrust and its u [N]
+    own_radial: Mapping[str, Sequence[tuple[float, float, float]]] = field(default_factory=dict)
+    """By name: radius [m], thrust [N/m] and torque [N] per radius."""
+    diagnosis: Diagnosed | None = None
+
+
+class Reproduced(Documented):
+    """A number of the source thesis beside ours."""
+
+    section: str
+    quantity: str
+    stated: Any  # As printed, number or words
+    ours: Any
+    unit: str
+    status: str
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """BEMT and K1/K2 over one quantity that is varied."""
+
+    x: Array
+    thrust_N: Array
+    k1k2_thrust_N: Array
+    M_tip: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """One propeller with one quantity varied at a time."""
+
+    name: str
+    title: str
+    D_in: float
+    pitch_in: float
+    rpm_case: float
+    mach_per_rpm: float
+    mach_per_inch: float
+    diameter: Line
+    pitch: Line
+    rpm: Line
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A drive on the robot of the source thesis, thrust over weight."""
+
+    name: str
+    thrust_N: float
+    u: float
+    power_W: float
+    disk_loading: float
+    g_per_W: float
+    robot_ratio: float
+    u_ratio: float
+    needed: float
+    recorded: Sequence[tuple[str, str, float]]  # Label, source, ratio of a recorded thrust
+
+
+@dataclass(frozen=True, eq=False)
+class Trends:
+    """The page of trends; last the thrusts of one drive of a pair: label, source, thrust and its u [N]."""
+
+    family: Family | None = None
+    choice: Sequence[Choice] = ()
+    pair: str = ""
+    moments: Sequence[tuple[str, str, float, float]] = ()
+
+
+class About(Documented):
+    """Head of the page, as far as wanted."""
+
+    title: str = ""
+    author: str = ""
+    date: str = ""
+    revision: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Book:
+    """Everything a report shows."""
+
+    version: str
+    cases: tuple[CasePage, ...]
+    trends: Trends
+    reproduction: Sequence[Reproduced]
+    exit_code: int
+    tools: tuple[Page, ...] = ()
+    diagnoses: tuple[Diagnosed, ...] = ()
+    about: About = About()

@@ -1,0 +1,264 @@
+"""What a sweep gives: rows, comparisons and conditions of a case, typed, and the document of each.
+
+A float is NaN, null in JSON, where nothing is known; what is None does not belong to the row, and its document is
+without it. Units stand in the names, as everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from bemt.base.document import Documented
+from bemt.data.recordings.audit import Audit
+from bemt.data.recordings.grid_study import LoadStudy
+from bemt.results.sweep.comparison import Comparison
+
+ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
+
+
+class Row(Documented):
+    """One model or one recorded value at one operating point."""
+
+    source: str
+    label: str
+    thrust_N: float
+    thrust_kgf: float = math.nan
+    torque_Nm: float = math.nan
+    power_W: float = math.nan
+    CT: float = math.nan
+    CP: float = math.nan
+    rpm: float = math.nan
+    airspeed_m_s: float = math.nan
+    density_kg_m3: float = math.nan
+    M_tip: float = math.nan
+    Re: float = math.nan
+    u: float = math.nan  # Standard uncertainty of the thrust, whole and by origin [N]
+    flags: tuple[str, ...] = ()
+    u_num: float | None = None
+    u_input: float | None = None
+    u_model: float | None = None
+    thrust_N_range: tuple[float, float] | None = None  # While one assumption is varied at a time
+    exhaust_speed_m_s: float | None = None
+    duct_share: float | None = None
+    converged: bool | None = None
+    H_force_N: float | None = None
+    upper_thrust_N: float | None = None
+    lower_thrust_N: float | None = None
+    J: float | None = None
+    angle_deg: float | None = None
+    origin: str | None = None
+    remark: str | None = None
+    # Of a recorded value: how far the models are off, and u_val of both [N]
+    bemt_error_pct: float | None = None
+    bemt_u_val: float | None = None
+    k1k2_error_pct: float | None = None
+    k1k2_u_val: float | None = None
+
+
+class Conditions(Documented):
+    """Operating point, air, rotor and model of a case."""
+
+    rpm: float
+    airspeed_m_s: float
+    angle_deg: float
+    density_kg_m3: float
+    temperature_C: float
+    a_sound_m_s: float
+    air: str
+    diameter_m: float
+    hub_diameter_m: float
+    blades: int
+    pitch_075R_m: float
+    solidity: float
+    stations: int
+    effects: tuple[str, ...]
+    n_crit: float
+    drag_level: float
+    convention: str = "CT = T/(rho n^2 D^4), CP = P/(rho n^3 D^5)"
+
+
+class AssumptionRow(Documented):
+    """One value that the source does not state, with its effect at the case's own operating point."""
+
+    key: str
+    nominal: Any
+    values: tuple[Any, ...]
+    discrete: bool
+    range: str
+    why: str
+    thrust_N: tuple[float, ...]
+    torque_Nm: tuple[float, ...]
+    u_thrust_N: float
+    u_torque_Nm: float
+
+
+class Stated(Documented):
+    """A recorded value as its file has it."""
+
+    quantity: str
+    kind: str
+    printed: str
+    value: float
+    u: float
+    channel: str
+    source: str
+    remark: str
+
+
+class Band(Documented):
+    """Value with its standard uncertainty."""
+
+    value: float
+    u: float
+
+
+class FullThrottle(Documented):
+    """Full throttle of a case with a motor, as the tool that knows motors gives it."""
+
+    kv: float
+    cells: float
+    soc: float
+    text: str
+    rpm: Band
+    thrust_N: Band
+    battery_A: Band
+    power_W: Band
+    g_per_W: Band
+
+
+class Fan(Documented):
+    """What a duct adds, at the case's own operating point."""
+
+    rotor_thrust_N: float
+    duct_thrust_N: float
+    stator_thrust_N: float
+    duct_share: float
+    exhaust_speed_m_s: float
+    u_exhaust_speed_m_s: float
+    mass_flow_kg_s: float
+    annulus_area_m2: float
+    exit_area_m2: float
+    exit_momentum_N: float
+    annulus_solidity: float
+    geometric_pitch_speed_m_s: float
+
+
+class Pair(Documented):
+    """What a second rotor adds, at the case's own operating point; the upper rotor is the first."""
+
+    z_over_D: float
+    turns: str
+    rotor: str
+    lower_rpm: float
+    upper_thrust_N: float
+    upper_torque_Nm: float
+    lower_thrust_N: float
+    lower_torque_Nm: float
+    reaction_torque_Nm: float
+    upper_thrust_ratio: float
+    lower_thrust_ratio: float
+    thrust_ratio: float
+    u_upper_thrust_N: float
+    u_upper_torque_Nm: float
+    u_lower_thrust_N: float
+    u_lower_torque_Nm: float
+    u_reaction_torque_Nm: float
+    u_upper_thrust_ratio: float
+    u_lower_thrust_ratio: float
+    u_thrust_ratio: float
+
+
+class Axis(Documented):
+    """Values of one axis of a grid, in the unit of its name."""
+
+    num: int
+    min: float
+    max: float
+
+
+class Statistics(Documented):
+    """What is told of the points of a grid: how many, and the ends of their finite values."""
+
+    points: int
+    unconverged: int
+    thrust_N: tuple[float, float]
+    torque_Nm: tuple[float, float]
+    M_tip: tuple[float, float]
+
+
+class GridResult(Statistics):
+    """A grid that was solved, and where it was written."""
+
+    axes: Mapping[str, Axis]
+    columns: tuple[str, ...]
+    file: str | None
+    sha256: str | None
+
+
+class Result(Documented):
+    """One case: models beside what was recorded; without rows it was not solved, and its faults say why."""
+
+    name: str
+    title: str = ""
+    kind: str = ""
+    origin: str = ""
+    version: str = "unknown"
+    rows: tuple[Row, ...] = ()
+    variants: tuple[Row, ...] = ()
+    other_rows: tuple[Row, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+    audit: tuple[Audit, ...] = ()
+    grid_studies: tuple[LoadStudy, ...] = ()
+    conditions: Conditions | None = None
+    assumptions: tuple[AssumptionRow, ...] = ()
+    references: tuple[Stated, ...] = ()
+    drive: FullThrottle | None = None
+    fan: Fan | None = None
+    pair: Pair | None = None
+    notes: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+    grid: GridResult | None = None
+    exit_code: int = 0
+
+    def document(self) -> dict[str, Any]:
+        """Entry of ``sweep.json``; short for a case that was not solved."""
+        told = super().document()
+        names = [f.name for f in fields(self)]
+        if not self.rows:
+            names = ["name", "title", "rows", "variants", "other_rows", "comparisons", "faults", "exit_code"]
+        return {name: told.get(name) for name in names}
+
+    @property
+    def all_rows(self) -> tuple[Row, ...]:
+        """Rows, those of variants and those of other sources."""
+        return self.rows + self.variants + self.other_rows
+
+    @property
+    def at(self) -> Conditions:
+        """Conditions of a solved case."""
+        assert self.conditions is not None
+        return self.conditions
+
+    def of(self, *sources: str) -> list[Row]:
+        """Rows of some sources."""
+        return [row for row in self.rows if row.source in sources]
+
+    def first(self, source: str) -> Row | None:
+        """First row of a source, None where there is none."""
+        return next(iter(self.of(source)), None)
+
+    def audit_of(self, reference: str) -> Audit | None:
+        """Audit of one recorded value."""
+        return next((a for a in self.audit if a.reference == reference), None)
+
+
+class Sweep(Documented):
+    """All cases, in the order in which they were given."""
+
+    schema: str
+    version: str
+    cases: tuple[Result, ...]
+    exit_code: int

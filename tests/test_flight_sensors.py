@@ -1,0 +1,306 @@
+"""The promise on speed sensors, sessions and logs without motors: nothing impossible is fitted, days are not damage."""
+
+from __future__ import annotations
+
+import gzip
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flight_files import Hover, dataflash
+
+from bemt.base.errors import InputError
+from bemt.tools.flight import read as reading
+from bemt.tools.flight.actions import fly
+from bemt.tools.flight.answer import answer_on
+from bemt.tools.flight.balance import DAY, SESSION, axes_of, features, healthy_flight
+from bemt.tools.flight.identify import identify
+from bemt.tools.flight.judge import judge
+from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
+from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.read import kind_of, read_log
+from bemt.tools.flight.sessions import sessions
+from bemt.tools.flight.speed_sensor import checked
+from bemt.tools.flight.text import pilot
+from bemt.tools.flight.thrust_curve import thrust_curve
+
+
+def hover(layout: str = "quad-x", **more: object) -> FlightLog:
+    """A flight in memory, whose total thrust is the weight of 1.5 kg."""
+    flight = Hover(layout, seconds=12.0, **more)  # type: ignore[arg-type]
+    t = np.arange(0.0, flight.seconds, 0.02)
+    command, rpm = flight.drives(t)
+    return FlightLog("f", "made", t, command=command, rpm=rpm, layout=layout)
+
+
+def sick(log: FlightLog, motor: int, factor: float, lost: float = 0.0) -> FlightLog:
+    """The same with a sensor that reads a share of the speed and drops out."""
+    assert log.rpm is not None
+    rpm = log.rpm.copy()
+    rpm[:, motor] *= factor
+    rpm[np.random.default_rng(1).random(log.t.size) < lost, motor] = 0.0
+    return replace(log, rpm=rpm)
+
+
+@pytest.mark.parametrize("layout", ["quad-x", "hexa-x", "x8"])
+@pytest.mark.parametrize(("factor", "count", "lost"),
+                         [(0.5, "1/2", 0.0), (0.5, "1/2", 0.85), (1 / 3, "1/3", 0.3), (2.0, "2", 0.0), (1.0, "", 0.3),
+                          (0.0, "", 0.0)])  # fmt: skip
+@pytest.mark.parametrize("commands", [True, False])
+def test_a_sensor_at_fault_is_named_and_repaired(
+    layout: str, factor: float, count: str, lost: float, commands: bool
+) -> None:
+    """Whatever it reads, the thrust constant is that of the whole flight within its band, and no other is named."""
+    log = hover(layout)
+    truth = identify(log, 1.5).constants["thrust constant"].value
+    bad = sick(log if commands else replace(log, command=None), 2, factor, lost)
+    answer = answer_on(bad, mass_kg=1.5)
+    (sensor,) = answer.log.sensors
+    assert sensor.motor == 3 and sensor.count == count and sensor.ratio == pytest.approx(factor, rel=0.04)
+    assert sensor.lost == pytest.approx(1.0 if factor == 0.0 else lost, abs=0.02)
+    k = answer.found.constants["thrust constant"]
+    assert abs(k.value / truth - 1.0) < 0.02 and abs(k.value - truth) < k.half + 0.003 * truth
+    assert not any("rotor 3" in name for name in answer.found.constants), "no constant of a repaired channel"
+    assert not answer.speeds and any("sensor of motor 3" in line for line in pilot(answer))
+
+
+@pytest.mark.parametrize("layout", ["quad-x", "hexa-x", "x8"])
+@pytest.mark.parametrize("loss", [0.0, 0.15, 0.3])
+def test_no_sound_sensor_is_accused(layout: str, loss: float) -> None:
+    """Nor that of a damaged rotor, of a motor that turns 18 % slower at its command, or of a speed alone."""
+    log = hover(layout, loss=((1, loss),))
+    assert log.command is not None
+    weak = log.command * (1.0 + 0.5 * (np.arange(log.rotors) == 0))  # the loads balance, at a higher command
+    for one in (log, replace(log, command=None), replace(log, command=weak)):
+        assert not checked(one).sensors
+
+
+def test_a_motor_that_stands_is_no_sensor() -> None:
+    """Eight rotors fly on seven: the loads balance without the one that reads nothing."""
+    log, layout = hover("octo-x"), layout_of("octo-x", 8)
+    assert log.rpm is not None and layout is not None
+    from bemt.tools.flight.layout import effect_matrix
+
+    A = effect_matrix(layout)
+    rest = np.delete(np.arange(8), 4)
+    thrust = np.zeros(8)
+    thrust[rest] = np.linalg.pinv(A[:, rest]) @ (A @ np.ones(8))
+    rpm = 6000.0 * np.sqrt(thrust) * np.ones((log.t.size, 1))
+    command = 0.4 * np.where(thrust > 0.0, thrust, 1.0) * np.ones((log.t.size, 1))
+    assert not checked(replace(log, rpm=rpm, command=command)).sensors
+
+
+IMRC = {
+    "brushed_34.7g_jana20": (1, 0.0347), "brushed_34.7g_jana25": (1, 0.0347), "payload_44.4g_eckart51": (3, 0.0444),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(IMRC))
+def test_recorded_sensors_at_fault(shared_data: Path, name: str) -> None:
+    """Named with the ratio; thrust constant within 3 % of the sound flights, mass within 4 %, no motor accused."""
+    folder, (motor, mass) = shared_data / "flight_logs", IMRC[name]
+    stem = name.rpartition("_")[0]
+    files = [*(folder / "imrc").glob(f"{stem}_*"), *folder.glob(f"cf21_{stem.replace('payload', 'brushless_payload')}_*")]
+    sound = [p for p in files if p.stem not in IMRC and p.suffix == ".usdlog"]
+    answer = fly(folder / "imrc" / f"{name}.usdlog", mass_kg=mass, healthy=sound, healthy_mass_kg=mass).flights[0]
+    (sensor,) = answer.log.sensors
+    assert sensor.motor == motor and sensor.count == "1/2" and abs(sensor.ratio - 0.5) < 0.02
+    k = [identify(checked(read_log(p)), mass).constants["thrust constant"].value for p in sound]
+    assert abs(answer.found.constants["thrust constant"].value / np.mean(k) - 1.0) < 0.03
+    assert answer.mass is not None and abs(answer.mass.value / mass - 1.0) < 0.04
+    assert not any("motor" in effect for effect in answer.judged.said.effects) and not answer.speeds
+
+
+def test_recorded_sound_sensors_are_left_alone(shared_data: Path) -> None:
+    """In every other flight with speeds, with and without its commands."""
+    folder = shared_data / "flight_logs"
+    files = [p for p in (*folder.glob("cf21*.usdlog"), *(folder / "imrc").glob("*")) if p.stem not in IMRC]
+    for file in files:
+        log = read_log(file)
+        assert not checked(log).sensors and not checked(replace(log, command=None)).sensors, file
+
+
+def by_name(folder: Path) -> dict[str, np.ndarray]:
+    """Features of the flights of a folder."""
+    return {p.name: x for p in sorted(folder.glob("*")) if (x := features(read_log(p))) is not None}
+
+
+def test_recorded_flights_of_another_day(shared_data: Path) -> None:
+    """A cut of 0.5 mm of another day is no damage; pairs of 2 mm and more are both seen by flights of their day."""
+    flights, layout = by_name(shared_data / "flight_logs" / "crazypad_E9"), layout_of("crazyflie", 4)
+    calm = [x for name, x in flights.items() if name.startswith("normal")]
+    small = {name: x for name, x in flights.items() if "0.5mm_46.5mm" in name}
+    for x in small.values():
+        left_open, other = judge(x, calm, layout, day=""), judge(x, calm, layout, day=None)
+        assert left_open.said.verdict in ("none", "insufficient") and other.said.verdict == "none"
+        assert left_open.said.verdict == "none" or "day" in left_open.said.why
+    for name, x in flights.items():
+        if name.startswith(("cut_M2_2.0", "cut_M2_3.0")):
+            both = {"damaged blade, motor 1", "damaged blade, motor 2"}
+            assert both <= set(judge(x, [*small.values()], layout, day=0).said.effects), name
+            days = [0] * len(calm) + [1] * len(small)
+            assert both <= set(judge(x, [*calm, *small.values()], layout, days=days, day=1).said.effects), name
+
+
+def test_recorded_cuts_stay_visible_when_the_day_is_open(shared_data: Path) -> None:
+    """E8: from 3 mm on motor 3 in eight of ten, another day beside it at most; no healthy flight accused."""
+    flights, layout, found = by_name(shared_data / "flight_logs" / "crazypad_E8"), layout_of("crazyflie", 4), 0
+    calm = [x for name, x in flights.items() if name.startswith("normal")]
+    large = ("cut_propeller_M3_3mm", "cut_propeller_M3_1.5mm_", "cut_propeller_M3_2mm_", "cut_propeller_M3_4mm_")
+    for name, x in flights.items():
+        said = judge(x, calm, layout, day="").said
+        assert not said.effects or said.effects[0] == "damaged blade, motor 3", name
+        found += name.startswith(large) and "damaged blade, motor 3" in said.effects
+    assert found >= 8
+
+
+def test_sessions_shape_the_prediction() -> None:
+    """Within a session a flight is predicted closely, in another as wide as sessions differ, by prior and by data."""
+    rng, axes = np.random.default_rng(2), axes_of(layout_of("quad-x", 4), 4)
+    back = np.linalg.pinv(axes)
+
+    def flights(shift: np.ndarray, n: int) -> list[np.ndarray]:
+        return [back @ (shift + 0.003 * rng.normal(size=3)) for _ in range(n)]
+
+    one = np.array(flights(np.zeros(3), 5))
+    same, other = healthy_flight(one, axes, True), healthy_flight(one, axes, True, [0] * 5, None)
+    assert np.all(same.sd < 0.008) and np.all(other.sd > np.array(SESSION)) and np.allclose(same.other_sd, other.sd)
+    far = [s * np.array(SESSION) * 4.0 for s in (-1.0, 1.0, -1.0, 1.0)]
+    many = np.array([x for shift in far for x in flights(shift, 3)])
+    days = [k // 3 for k in range(12)]
+    assert np.all(healthy_flight(many, axes, True, days, None).sd > 1.5 * other.sd)
+    last = healthy_flight(many, axes, True, days, 3)
+    np.testing.assert_allclose(last.mean, far[3], atol=0.01)
+
+
+def test_healthy_flights_of_other_days_are_accused_as_rarely_as_stated() -> None:
+    """Over 150 vehicles with three sessions of three flights: one of a fourth, and one whose day is not known."""
+    rng, layout = np.random.default_rng(3), layout_of("quad-x", 4)
+    back, hits, open_hits = np.linalg.pinv(axes_of(layout, 4)), 0, 0
+    for _ in range(150):
+        days = rng.normal(size=(4, 3)) * SESSION
+        calm = [back @ (days[k // 3] + 0.006 * rng.normal(size=3)) for k in range(9)]
+        x = back @ (days[3] + 0.006 * rng.normal(size=3))
+        known = judge(x, calm, layout, days=[k // 3 for k in range(9)], day=None)
+        hits += known.said.verdict in ("named", "class", "unknown")
+        open_hits += judge(x, calm[:3], layout, day="").said.verdict == "named"
+    assert hits <= 6 and open_hits <= 6
+
+
+def test_days_by_statement_and_by_date() -> None:
+    """What is stated goes before what the logs or their names hold; nothing is guessed."""
+
+    def log(file: str, date: str = "") -> FlightLog:
+        return FlightLog(file, "made", np.arange(9.0), date=date)
+
+    a, b = log("a.bin", "2026-05-01"), log("log_7_2026-5-2-10-11-12.ulg")
+    assert sessions(log("c", "2026-05-02"), [a, b]).day == 1 and sessions(log("c"), [a, b]).day == ""
+    assert sessions(log("c", "2026-05-03"), [a, b]).day is None
+    assert sessions(log("c"), [a, b], day="same").day == 1 and sessions(log("c"), [a, b], day="other").day is None
+    assert sessions(log("c"), [log("x"), log("y")]).days == (0, 0)
+    assert sessions(log("c"), [log("x"), log("y")], ["monday", "friday"], "monday").day == 0
+
+
+def test_leaving_sessions_out(tmp_path: Path) -> None:
+    """Two folders are two sessions, and the error rate leaves a whole one out."""
+    for day in range(2):
+        (tmp_path / f"day{day}").mkdir()
+        for k in range(3):
+            data = dataflash(Hover(seconds=12.0, seed=10 * day + k))
+            (tmp_path / f"day{day}" / f"{k}.bin").write_bytes(data)
+    (tmp_path / "now.bin").write_bytes(dataflash(Hover(seconds=12.0, seed=99)))
+    pytest.importorskip("pymavlink")
+    answer = fly(tmp_path / "now.bin", healthy=[tmp_path / "day0", tmp_path / "day1"], healthy_day="same").flights[0]
+    said = answer.document()
+    assert said["sessions"] == {"of_healthy": [0, 0, 0, 1, 1, 1], "by": "stated", "of_this": 1}
+    assert said["error_rate"]["left_out"] == "session" and said["error_rate"]["healthy"] == 6
+
+
+@pytest.mark.parametrize("layout", ["quad-x", "quad-plus", "hexa-x", "x8"])
+def test_commands_of_a_mixer_balance_its_demands(layout: str) -> None:
+    """A demand in one axis moves the loads of that axis alone, to the side it asks for."""
+    from bemt.tools.flight.layout import effect_matrix
+
+    placed = layout_of(layout, len(LAYOUTS[layout].split()))
+    assert placed is not None
+    for axis in range(3):
+        torque = np.zeros((1, 3))
+        torque[0, axis] = 0.1
+        loads = effect_matrix(placed) @ (mixed(placed, np.array([0.5]), torque, (0.5, 0.5, 0.5))[0] - 0.5)
+        assert loads[axis] > 0.05 and np.allclose(np.delete(loads, axis), 0.0, atol=1e-9)
+
+
+def test_recorded_logs_without_motors(shared_data: Path) -> None:
+    """They say what they show, with a number, and no rotors are counted as none."""
+    pytest.importorskip("pyulog")
+    pytest.importorskip("pymavlink")
+    folder = shared_data / "flight_logs"
+    octo = fly(folder / "air_octoquad_00000012.BIN")
+    assert "0 rotors" not in octo.text(True) and "8 rotors" in octo.text() and "VIBE" in str(octo)
+    assert octo.flights[0].vibration.stated and max(octo.flights[0].vibration.rms) < 1.0
+    cut = fly(folder / "udesa_quad_cut_15mm_one_blade_log13.ulg.gz").flights[0]
+    assert cut.log.rotors == 4 and cut.log.mixed and cut.log.file.endswith(".gz")
+    assert 80.0 < cut.vibration.line_hz < 95.0 and cut.vibration.line > 10.0
+    assert 0.01 < cut.demand[2] < 0.06, "trim in yaw, without the seconds in which it spins"
+
+
+@pytest.mark.parametrize("expo", [0.0, 0.4, 0.7])
+def test_curve_of_an_autopilot(expo: float) -> None:
+    """Share of the square within its band, and the hover throttle of that curve."""
+    rng = np.random.default_rng(4)
+    t = np.arange(0.0, 60.0, 0.02)
+    x = 0.45 + 0.04 * np.stack([np.sin(2 * np.pi * f * t + p) for f, p in rng.uniform(0.1, 0.4, (4, 2))], axis=1)
+    thrust = (1.0 - expo) * x + expo * x**2
+    rpm = 9000.0 * np.sqrt(thrust) * (1.0 + 0.002 * rng.normal(size=x.shape))
+    log = FlightLog("f", "PX4 ULog", t, command=x, rpm=rpm, layout="px4-x")
+    got = thrust_curve(log)
+    assert abs(got["THR_MDL_FAC"].value - expo) < got["THR_MDL_FAC"].half + 0.01 and got["THR_MDL_FAC"].half < 0.1
+    assert abs(got["MPC_THR_HOVER"].value - thrust.mean()) < got["MPC_THR_HOVER"].half + 0.005
+
+
+@pytest.mark.parametrize("heads", ["t_s,rpm1,rpm2,rpm3,rpm4", "time,motor_1_rpm,motor_2_rpm,motor_3_rpm,motor_4_rpm"])
+def test_speeds_alone_give_the_thrust_constant(heads: str, tmp_path: Path) -> None:
+    """A CSV of time and speeds."""
+    log = hover()
+    assert log.rpm is not None
+    rows = [",".join(f"{v:.4f}" for v in (a, *b)) for a, b in zip(log.t, log.rpm, strict=True)]
+    (tmp_path / "s.csv").write_text("\n".join([heads, *rows]))
+    k = identify(read_log(tmp_path / "s.csv"), 1.5).constants["thrust constant"]
+    assert k.value == pytest.approx(1.5 * 9.80665 / float(np.sum(log.rpm**2, axis=1).mean()), rel=0.01)
+
+
+def test_what_is_packed_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refused as soon as the limit is passed; what is cut is read as far as it goes."""
+    data = dataflash(Hover(seconds=12.0))
+    pytest.importorskip("pymavlink")
+    packed = gzip.compress(data, 1)
+    (tmp_path / "a.bin.gz").write_bytes(packed)
+    assert read_log(tmp_path / "a.bin.gz").rotors == 4 and kind_of(tmp_path / "a.bin.gz").startswith("ArduPilot")
+    (tmp_path / "cut.gz").write_bytes(packed[: len(packed) // 2])
+    assert "gzip" in read_log(tmp_path / "cut.gz").ends
+    monkeypatch.setattr(reading, "MAX_BYTES", 100_000)
+    with pytest.raises(InputError):
+        read_log(tmp_path / "a.bin.gz")
+
+
+def test_a_folder_is_a_table(tmp_path: Path) -> None:
+    """A row a flight; what is no log is told, and does not stop the others."""
+    pytest.importorskip("pymavlink")
+    (tmp_path / "a.bin").write_bytes(dataflash(Hover(seconds=12.0)))
+    (tmp_path / "b.bin").write_bytes(dataflash(Hover(seconds=12.0, seed=3)))
+    (tmp_path / "c.bbl").write_bytes(b"H Product:Blackbox flight data recorder\n\0\0")
+    answer = fly(tmp_path, mass_kg=1.5, out_csv=tmp_path / "t.csv")
+    assert [Path(r["file"]).name for r in answer.table()] == ["a.bin", "b.bin"] and len(answer.faults) == 1
+    assert len((tmp_path / "t.csv").read_text().splitlines()) == 3 and "c.bbl" in str(answer)
+    with pytest.raises(InputError, match="blackbox_decode"):
+        fly(tmp_path / "c.bbl")
+
+
+def test_the_first_line_is_for_a_pilot(tmp_path: Path) -> None:
+    """Where to look, by how much, and what would do it."""
+    calm = [hover(seed=k) for k in range(4)]
+    got = pilot(answer_on(hover(seed=9, loss=((2, 0.25),)), calm, day="same"))
+    assert got[0].startswith("Look at motor 3: it works ") and "damaged blade" in got[0] and got[2].startswith("Next: ")
+    assert len(got) == 3 and "motor" not in pilot(answer_on(hover(seed=9), calm, day="same"))[0].split(":")[0]
+    assert DAY not in got[0]
