@@ -13,6 +13,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -307,7 +308,9 @@ def _write_step(whole: Any, path: Path, unit: str) -> None:
     export_parts: Any = exportStepMeta
     export_parts(whole, str(path), outputUnit=unit.upper())
     text = path.read_text(encoding="utf-8", errors="replace")
-    path.write_text(re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1), encoding="utf-8")
+    text = re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1)
+    mark, number = "NEXT_ASSEMBLY_USAGE_OCCURRENCE('", count(1)  # the kernel counts on from file to file
+    path.write_text(re.sub(rf"{re.escape(mark)}\d+", lambda _: f"{mark}{next(number)}", text), encoding="utf-8")
 
 
 def _said_unit(path: Path) -> str | None:
