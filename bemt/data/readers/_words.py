@@ -86,7 +86,7 @@ NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "
 _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, its own words, words that change nothing
     "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
     "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
-    "voltage": ("voltage", {"voltage", "v"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
+    "voltage": ("voltage", {"voltage", "v", "u"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
     "current": ("current", {"current"},
                 {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
     "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"}),
@@ -99,7 +99,7 @@ _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, it
                     {"width", "servo", "input", "command", "motor"}),
     "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"},
             {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
-    "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream"},
+    "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream", "v", "u", "v0", "u0", "va"},
                  {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"}),
     "temperature": ("temperature", {"temperature"}, {"ambient", "air", "tunnel", "inlet"}),
     "pressure": ("pressure", {"pressure"}, {"ambient", "air", "tunnel"}),

@@ -40,6 +40,20 @@ _WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves
     "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
     "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
+USUAL: dict[str, str] = {
+    "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
+    "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
+    "mechanical_power_W": "power_W", "shaft_power_W": "power_W", "T_K": "temperature_K", "P_Pa": "pressure_Pa",
+    "air_temperature_K": "temperature_K", "air_pressure_Pa": "pressure_Pa", "rho_kg_m3": "density_kg_m3",
+    "air_density_kg_m3": "density_kg_m3", "P_el_W": "electrical_power_W", "P_in_W": "electrical_power_W",
+    "input_power_W": "electrical_power_W", "P_mech_W": "power_W", "P_shaft_W": "power_W",
+    "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
+    "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
+    "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
+    "freestream_m_s": "airspeed_m_s", "pull_N": "thrust_N", "force_N": "thrust_N", "load_N": "thrust_N",
+    "load_cell_N": "thrust_N", "loadcell_N": "thrust_N",
+}  # fmt: skip
+"""Usual name of a channel that headings of benches and of CFD name in another way."""
 _THRUSTS = re.compile(
     r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
     r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
@@ -240,6 +254,16 @@ def heading(text: str) -> Heading:
     if found.unit is None and not found.doubt and not text.isascii() and quantities(words := english(text)):
         return replace(found, name=slug(" ".join(dict.fromkeys(words))))
     return found
+
+
+def usual(text: str, unit: str = "") -> str:
+    """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
+
+    >>> usual("V", "m s^-1"), usual("U [m/s]"), usual("Velocity", "m/s"), usual("T", "N"), usual("Q", "N m"), usual("J")
+    ('airspeed_m_s', 'airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
+    """
+    name = heading(f"{text} [{unit}]" if unit else text).name
+    return USUAL.get(name, name)
 
 
 def _splits(text: str) -> Iterator[tuple[str, str]]:

@@ -20,7 +20,7 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data.recordings.audit import combined
-from bemt.data.recordings.cfd_run import is_run
+from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
@@ -41,11 +41,15 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
     from bemt.data.recordings.load import as_dataset, import_file
 
     imported = import_file(path) if read is None else read
+    if imported.kind == "cfd" and not is_run(imported) and "clock" in imported.provenance:
+        try:
+            imported = run_at(path) or imported
+        except InputError as error:
+            hint = f"`bemt import {path}` with what is missing, and --out run.toml, keeps it"
+            first = Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint)
+            raise InputError([first, *error.faults]) from error
     if is_run(imported):
         return imported, imported
-    if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
-        hint = f"`bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
-        raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
     points = named(as_dataset(imported))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
     if not known or ("rpm" not in points and "thrust_N" in points):

@@ -143,7 +143,7 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
     duct = case.duct
     if duct is None:
         return None
-    inner, hub, x = duct.inner_diameter_m, 0.5e-3 * duct.exit_hub_diameter_mm, duct.rotor_position_mm
+    inner, hub, x = duct.inner_diameter_m, 0.5e-3 * (duct.exit_hub_diameter_mm or 0.0), duct.rotor_position_mm
     gap = 1e-3 * (duct.tip_gap_mm or 0.0) if math.isnan(inner) else 0.5 * inner - rotor.R
     ratio = duct.exit_area_ratio
     if duct.exit_diameter_mm is not None:
@@ -155,8 +155,8 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
         turned = 0.0 if vanes is None else math.radians(rotor.rotation * vanes.angle_deg)  # their tails with the swirl
         stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3, beta=0.5 * math.pi + turned)
         return around(
-            rotor, duct.length_mm * 1e-3, gap, duct.lip_radius_mm * 1e-3, exit_area_ratio=ratio, exit_hub_radius=hub,
-             rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+            rotor, duct.length_mm * 1e-3, gap, (duct.lip_radius_mm or 0.0) * 1e-3, exit_area_ratio=ratio,
+            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
         )  # fmt: skip
 
     return _as_input(path.as_posix(), "", make)

@@ -179,8 +179,15 @@ class Case:
 
     @property
     def run_paths(self) -> tuple[Path, ...]:
-        """CFD runs in the folder of the case (``run*.toml``): recorded values like those of the references."""
-        return tuple(sorted(self.folder.glob("run*.toml"))) if self.path.is_file() else ()
+        """CFD runs in the folder of the case: recorded values like those of the references.
+
+        ``run*.toml``, and ``study*.toml`` in place of the runs that they name.
+        """
+        if not self.path.is_file():
+            return ()
+        studies = sorted(self.folder.glob("study*.toml"))
+        named = {path.resolve() for study in studies for path in _exports(study)}
+        return (*(p for p in sorted(self.folder.glob("run*.toml")) if p.resolve() not in named), *studies)
 
     @property
     def diameter_m(self) -> float:
@@ -304,7 +311,9 @@ class Case:
         names += [blade.as_built.file] if blade.as_built is not None else []
         if self.file.second_rotor is not None and self.file.second_rotor.case is not None:
             names += [os.path.relpath(path, self.folder) for path in self.second().files()]
-        runs = [p for run in self.run_paths for p in (run, *_exports(run)) if p.is_file()]
+        named = [p for run in self.run_paths for p in (run, *_exports(run))]
+        runs = [p for name in named for p in (name, *(_exports(name) if name not in self.run_paths else ()))]
+        runs = [p for p in dict.fromkeys(runs) if p.is_file()]
         return [self.path, *(self.folder / name for name in names if name), *runs]
 
     def content_hash(self) -> str:
@@ -331,7 +340,7 @@ def _exports(run: Path) -> list[Path]:
     from bemt.data.readers.cfd_run import read
 
     try:
-        return [run.parent / name for name in read(run).run.files]
+        return [run.parent / name for name in read(run).files] if run.suffix == ".toml" else []
     except InputError:
         return []
 

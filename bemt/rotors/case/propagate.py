@@ -32,6 +32,7 @@ from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
+    from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
@@ -159,7 +160,7 @@ class Propagated:
         for one in self.moved:
             runs = [values if run is self.nominal else answer(run) for run in one.runs]
             for key, v in values.items():
-                squares["input"][key] += spread(one.unknown.discrete, v, [np.asarray(run[key]) for run in runs]) ** 2
+                squares["input"][key] += spread(one.unknown, v, [np.asarray(run[key]) for run in runs]) ** 2
         if "numerics" in squares and self.refined is not None:
             other = answer(self.refined)
             for key, v in values.items():
@@ -173,15 +174,22 @@ class Propagated:
         return values, {origin: {k: np.sqrt(v) for k, v in part.items()} for origin, part in squares.items()}
 
 
-def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
+def spread(unknown: Assumption, nominal: Array, at: Sequence[Array]) -> Array:
     """Standard uncertainty from one unknown, (P,), of the results at its values.
 
-    >>> spread(False, np.array([1.0]), [np.array([0.0]), np.array([2.0])]).round(3)
-    array([0.577])
+    What is taken may be one end of the range: then the whole of the range lies on one side of the result, and the root
+    mean square about it counts.
+
+    >>> from bemt.rotors.case.load import Assumption
+    >>> ends = [np.array([0.0]), np.array([2.0])]
+    >>> [spread(Assumption("x", x, (0.0, 2.0), False, ""), np.array([x]), ends).round(3).item() for x in (1.0, 0.0)]
+    [0.577, 1.155]
     """
-    if discrete:
+    if unknown.discrete:
         return np.asarray(np.std(np.subtract(at, nominal), axis=0))  # equal values have no spread, to the last bit
     low, high = at
+    if unknown.nominal in unknown.values:
+        return np.asarray(np.abs(high - low) / np.sqrt(3.0))
     slope, sag = 0.5 * (high - low), 0.5 * (high + low) - nominal
     return np.asarray(np.sqrt(slope**2 / 3.0 + 4.0 * sag**2 / 45.0))
 
@@ -196,7 +204,7 @@ def vary(
             nominal if v == unknown.nominal else answer(case.replaced({unknown.key: v}), unknown.key)
             for v in unknown.values
         )
-        u = {key: spread(unknown.discrete, v, [run[key] for run in runs]) for key, v in nominal.items()}
+        u = {key: spread(unknown, v, [run[key] for run in runs]) for key, v in nominal.items()}
         out.append(Moved(unknown, runs, u))
     return tuple(out)
 
@@ -288,6 +296,11 @@ def propagate(
             loads_of(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
             for u, times in zip(widths, (1.0, 2.0), strict=True)
         )
+        if model.duct is not None:
+            narrow, wide = (
+                one | {"duct_share": share_error(model.duct, found, one["thrust_N"], k)}
+                for k, one in ((1.0, narrow), (2.0, wide))
+            )
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
@@ -343,11 +356,11 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
     words: tuple[tuple[str, ...], ...] = ((),) * J.size
     if known is not None:
         size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
-        ducted, run = case.ducted, case.as_built().reference
-        if run is not None:  # a rotor that was measured itself, in its duct
+        run = case.as_built().reference
+        if run is not None:  # a rotor that was measured itself
             own = Validity.of_rotor(*size, run.at.J / _zero_thrust_J(case), run.at.Re, known.M_tip)
-            known, ducted = Validity.of_rotors((known, own)), False
-        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
+            known = Validity.of_rotors((known, own))
+        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
     swept = swept_words(case)
     return factor, tuple((*a, *b, *swept) for a, b in zip(words, tip, strict=True))
@@ -370,11 +383,23 @@ def swept_words(case: Case) -> tuple[str, ...]:
     return (f"swept blade: by up to {angle:.0f} deg, loads are those of the straight one",)
 
 
+SHARE = 0.02
+"""Standard deviation of the duct's share at one thrust: nozzle 19A at rest, five pitches, by 3.6 to -1.6 points [1]."""
+
+
+def share_error(duct: DuctFlow, points: Dataset, u_thrust: Array, times: float = 1.0) -> Array:
+    """Uncertainty of the duct's share, (P,): so many deviations of the balance, and what that of the thrust moves."""
+    T, more = points.thrust_N / points.density_kg_m3, np.log1p(u_thrust / np.abs(points.thrust_N))
+    at = np.array([duct.share_at(T * np.exp(k * more), points.airspeed_m_s) for k in (-1.0, 0.0, 1.0)])
+    moved = np.fmax(np.abs(at[0] - at[1]), np.abs(at[2] - at[1]))
+    return np.where(np.isnan(moved), np.abs(points.duct_share), np.hypot(times * SHARE, moved))
+
+
 def loads_of(points: Dataset, D: float, u: Array, J_axial: Array | None = None) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
-    share has none: no population tells of it. Efficiency takes CT and CP as independent.
+    share: `share_error`. Efficiency takes CT and CP as independent.
     """
     rho, n, V, exit_speed = points.density_kg_m3, points.rpm / 60.0, points.airspeed_m_s, points.exhaust_speed_m_s
     thrust = np.asarray(co.thrust(u[0], rho, n, D))
