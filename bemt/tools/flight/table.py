@@ -7,11 +7,9 @@ used only with a row motor_poles before the headings, accSmooth with acc_1G.
 
 from __future__ import annotations
 
-import gzip
 import io
 import json
 import re
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -19,6 +17,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.packed import gunzip
 from bemt.base.units import G0
 from bemt.tools.flight import crazyflie
 from bemt.tools.flight.log import SPARSE, FlightLog, Stretches, joined
@@ -50,11 +49,8 @@ def read(path: Path) -> FlightLog:
         head = file.read(_HEAD_BYTES)
     source: Path | io.BytesIO = path
     if head[:2] == b"\x1f\x8b":
-        raw = path.read_bytes()
-        try:
-            raw = gzip.decompress(raw)
-        except (OSError, EOFError, zlib.error):
-            raw, ends = _partly(raw), "damaged gzip; read as far as it goes"
+        raw, damage = gunzip(path.read_bytes(), name)
+        ends = f"damaged gzip ({damage}); read as far as it goes" if damage else ""
         source, head = io.BytesIO(raw), raw[:_HEAD_BYTES]
     lines = head.decode("utf-8", errors="replace").split("\n")
     start = next((k for k, line in enumerate(lines[:400]) if re.search(r"\btime\b|\bt\b|\bt_s\b|loopIteration", line)
@@ -101,17 +97,6 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
                 piece[c] = numbers if c in _TIMES else numbers.astype(np.float32)
         kept.add(piece)
     return pd.concat(kept.parts, ignore_index=True)
-
-
-def _partly(raw: bytes) -> bytes:
-    """What of a damaged gzip can be unpacked."""
-    stream, out = zlib.decompressobj(31), bytearray()
-    try:
-        for k in range(0, len(raw), 256):
-            out += stream.decompress(raw[k : k + 256])
-    except zlib.error:
-        pass
-    return bytes(out)
 
 
 def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
