@@ -136,7 +136,7 @@ def _of_zip(archive: zipfile.ZipFile, raw: bytes, name: str, most: int | None, d
     if (size := sum(item.file_size for item in files.values())) > MAX_BYTES:
         raise InputError(_too_large(name, f"{size} bytes, unpacked"))
     if "xl/workbook.bin" in files:
-        raise InputError(Fault(name, "", "a binary workbook (.xlsb)", "a text file or .xlsx", "Save it as CSV or .xlsx"))
+        raise InputError(Fault(name, "", "a binary workbook (.xlsb)", "a text file or .xlsx", "Save it as CSV"))
     is_ods = "content.xml" in files and _ODS.encode() in archive.read("mimetype") if "mimetype" in files else False
     if is_ods or "xl/workbook.xml" in files:
         for item in files.values():  # sizes and checksums as the directory says, or an error
@@ -215,7 +215,7 @@ class _Extent:
         cells = (self.last[0] - self.first[0] + 1) * (self.last[1] - self.first[1] + 1)
         if cells > MAX_CELLS:
             got = f"{cells} cells up to row {self.last[0]}, column {self.last[1]}"
-            raise InputError(Fault(self.name, self.part, got, f"at most {MAX_CELLS}", "Delete cells that stand far away"))
+            raise InputError(Fault(self.name, self.part, got, f"at most {MAX_CELLS}", "Delete cells far away"))
 
 
 def _workbook(raw: bytes, name: str, most: int | None) -> bytes:

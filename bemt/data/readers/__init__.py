@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
 
@@ -145,8 +145,7 @@ def load_bytes(path: str | os.PathLike[str]) -> bytes:
         with Path(path).open("rb") as stream:
             raw = stream.read(MAX_BYTES + 1)  # a device has no size
     except OSError as error:
-        fault = Fault(os.fspath(path), "", error.strerror or str(error), "a readable file", "Check the path")
-        raise InputError(fault) from error
+        raise InputError(system_fault(error, os.fspath(path), "a readable file")) from error
     if len(raw) > MAX_BYTES:
         raise InputError(Fault(os.fspath(path), "", f"more than {MAX_BYTES} bytes", "less", "Part the file"))
     return raw
@@ -315,7 +314,7 @@ def _head(target: Path, place: Collector) -> bytes:
             head = stream.read(HEAD_BYTES)
         return unpacked(load_bytes(target), place.file, HEAD_BYTES) if packed(head) else head
     except OSError as error:
-        place.refuse("", error.strerror or str(error), "a readable file or folder", "Check the path")
+        raise InputError(system_fault(error, place.file, "a readable file or folder")) from error
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file
