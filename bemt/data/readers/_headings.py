@@ -117,6 +117,26 @@ def known(text: str, base: str, unit: str) -> Heading:
     return Heading(text, _channel(base, found).lstrip("_"), found)
 
 
+def usual(text: str, base: str, unit: str) -> Heading:
+    """Heading of a stand's own column: its usual unit, or the one that it states; unit None if that fits no such column.
+
+    >>> [usual(f"Torque Left {u}", "torque", "Nm").unit.factor for u in ("", "[Nm]", "[Nmm]")]
+    [1.0, 1.0, 0.001]
+    >>> usual("Thrust [g]", "thrust", "gf").unit.suffix, usual("Torque [V]", "torque", "Nm").unit
+    ('gf', None)
+    """
+    found, said = known(text, base, unit), re.search(r"[\[(]([^()\[\]]*)[)\]]\s*$", text)
+    if not said or said[1].lower().strip(" -") in ("", unit.replace("gf", "g").lower()) or found.unit is None:
+        return found
+    goes = unit_for(found.unit.dimension, said[1].strip())
+    if goes is None:
+        return replace(found, unit=None, doubt=f"{said[1].strip()!r} is no unit of it")
+    made = goes[0]
+    if made.dimension == "angular_speed" and made.suffix != "rpm":
+        made = units.Unit("", "angular_speed", made.factor / units.RPM)
+    return replace(found, unit=made)
+
+
 def _channel(base: str, unit: units.Unit) -> str:
     """Name of a channel with its unit in SI."""
     si = si_name(unit).replace("/", "_")
