@@ -47,7 +47,7 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
 )
 _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
-    (re.compile(rb"^\s*(#.*\s+)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
+    (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
     (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
      "Import the propeller's own file, PER3_*.dat"),
     (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
