@@ -9,11 +9,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from test_recordings_mutated import BASES
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
 from bemt.data.recordings.overview import is_recording, reduction_of
-from test_recordings_mutated import BASES
 
 LINES = 600
 """Lines, or words of a line, before the doublings."""

@@ -262,7 +262,7 @@ def heading(text: str) -> Heading:
     return found
 
 
-def _splits(text: str) -> Iterator[tuple[str, str]]:
+def splits(text: str) -> Iterator[tuple[str, str]]:
     """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
     for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
         yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
@@ -290,7 +290,7 @@ def _by_words(text: str) -> Heading | None:
     ):
         if unit.dimension == "time":
             return Heading(text, "time_s", unit)
-    for base, unit in _splits(bare):
+    for base, unit in splits(bare):
         words = english(base)
         for name, dimension in quantities(words):
             if not unit:
