@@ -1,9 +1,9 @@
 """Tables of the New Dexterity coaxial stand: two rotors, ``Left`` upstream and ``Right`` downstream, a row per setting.
 
 PWM [us], thrust [g: gram-force], torque [Nm, its sign is the sense of rotation], voltage, current and optical speed per
-side, in these units where the heading states no other (IEEE 9720993, An Open-Source Benchmarking Platform for Coaxial Rotor Systems). If only one side turned, its
-columns get the plain names; two that turned keep ``left`` and ``right``. The first row is read before the tare: its
-loads are left out.
+side, in these units where the heading states no other (IEEE 9720993, An Open-Source Benchmarking Platform for Coaxial
+Rotor Systems). If only one side turned, its columns get the plain names; two that turned keep ``left`` and ``right``.
+The first row is read before the tare: its loads are left out.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     build = Builder.of_stand(path, KIND)
     raw = set(map(_base, build.table.headings)) >= _RAW_KEYS
     for k, text in enumerate(build.table.headings):
-        if raw and _base(text) in _RAW:
+        if raw and _base(text) in _RAW and (_base(text) != text or text == "Motor Output"):
             build.add_usual(k, *_RAW[_base(text)])
         else:
             build.add(k, Heading(text, slug(text), None, "counts or telemetry") if raw else _table_heading(text))
