@@ -91,6 +91,8 @@ def unpacked(raw: bytes, name: str, most: int | None = None, depth: int = 0) -> 
         Path, for faults.
     most : int or None
         Bytes that are enough, for a look at the head; None: all.
+    depth : int
+        How many times it was unpacked so far.
 
     Raises
     ------

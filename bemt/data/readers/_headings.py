@@ -118,7 +118,7 @@ def known(text: str, base: str, unit: str) -> Heading:
 
 
 def usual(text: str, base: str, unit: str) -> Heading:
-    """Heading of a stand's own column: its usual unit, or the one that it states; unit None if that fits no such column.
+    """Heading of a stand's own column: its usual unit, or the one that it states; unit None if that does not fit.
 
     >>> [usual(f"Torque Left {u}", "torque", "Nm").unit.factor for u in ("", "[Nm]", "[Nmm]")]
     [1.0, 1.0, 0.001]
