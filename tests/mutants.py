@@ -14,6 +14,7 @@ import os
 import resource
 import sys
 import time
+import traceback
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MOST_SECONDS = 90
 """CPU time of a child, after which the mutant counts as noticed: it does not end. [s]"""
 WARM = ("numpy", "numpy.testing", "scipy.stats", "scipy.optimize", "scipy.interpolate", "pandas", "numba", "pydantic",
-        "pytest", "hypothesis", "tomlkit", "matplotlib.figure", "xdist")  # fmt: skip
+        "tomlkit", "matplotlib.figure")  # fmt: skip
 INTERPRETED = {  # texts that make the kernel run as Python
     "bemt/physics/bem/kernel.py": (("self._fast = always_compile()", "self._fast = False"),
                                    ("INTERPRETED = 6000", "INTERPRETED = 10**9"),
@@ -183,7 +184,7 @@ def _child(tests: str, mutant: Mutant | None, log: Path) -> int:
             os.environ["NUMBA_CACHE_DIR"] = str(log.with_suffix(".numba"))
         _changed(edits)
     files = [w if not w.startswith("test_") else f"tests/{w}" for w in shlex.split(tests)]
-    return int(pytest.main([*files, "-x", "-q", "--no-header", "-o", "addopts=", "-m", "not slow", "-p", "no:cacheprovider"]))
+    return int(pytest.main([*files, "-x", "-q", "--no-header", "-o", "addopts=", "-m", "not slow", "-p", "no:cacheprovider", "-W", "ignore"]))
 
 
 def _forked(tests: str, mutant: Mutant | None, log: Path) -> tuple[int, float]:
@@ -193,6 +194,8 @@ def _forked(tests: str, mutant: Mutant | None, log: Path) -> tuple[int, float]:
         code = 70
         try:
             code = _child(tests, mutant, log)
+        except BaseException:
+            traceback.print_exc()
         finally:
             os._exit(code)
     _, status, used = os.wait4(pid, 0)
@@ -222,7 +225,7 @@ def run(mutants: Iterable[Mutant], folder: Path) -> dict[str, Any]:
             found["survived"].append(mutant.name)
         else:
             found["killed"] += 1
-        print(f"{k:3} {code:4} {seconds:6.1f} s  {mutant.name}", file=sys.stderr, flush=True)
+        print(f"{k:3} {code:4} {seconds:6.1f} s  {' '.join(mutant.name.split())[:150]}", file=sys.stderr, flush=True)
     return found | {"seconds": time.monotonic() - began}
 
 
