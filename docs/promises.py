@@ -13,8 +13,8 @@ import figures  # noqa: E402
 
 HEAD = """# Promises and their tests
 
-*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise leads to the file that fails when it
-breaks.
+*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise leads to the file that
+fails when it breaks.
 
 ## Figures
 

@@ -1,3 +1,4 @@
+# ruff: noqa: E501 - a table
 """Sixty small wrong changes, each of which some test must notice: ``python tests/mutants.py [WORD]`` lists survivors.
 
 A parent loads the libraries once and forks for each mutant; the child reads one file of the tree with one text replaced
@@ -68,10 +69,10 @@ MUTANTS = (
            "- dcd * s - cd * c\n    dct = dcl * s + cl * c + dcd * c - cd * s\n    FM", PLAIN),
     Mutant(RES, "res = FM * across - sg4 * (cn * UT + ct * ctUP)", "res = FM * across - sg4 * cn * UT", PLAIN),
     Mutant(RES, "q2s * q * ss if far else ss * ss", "q2s * ss if far else ss * ss", "test_kernel_guards.py"),
-    Mutant(RES, "return l0 + wa * dl, d0 + wa * dd, dl * inv", "return l0 + wa * dl, d0, dl * inv", PLAIN),
+    Mutant(RES, "return l0 + wa * dl, d0 + wa * dd, dl * inv", "return l0 + wa * dl, d0, dl * inv", "test_kernel_guards.py"),
     Mutant(RES, "l0 = l00 + wm * (l10 - l00)", "l0 = l00", "test_kernel_guards.py"),
-    Mutant(KER, "lo = phi if res < 0.0 else w[_LO + k]", "lo = w[_LO + k]", PLAIN),
-    Mutant(KER, "w[_CL + k] = cl + dcl * d", "w[_CL + k] = cl + 2.0 * dcl * d", PLAIN),
+    Mutant(KER, "drag = 1.0 + w[_SG4 + k] * cd / max(X, 1e-12)", "drag = 1.0", PLAIN),
+    Mutant(KER, "(cl * s + cd * c) * st[i, S_R]", "(cl * s - cd * c) * st[i, S_R]", PLAIN),
     Mutant(f"{K}oblique.py", "PITT_PETERS = 15.0 * math.pi / 32.0", "PITT_PETERS = 15.0 * math.pi / 64.0",
            "test_kernel_guards.py -k oblique"),
     # duct

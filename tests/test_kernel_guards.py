@@ -14,7 +14,8 @@ import pytest
 from scipy import stats
 
 from bemt.physics.bem import kernel, oblique, packing, residual
-from bemt.physics.bem.duct import duct_flow
+from bemt.physics.bem.duct import DuctFlow, duct_flow
+from bemt.physics.effects.drag_divergence import DragDivergence
 from bemt.physics.sections.polars import ALPHA_GRID
 from bemt.rotors import validity
 from bemt.rotors.case import load_case
@@ -75,6 +76,15 @@ def test_a_table_is_linear_between_its_nodes() -> None:
         assert got[4] == pytest.approx(by_lnW, rel=1e-9)
 
 
+def test_a_table_of_angles_alone_is_linear_between_its_nodes() -> None:
+    a = ALPHA_GRID[None, None, None, :]
+    bake: Any = SimpleNamespace(cl=0.3 + 2.0 * a, cd=0.02 + 0.1 * a, M2=np.zeros(1), Re=np.array([1e5]), B=2)
+    tab, g = packing.pack_tables(bake).ravel(), packing.pack_grid(bake)
+    for alpha in (-0.103, 0.052, 0.7):
+        got = SPACE["lookup_plain"](alpha, 0.0, 1.0, 0, tab, g)
+        assert got == pytest.approx((0.3 + 2.0 * alpha, 0.02 + 0.1 * alpha, 2.0, 0.1, 0.0, 0.0), rel=1e-9)
+
+
 def test_descent_follows_the_measured_curve_and_climb_momentum_theory() -> None:
     """v over that of hover at sink rate x: 1 + 1.125 x - 1.372 x^2 + 1.718 x^3 - 0.655 x^4 (Leishman 2006)."""
 
@@ -93,6 +103,32 @@ def test_descent_follows_the_measured_curve_and_climb_momentum_theory() -> None:
 def test_the_gradient_of_oblique_flow_is_that_of_pitt_and_peters() -> None:
     """15 pi / 32 (Pitt and Peters 1981; Moriarty and Hansen 2005, AeroDyn Theory Manual)."""
     assert pytest.approx(1.4726, abs=1e-4) == oblique.PITT_PETERS
+
+
+def test_the_jet_of_a_duct_is_that_of_the_kernel() -> None:
+    """Both write down how its speed departs from a straight line between rest and stream."""
+    fx = np.zeros(residual.N_NUM)
+    fx[[residual.N_WAKE, residual.N_STREAM, residual.N_BEND]] = 1.0 / (0.9 * 0.95), 0.98 / 0.95 - 1.0, 0.15
+    flow = DuctFlow(wake_ratio=0.9, contraction=0.95, capture=0.98, bend=0.15)
+    for w, V in ((20.0, 0.0), (20.0, 15.0), (30.0, 40.0)):
+        assert float(flow.jet_speed(np.array(w), np.array(V))) == pytest.approx(SPACE["jet_speed"](w, V, fx)[0], rel=1e-9)
+
+
+def test_drag_diverges_earlier_with_lift_as_korn_says() -> None:
+    """M_dd = kappa - t/c - cl/10 (Korn; Mason 1990): the wave drag at one Mach number is that of M_dd at the lift."""
+    effect, added = DragDivergence(), []
+    alpha, M2, cl = np.radians([-20.0, 2.0, 3.0, 20.0]), np.array([0.0, 0.68**2, 0.76**2]), np.array([0.3, 0.0, 0.7, 0.9])
+    bake: Any = SimpleNamespace(
+        r=np.ones(1), M2=M2, alpha=alpha, thickness=np.array([0.12]), own_mach=np.zeros(1), fast=slice(0, 1),
+        cl=np.broadcast_to(cl, (1, 3, 1, 4)), add_drag=added.append,
+    )  # fmt: skip
+    effect.section(bake)
+    for k, lift in ((1, 0.0), (2, 0.7)):
+        for m in (1, 2):
+            rise = float(effect.rise(math.sqrt(M2[m]), 0.87 - 0.12 - 0.1 * lift))
+            cap = 4.0 * (alpha[k] ** 2 + 0.12**2) / math.sqrt(1.1025 - 1.0)
+            assert added[0][0, m, 0, k] == pytest.approx(min(rise, cap), rel=1e-9)
+    assert added[0][0, 1, 0, 2] > 2.0 * added[0][0, 1, 0, 1]
 
 
 def test_the_walls_of_a_duct_rub_on_all_that_they_wet(project: Any) -> None:
