@@ -54,7 +54,8 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": (
-        "believe.md", "promises.md",
+        "believe.md",
+        "promises.md",
         "theory.md",
         "oblique.md",
         "duct.md",

@@ -185,7 +185,24 @@ def _child(tests: str, mutant: Mutant | None, log: Path) -> int:
             os.environ["NUMBA_CACHE_DIR"] = str(log.with_suffix(".numba"))
         _changed(edits)
     files = [w if not w.startswith("test_") else f"tests/{w}" for w in shlex.split(tests)]
-    return int(pytest.main([*files, "-x", "-q", "--no-header", "-o", "addopts=", "-m", "not slow", "-p", "no:cacheprovider", "-W", "ignore"]))
+    return int(
+        pytest.main(
+            [
+                *files,
+                "-x",
+                "-q",
+                "--no-header",
+                "-o",
+                "addopts=",
+                "-m",
+                "not slow",
+                "-p",
+                "no:cacheprovider",
+                "-W",
+                "ignore",
+            ]
+        )
+    )
 
 
 def _forked(tests: str, mutant: Mutant | None, log: Path) -> tuple[int, float]:

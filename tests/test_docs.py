@@ -136,9 +136,7 @@ def test_docstrings_agree_with_the_code_and_name_units(module: str) -> None:
     assert not faults, "\n".join(faults)
 
 
-@pytest.mark.parametrize(
-    "module", ["bemt.app.library.answers", "bemt.app.library.rotors", "bemt.physics.dataset"]
-)
+@pytest.mark.parametrize("module", ["bemt.app.library.answers", "bemt.app.library.rotors", "bemt.physics.dataset"])
 def test_everything_of_the_face_has_an_example_that_runs(module: str) -> None:
     """Its own, or a line of its class's; pytest runs them."""
     without = []

@@ -111,13 +111,19 @@ def test_the_jet_of_a_duct_is_that_of_the_kernel() -> None:
     fx[[residual.N_WAKE, residual.N_STREAM, residual.N_BEND]] = 1.0 / (0.9 * 0.95), 0.98 / 0.95 - 1.0, 0.15
     flow = DuctFlow(wake_ratio=0.9, contraction=0.95, capture=0.98, bend=0.15)
     for w, V in ((20.0, 0.0), (20.0, 15.0), (30.0, 40.0)):
-        assert float(flow.jet_speed(np.array(w), np.array(V))) == pytest.approx(SPACE["jet_speed"](w, V, fx)[0], rel=1e-9)
+        assert float(flow.jet_speed(np.array(w), np.array(V))) == pytest.approx(
+            SPACE["jet_speed"](w, V, fx)[0], rel=1e-9
+        )
 
 
 def test_drag_diverges_earlier_with_lift_as_korn_says() -> None:
     """M_dd = kappa - t/c - cl/10 (Korn; Mason 1990): the wave drag at one Mach number is that of M_dd at the lift."""
     effect, added = DragDivergence(), []
-    alpha, M2, cl = np.radians([-20.0, 2.0, 3.0, 20.0]), np.array([0.0, 0.68**2, 0.76**2]), np.array([0.3, 0.0, 0.7, 0.9])
+    alpha, M2, cl = (
+        np.radians([-20.0, 2.0, 3.0, 20.0]),
+        np.array([0.0, 0.68**2, 0.76**2]),
+        np.array([0.3, 0.0, 0.7, 0.9]),
+    )
     bake: Any = SimpleNamespace(
         r=np.ones(1), M2=M2, alpha=alpha, thickness=np.array([0.12]), own_mach=np.zeros(1), fast=slice(0, 1),
         cl=np.broadcast_to(cl, (1, 3, 1, 4)), add_drag=added.append,

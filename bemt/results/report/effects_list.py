@@ -108,7 +108,13 @@ def _page(e: dict[str, Any]) -> list[str]:
         items += _wrapped(f"* `{p['name']}` {p['default']:.4g} ({_range(p)}: {p['source']}{off})", "  ")
     for name, words in e["choices"].items():
         items += _wrapped(f"* `{name}` " + ", ".join(f"`{w}`" for w in words), "  ")
-    return [*lines, *items, *([""] if items else []), *_wrapped(_short(e["source"], catalogue()[e["id"]].__module__.rpartition(".")[2])), ""]
+    return [
+        *lines,
+        *items,
+        *([""] if items else []),
+        *_wrapped(_short(e["source"], catalogue()[e["id"]].__module__.rpartition(".")[2])),
+        "",
+    ]
 
 
 def _wrapped(text: str, indent: str = "") -> list[str]:
