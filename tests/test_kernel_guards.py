@@ -13,9 +13,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bemt.base import units
+from bemt.physics import air
 from bemt.physics.bem import kernel, oblique, packing, residual
 from bemt.physics.bem.duct import DuctFlow, duct_flow
+from bemt.physics.effects.compressibility import Compressibility
 from bemt.physics.effects.drag_divergence import DragDivergence
+from bemt.physics.effects.tip_gap import TipGap
 from bemt.physics.sections.polars import ALPHA_GRID
 from bemt.rotors import validity
 from bemt.rotors.case import load_case
@@ -135,6 +139,26 @@ def test_drag_diverges_earlier_with_lift_as_korn_says() -> None:
             cap = 4.0 * (alpha[k] ** 2 + 0.12**2) / math.sqrt(1.1025 - 1.0)
             assert added[0][0, m, 0, k] == pytest.approx(min(rise, cap), rel=1e-9)
     assert added[0][0, 1, 0, 2] > 2.0 * added[0][0, 1, 0, 1]
+
+
+def test_lift_diverges_earlier_at_more_lift() -> None:
+    """A tenth of the lift, as Korn's drag divergence does."""
+    at = Compressibility().lift_divergence(0.12, np.array([0.0, 0.5, 1.0, 3.0]))
+    assert at[0] - at == pytest.approx([0.0, 0.05, 0.10, 0.12])
+
+
+def test_a_tip_gap_costs_its_share_of_the_span_times_the_stated_loss() -> None:
+    bake: Any = SimpleNamespace(ducted=True, level=1.0, gap=1e-3, R=0.06, Rhub=0.02, num=SimpleNamespace())
+    TipGap(loss=1.5, scale=0.05).momentum(bake)
+    assert bake.num.gap_loss == pytest.approx(1.5 * 1.0 / 40.0)
+    assert bake.num.gap_share == pytest.approx(1.0 - math.exp(-1.0 / (0.05 * 60.0)))
+
+
+def test_pressures_of_one_atmosphere_and_the_vapour_in_it() -> None:
+    """29.921 inHg, 760 mmHg and 14.696 psi are 101,325 Pa; saturated air of 20 deg C holds 2.318 % vapour (CIPM-2007)."""
+    for value, unit in ((29.921, "inHg"), (760.0, "mmHg"), (14.696, "psi")):
+        assert units.to_si(value, unit) == pytest.approx(101_325.0, rel=3e-5)
+    assert air.vapour_fraction(101_325.0, 293.15, 100.0) == pytest.approx(0.02318, abs=2e-5)
 
 
 def test_the_walls_of_a_duct_rub_on_all_that_they_wet(project: Any) -> None:
