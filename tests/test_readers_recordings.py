@@ -1304,3 +1304,22 @@ def test_a_unit_in_the_heading_of_a_stand_is_converted_or_refused(stand: str, wr
         assert np.allclose(column(unit) / factor, first / next(iter(factors.values())), rtol=1e-9, equal_nan=True), unit
     with pytest.raises(InputError, match=f"{wrong}.*a unit such as"):
         column(wrong)
+
+
+@pytest.mark.parametrize(
+    ("head", "cell", "channel", "value"),
+    [("Efficiency (kgf/W)", "0.008", "efficiency_N_W", 0.008 * 9.80665), ("Prop speed (Hz)", "80", "rpm", 4800.0),
+     ("Propeller speed (1/s)", "80", "rpm", 4800.0)],
+)  # fmt: skip
+def test_units_of_headings_that_a_mutant_changed(
+    head: str, cell: str, channel: str, value: float, write: Write
+) -> None:
+    got = named(importers.read(write(f"{head},x_A\n" + f"{cell},1\n" * 3)))
+    assert np.allclose(got[channel], value, rtol=1e-6)
+
+
+def test_loads_before_the_tare_are_left_out(write: Write) -> None:
+    head, row, channel, *_ = STANDS["coaxial_stand"]
+    first = "1000,1000,3,3,0.3,10,10\n"
+    got = importers.read(write(head.format("Nm") + "\n" + first + "".join(row.format(k=k) + "\n" for k in range(1, 6))))
+    assert np.isnan(got[channel][0]) and np.isfinite(got[channel][1:]).all() and said(got, "before the tare")
