@@ -58,8 +58,14 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "battery current": "ibat i~bat i~in i~batt akkustrom batteriestrom",
     "motor rotation speed": "motordrehzahl",
     "propeller rotation speed": "propellerdrehzahl luftschraubendrehzahl rotordrehzahl",
-    "radius": "半径",
-    "chord": "弦长",
+    "radius": "半径 半徑 rayon raggio radio halbmesser promien радиус radialposition position~radiale posicion~radial "
+    "posizione~radiale",
+    "chord": "弦长 弦長 sehne sehnenlange profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
+    "longueur~de~corde",
+    "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "
+    "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
+    "kat~nastawienia угол~установки",
+    "pitch": "steigung pas passo paso",
     "static": "statisch statique estatico estatica statico statica 静态",
     "mean": "mittlerer mittlere mittelwert moyen moyenne medio media 平均 average avg",
     "ambient": "umgebung ambiant ambiante ambiente ambientale 环境 環境 室 room lab laboratory outside outdoor amb "

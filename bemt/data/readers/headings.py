@@ -131,6 +131,26 @@ def known(text: str, base: str, unit: str) -> Heading:
     return Heading(text, _channel(base, found).lstrip("_"), found)
 
 
+def in_usual_unit(text: str, base: str, unit: str) -> Heading:
+    """Heading of a stand's own column: its usual unit, or the one that it states; unit None if that does not fit.
+
+    >>> [in_usual_unit(f"Torque Left {u}", "torque", "Nm").unit.factor for u in ("", "[Nm]", "[Nmm]")]
+    [1.0, 1.0, 0.001]
+    >>> in_usual_unit("Thrust [g]", "thrust", "gf").unit.suffix, in_usual_unit("Torque [V]", "torque", "Nm").unit
+    ('gf', None)
+    """
+    found, said = known(text, base, unit), re.search(r"[\[(]([^()\[\]]*)[)\]]\s*$", text)
+    if not said or said[1].lower().strip(" -") in ("", unit.replace("gf", "g").lower()) or found.unit is None:
+        return found
+    goes = unit_for(found.unit.dimension, said[1].strip())
+    if goes is None:
+        return replace(found, unit=None, doubt=f"{said[1].strip()!r} is no unit of it")
+    made = goes[0]
+    if made.dimension == "angular_speed" and made.suffix != "rpm":
+        made = units.Unit("", "angular_speed", made.factor / units.RPM)
+    return replace(found, unit=made)
+
+
 def _channel(base: str, unit: units.Unit) -> str:
     """Name of a channel with its unit in SI."""
     si = si_name(unit).replace("/", "_")
@@ -256,17 +276,17 @@ def heading(text: str) -> Heading:
     return found
 
 
-def usual(text: str, unit: str = "") -> str:
+def channel_of(text: str, unit: str = "") -> str:
     """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
 
-    >>> usual("V", "m s^-1"), usual("U [m/s]"), usual("Velocity", "m/s"), usual("T", "N"), usual("Q", "N m"), usual("J")
+    >>> channel_of("V", "m s^-1"), channel_of("U [m/s]"), channel_of("Velocity", "m/s"), channel_of("T", "N"), channel_of("Q", "N m"), channel_of("J")
     ('airspeed_m_s', 'airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
     """
     name = heading(f"{text} [{unit}]" if unit else text).name
     return USUAL.get(name, name)
 
 
-def _splits(text: str) -> Iterator[tuple[str, str]]:
+def splits(text: str) -> Iterator[tuple[str, str]]:
     """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
     for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
         yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
@@ -294,7 +314,7 @@ def _by_words(text: str) -> Heading | None:
     ):
         if unit.dimension == "time":
             return Heading(text, "time_s", unit)
-    for base, unit in _splits(bare):
+    for base, unit in splits(bare):
         words = english(base)
         for name, dimension in quantities(words):
             if not unit:

@@ -19,7 +19,7 @@ from bemt.base.errors import Fault
 from bemt.base.units import Unit
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import may_be_shaft_speed, meanings, usual
+from bemt.data.readers.headings import channel_of, may_be_shaft_speed, meanings
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.physics.dataset import Dataset
 
@@ -262,7 +262,7 @@ class OpenRun:
 def _means(word: str, unit: Unit | None, quantity: str) -> bool:
     """Whether a heading means a quantity in the words of any recording; without a unit only what nothing else is."""
     if unit is not None:
-        name = usual(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
+        name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
         return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
     return quantity in ("airspeed", "density") and quantity in meanings(word)
 

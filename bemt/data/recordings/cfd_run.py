@@ -19,7 +19,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd_run import RunToml
-from bemt.data.readers.headings import usual
+from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
 from bemt.data.recordings.cfd_setup import with_grid_floor
@@ -237,7 +237,7 @@ def _applied(
     if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
         _nothing(work)
     elif "airspeed_m_s" not in values and "J" not in values:
-        for c in [c for c in work.columns if usual(c.stem) == "J" and _table(c.record)][:1]:
+        for c in [c for c in work.columns if channel_of(c.stem) == "J" and _table(c.record)][:1]:
             values["J"] = c.record[c.name]
             work.used.add(c.name)
     if not work.faults:
@@ -252,7 +252,7 @@ def _table(record: Dataset) -> bool:
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
-    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and usual(c.stem) not in _KNOWN]
+    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and channel_of(c.stem) not in _KNOWN]
     rest = [c for c in rest if moves(c.record[c.name])]
     if not rest:
         return

@@ -318,6 +318,8 @@ def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
 
 def _file_text(file: Mapping[str, Any]) -> str:
     if file["error"] is not None:
+        if not os.path.exists(file["path"]):
+            return str(file["error"])
         return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
     lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
     rows, plain = [], []

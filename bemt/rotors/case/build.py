@@ -109,21 +109,35 @@ def _bent(case: CaseFile, blade: Blade) -> Blade:
 
 def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
-    blade = case.blade
-    if blade.stations is not None:
-        from bemt.data.readers.stations import read_stations
+    key = next(k for k in ("stations", "uiuc", "apc") if getattr(case.blade, k) is not None)  # a rule of the file
+    return stations_in(path.parent / getattr(case.blade, key), 0.5 * case.rotor.diameter_m, key)
 
-        return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
-    if blade.uiuc is not None:
+
+def stations_in(file: Path, R: float, key: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns r/R, c/R and beta [rad] of a file of stations, by the key of [blade] that names it; tip radius in m."""
+    if key == "uiuc":
         from bemt.data.readers.uiuc_tables import read_geometry
 
-        table = read_geometry(path.parent / blade.uiuc)
+        table = read_geometry(file)
         return table.r_R, table.c_R, np.radians(table.beta_deg)
-    from bemt.data.readers.apc import read_pe0
+    if key == "apc":
+        from bemt.data.readers.apc import read_pe0
 
-    assert blade.apc is not None  # a rule of the file
-    apc = read_pe0(path.parent / blade.apc)
-    return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
+        apc = read_pe0(file)
+        return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
+    from bemt.data.readers.stations import read_stations
+
+    return read_stations(file, R)
+
+
+def key_of(file: Path) -> str:
+    """Key of [blade] for a file of stations, by its content: ``apc``, ``uiuc``, or our own table, ``stations``."""
+    from bemt.data.readers import HEAD_BYTES, load_text
+    from bemt.data.readers.apc import sniff
+    from bemt.data.readers.uiuc_tables import role_of
+
+    head = load_text(file).text[:HEAD_BYTES]
+    return "apc" if sniff(head) else "uiuc" if role_of(head) == "geometry" else "stations"
 
 
 def build_rotor(case: CaseFile, path: Path) -> Rotor:

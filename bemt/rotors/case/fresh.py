@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -201,6 +202,7 @@ def stations_text(
     label: Designation | None = None,
     family: str | None = None,
     motor: tuple[float, int] | None = None,
+    name: str = "",
 ) -> str:
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
@@ -208,7 +210,7 @@ def stations_text(
     """
     section = section_of((label.blade_class if label else None) or class_of(family))
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
-    name = _label_name(label) if label else case_name(Path(file).stem)
+    name = _label_name(label) if label else name or case_name(Path(file).stem)
     title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"
     return f"""# A propeller with the stations of {file}. Each unknown is an assumption with a range.
 schema = "bemt.case/1"
@@ -287,19 +289,22 @@ recovery = 0.8
 
 
 def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
-    """Hub ratio and key of a file of stations: our own CSV, a geometry file of UIUC, or an APC PE0 file."""
-    from bemt.data.readers import load_text
+    """Hub ratio and key of [blade] of a file of stations: a table in any dialect, or one of UIUC or APC."""
+    from bemt.rotors.case.build import key_of, stations_in
 
-    head = load_text(file).text[:4000]
-    first = head.lstrip().partition("\n")[0]
-    if "," in first:
-        from bemt.data.readers.stations import read_stations
+    key = key_of(file)
+    return float(np.clip(stations_in(file, 0.5 * diameter_m, key)[0].min(), 0.05, 0.3)), key
 
-        return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
-    if re.match(r"\s*r/R\b", first):
-        rows = [float(row.split()[0]) for row in head.splitlines()[1:] if row.split()]
-        return max(min(min(rows, default=0.15), 0.3), 0.05), "uiuc"
-    if "STATION" in head and "CHORD" in head:
-        return 0.15, "apc"
-    got, expected = repr(first.strip()[:60]), "r_over_R,chord_over_R,beta_deg, a UIUC geometry file or an APC PE0 file"
-    raise InputError(Fault(file.as_posix(), "1", got, expected, "Read recordings with `bemt import`"))
+
+_LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
+
+
+def label_or_name(text: str | None, blades: int | None, file: Path) -> tuple[Designation | None, str]:
+    """What the word beside a file of stations is: a label, such as ``10x5``, or the name of the case."""
+    if text is not None:
+        with suppress(GeometryError):
+            parse_designation(text)
+            return read_label(text, blades), ""
+        if _LABEL.search(text):
+            read_label(text)  # says what is wrong with it
+    return None, case_name(text or file.stem)

@@ -141,7 +141,7 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
     if w.unit is not None and w.scan is None:
         faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
-    if w.stations is not None and w.diameter_mm is None and w.label is None:
+    if w.stations is not None and w.diameter_mm is None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
         faults.append(
             Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
         )
@@ -169,11 +169,11 @@ def _files(w: Wanted) -> dict[str, bytes]:
         return {name: text.encode() for name, text in texts.items()}
     if w.stations is not None:
         file = Path(w.stations)
-        told = None if w.label is None else fresh.read_label(w.label, w.blades)
+        told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
         hub, key = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
-        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor)
+        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name)
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import textwrap
+import unicodedata
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -118,6 +120,60 @@ def _data(case: Case) -> list[Source]:
     rows = [] if path is None else reference_file.read(path)
     told = dict.fromkeys((row.kind, row.source) for row in rows if row.source)
     return found + [Source("data", kind, source) for kind, source in told]
+
+
+_WORK = re.compile(
+    r"(?P<who>[A-Z]\w+(?:,? (?:and |van |von )*[A-Z][\w.'-]*)*(?: et al\.)?)(?:,)? \(?(?P<year>1[89]\d\d|20[0-4]\d)\)?"
+    r"(?P<what>(?:(?!(?<=[a-z]{4})\. [A-Z`])[^;()])*)"
+)
+"""Authors, year and what follows in a source, up to the next semicolon, bracket or sentence."""
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/"}
+
+
+def bibtex(found: Sources) -> str:
+    """Works that an answer stands on, as BibTeX.
+
+    Each work with an author and a year that a source names is an entry ``@misc``, whose note is what the source says of
+    it ("not checked" included) and where it is used; a source without both is a comment. The program is ``@software``.
+
+    Parameters
+    ----------
+    found : Sources
+        Sources of the answer.
+
+    Returns
+    -------
+    str
+        Entries, each key once, in their order.
+    """
+    from bemt import __version__
+
+    entries: dict[str, tuple[str, str, str, list[str]]] = {}
+    bare = []
+    for source in found[1:]:
+        works = list(_WORK.finditer(source.source))
+        for work in works:
+            plain = unicodedata.normalize("NFKD", work["who"]).encode("ascii", "ignore").decode()
+            key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + work["year"]
+            what = " ".join(work["what"].split()).strip(" ,.:")
+            if re.match(r"[ (,;]*(?:\w+ ){0,2}not checked", source.source[work.end() :]):
+                what = f"{what} (not checked)".strip()
+            entry = entries.setdefault(key, (work["who"], work["year"], what, []))
+            entry[3].append(source.name)
+        if not works:
+            bare.append(f"% {source.name}: {' '.join(source.source.split())}")
+    lines = [f"@software{{bemt, title = {{bemt}}, version = {{{__version__}}}, note = {{see CITATION.cff}}}}"]
+    for key, (who, year, what, used) in entries.items():
+        author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
+        doi = re.search(r"doi:\s*(10\.\d+/[^\s,)]+)", what)
+        note = f"{what}; in {', '.join(dict.fromkeys(used))}" if what else f"in {', '.join(dict.fromkeys(used))}"
+        fields = [f"author = {{{_latex(author)}}}", f"year = {{{year}}}", f"note = {{{_latex(note)}}}"]
+        lines.append(f"@misc{{{key}, {', '.join([*fields, *([f'doi = {{{doi[1]}}}'] if doi else [])])}}}")
+    return "\n".join([*lines, *bare]) + "\n"
+
+
+def _latex(text: str) -> str:
+    return "".join(_LATEX.get(c, c) for c in text)
 
 
 def text(found: Sources, width: int = 100) -> str:
