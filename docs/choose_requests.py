@@ -13,8 +13,10 @@ from bemt.tools.design.search import choose
 
 PAGE = Path(__file__).resolve().parent / "choose.md"
 REQUESTS: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("quadrotor of 2 kg, 4S, shafts 330 mm from the middle", {"cells": 4, "mass_kg": 2.0, "rotors": 4, "arm_mm": 330.0}),
-    ("quadrotor of 250 g, 3S, shafts 90 mm from the middle", {"cells": 3, "mass_kg": 0.25, "rotors": 4, "arm_mm": 90.0}),
+    ("quadrotor of 2 kg, 4S, shafts 330 mm from the middle",
+     {"cells": 4, "mass_kg": 2.0, "rotors": 4, "arm_mm": 330.0}),
+    ("quadrotor of 250 g, 3S, shafts 90 mm from the middle",
+     {"cells": 3, "mass_kg": 0.25, "rotors": 4, "arm_mm": 90.0}),
     ("5 in racer of 650 g, 4S, 12 N a rotor, two or three blades",
      {"cells": 4, "mass_kg": 0.65, "rotors": 4, "thrust_N": 12.0, "arm_mm": 110.0, "blades": (2, 3)}),
     ("wing, 6 N at 15 m/s, 3S, 11 in at most",

@@ -209,7 +209,8 @@ def _started_rows() -> str:
 def _qprop_rows() -> str:
     """Differences of QPROP's equations."""
     return "\n".join(
-        f"| {name} | {rpm:.0f} | {V:.1f} | {T:+.1f} % | {Q:+.1f} % |" for name, rpm, V, T, Q in qprop_equations.compared()
+        f"| {name} | {rpm:.0f} | {V:.1f} | {T:+.1f} % | {Q:+.1f} % |"
+        for name, rpm, V, T, Q in qprop_equations.compared()
     )
 
 
@@ -412,9 +413,9 @@ The exported files in QPROP's equations, beside BEMT at the same point:
 |---|---|---|---|---|
 {_qprop_rows()}
 
-At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it: thrust is high where
-the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference Reynolds
-number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
+At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it: thrust is high
+where the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference
+Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
 `bemt stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
 

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
 DIAMETERS = (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 20, 22, 24, 26, 28, 30, 32, 36, 40)
 """Diameters on sale [in]."""
 RATIOS = ((5.6, (0.6, 0.75, 0.9)), (10.6, (0.47, 0.55, 0.7)), (math.inf, (0.36, 0.45, 0.55, 0.7)))
-"""Pitch over diameter of the labels that are tried, up to a diameter [in]: from the lowest tenth to the upper quarter of
-567 propellers on sale that Drive Calculator lists; small ones have more pitch [1]."""
+"""Pitch over diameter of the labels that are tried, up to a diameter [in]: from the lowest tenth to the upper quarter
+of 567 propellers on sale that Drive Calculator lists; small ones have more pitch [1]."""
 FLYING = (0.85, 1.0, 1.2)
 """More pitches over the diameter where the target flies [1]."""
 SOC = 0.5
@@ -315,7 +315,8 @@ def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
     flying = target.airspeed_m_s > 0.0 or target.fluid == "water"
-    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D in fit for P in pitches_in(D, flying) for B in blades)
+    pairs = [(D, P) for D in fit for P in pitches_in(D, flying)]
+    return tuple(f"{D:g}x{P:g}" + (f"x{B}" if B != 2 else "") for D, P in pairs for B in blades)
 
 
 def pitches_in(diameter_in: float, flying: bool) -> tuple[float, ...]:
