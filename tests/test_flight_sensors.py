@@ -101,7 +101,8 @@ def test_recorded_sensors_at_fault(shared_data: Path, name: str) -> None:
     """Named with the ratio; thrust constant within 3 % of the sound flights, mass within 4 %, no motor accused."""
     folder, (motor, mass) = shared_data / "flight_logs", IMRC[name]
     stem = name.rpartition("_")[0]
-    files = [*(folder / "imrc").glob(f"{stem}_*"), *folder.glob(f"cf21_{stem.replace('payload', 'brushless_payload')}_*")]
+    others = folder.glob(f"cf21_{stem.replace('payload', 'brushless_payload')}_*")
+    files = [*(folder / "imrc").glob(f"{stem}_*"), *others]
     sound = [p for p in files if p.stem not in IMRC and p.suffix == ".usdlog"]
     answer = fly(folder / "imrc" / f"{name}.usdlog", mass_kg=mass, healthy=sound, healthy_mass_kg=mass).flights[0]
     (sensor,) = answer.log.sensors

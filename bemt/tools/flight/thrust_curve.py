@@ -21,7 +21,8 @@ from bemt.tools.flight.log import FlightLog
 
 __all__ = ["thrust_curve"]
 
-_BLOCK_S, _WIDE, _SCATTER = 0.25, 0.5, 0.14  # length of a mean [s]; half width of e from which it is not given; flights [1]
+_BLOCK_S, _WIDE, _SCATTER = 0.25, 0.5, 0.14
+"""Length of a mean [s]; half width of e from which it is not given; standard deviation of e between flights [1]."""
 _NAMES = {"ArduPilot DataFlash": ("MOT_THST_EXPO", "MOT_THST_HOVER"), "PX4 ULog": ("THR_MDL_FAC", "MPC_THR_HOVER")}
 
 
