@@ -143,7 +143,7 @@ def label_text(
     """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
     told = read_label(label, blades)
     D, B = told.diameter_in, told.blades
-    chord, section = label_chord(D * INCH, told.blade_class), section_of(told.blade_class)
+    chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
     return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
 # `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
 schema = "bemt.case/1"

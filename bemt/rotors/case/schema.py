@@ -72,7 +72,7 @@ _GAP = FieldLimits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
-BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv"]
+BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv", "reversible", "pattern"]
 KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None

@@ -18,9 +18,23 @@ CHORD, CHORD_EXPONENT = 0.2, -0.2
 pairs the one that predicts 87 propellers of UIUC from their labels best in the median, at rest and in flight.  Their
 chords alone give 0.218 and -0.4 with families alike in weight, which is 13 to 31 % too much thrust and power below 9 in
 [1]."""
-SLOW_FLYER_CHORD = 1.4
-"""Chord of slow flyers over that of others: eleven of two makers have 1.5 times the law's, others of their size 1.1;
-the factor moves the mean log score of 175 propellers known from their labels from 0.042 to 0.086 [1]."""
+CLASS_CHORD: dict[str | None, tuple[float, float | None]] = {
+    "electric": (1.0, 0.09), "sport": (1.0, 0.09), "folding": (0.95, 0.12), "slow_flyer": (1.4, None),
+    "multirotor": (1.25, 0.10), "reversible": (0.75, 0.15), "fpv": (0.9, 0.15),
+}  # fmt: skip
+"""Chord of a class of blades over the usual, and the scatter of its logarithm where that is known.
+
+Fitted to readings at rest and in flight through the solver's slopes, beside blade angle and camber
+(`reports/studies/label_classes.py`): electric, sport and folding to UIUC volumes 1 to 3 (19, 27 and 21 propellers;
+their own scatter is 0.05, 0.04 and 0.10, between makers 0.07), fpv to 16 of Drive Calculator and two stands.
+Multirotor and reversible are APC's computed tables (20 and 8), with the spread of a computation; eight multirotor
+propellers that Drive Calculator measured have 1.10 +- 0.09. Slow flyers: eleven of two makers have 1.5 times the law's
+chord; 1.4 moves the mean log score of 175 propellers known from their labels from 0.042 to 0.086 [1]."""
+WIDTH_CHORD = {1: 1.08, 0: 1.0, -1: 0.86, -2: 0.79}
+"""Chord of wide (W) and narrow blades (N, NN) over others', from APC's computed tables of 21, 18 and 7 [1]."""
+BLADES_EXPONENT = 0.2
+"""Chord of B blades is (2/B) to this power that of two: three- and four-bladed DA4052 and NR640 against their own two
+blades (0.18), 57 and 19 of Drive Calculator's against its two-bladed ones (0.1 to 0.2), FPV (0.4 +- 0.2) [1]."""
 DEG_PER_CAMBER = 104.0
 """Zero-lift angle over camber of a NACA four-digit mean line, camber at 40 % chord: thin-airfoil theory [deg]."""
 _CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
@@ -123,7 +137,9 @@ CHORDS = ("chord_law", "stations", "uiuc", "apc")
 
 
 def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
-    """Section of a class of blades: slow flyers are cambered as the measured ones are."""
+    """Section of a class of blades: slow flyers are cambered as the measured ones are, reversible ones not at all."""
+    if blade_class == "reversible":
+        return Unknown("blade.section.camber", 0.0, 0.0, 0.01, "turns both ways: symmetric, or nearly so"), THICKNESS
     if blade_class != "slow_flyer":
         return SECTION
     camber = round(SECTION[0].value + population().slow_flyer_deg / DEG_PER_CAMBER, 3)
@@ -131,14 +147,18 @@ def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
     return Unknown("blade.section.camber", camber, camber - 0.015, camber + 0.015, why), THICKNESS
 
 
-def label_chord(diameter_m: float, blade_class: str | None = None) -> Unknown:
+def label_chord(
+    diameter_m: float, blade_class: str | None = None, blades: int | None = None, width: int = 0
+) -> Unknown:
     """Largest chord of a propeller that is known by its label."""
     low, high = _CHORD_LAW
-    far = math.exp(math.sqrt(3.0) * chord_sd(diameter_m))
-    wider = SLOW_FLYER_CHORD if blade_class == "slow_flyer" else 1.0
+    wider, scatter = CLASS_CHORD.get(blade_class, (1.0, None))
+    wider *= WIDTH_CHORD[min(max(width, -2), 1)] * (2.0 / max(blades or 2, 2)) ** BLADES_EXPONENT
+    far = math.exp(math.sqrt(3.0) * (scatter or chord_sd(diameter_m)))
     chord = min(max(wider * CHORD * (diameter_m / INCH / 10.0) ** CHORD_EXPONENT, low), high)
     least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
-    why = "chord not known; range of 87 measured propellers, 2.2 to 19 in. Measuring it narrows the band most"
+    of = f"{blade_class} propellers" if scatter else "87 measured propellers, 2.2 to 19 in"
+    why = f"chord not known; range of {of}. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
 
 
@@ -166,6 +186,11 @@ def _diameter_m(rotor: Any) -> float:
     return 10.0 * INCH
 
 
+def _blades(rotor: Any) -> int | None:
+    blades = rotor.get("blades") if isinstance(rotor, dict) else None
+    return blades if isinstance(blades, int) else None
+
+
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Document with what a short case leaves out: kind, hub, chord law, section and air, each with its assumption.
 
@@ -185,7 +210,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(blade, dict):
         if not any(key in blade for key in CHORDS):
             blade["chord_law"] = "fan" if fan else "apc_like"
-            unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor), blade.get("class"))]
+            chord = label_chord(_diameter_m(rotor), blade.get("class"), _blades(rotor))
+            unknowns += FAN[1:2] if fan else [OFFSET, chord]
         if "section" not in blade:
             unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
