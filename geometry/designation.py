@@ -18,7 +18,7 @@ _PART = re.compile(r"sf|mr|pn|bn|cf|ccw|cw|[rl]h|[efwncpsr]", re.IGNORECASE)
 _VERSION = re.compile(r"(?<![A-Za-z])V\d\w*$|(?<=[A-Za-z])V\d\w*$", re.IGNORECASE)  # of a mould
 # Words before or behind the size; the first that matches.
 _WORDS: tuple[tuple[str, str], ...] = (
-    (r"slow\W?fl(?:y|i)(?:er)?\b|\bslo\W?fly|\bsf\b", "slow_flyer"), (r"multi\W?rotor|\bmr\b", "multirotor"),
+    (r"slow\W?fl(?:y|i)(?:er)?\b|\bslo\W?fly|\bsf\b|\bgws rs\b", "slow_flyer"), (r"multi\W?rotor|\bmr\b", "multirotor"),
     (r"\bfold", "folding"), (r"\breversible\b", "reversible"), (r"\bpattern\b", "pattern"),
     (r"thin electric|\belectric\b|\be\W?prop", "electric"), (r"\bsport\b|\bglow\b", "sport"),
     (r"\b(?:hq|hqprop|gemfan|dalprop|dal|hurricane|ethix|azure|fpv)\b|bull\W?nose", "fpv"),

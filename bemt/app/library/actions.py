@@ -19,8 +19,8 @@ from bemt.physics.dataset import Dataset, from_pandas
 if TYPE_CHECKING:
     import pandas as pd
 
-    from bemt.judge.compare.as_measured import AsMeasured
     from bemt.judge.diagnose.plan import Plan
+    from bemt.rotors.as_measured import AsMeasured
     from bemt.rotors.case.sources import Source
 
 __all__ = [
@@ -203,7 +203,7 @@ class CalibratedRotor:
     ----------
     source : Propeller
         The propeller as its case describes it.
-    found : bemt.judge.compare.as_measured.AsMeasured
+    found : bemt.rotors.as_measured.AsMeasured
         What the runs say.
     recordings : tuple of str
         The files.

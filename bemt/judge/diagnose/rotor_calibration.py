@@ -1,4 +1,4 @@
-"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.judge.compare.as_measured`."""
+"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.rotors.as_measured`."""
 
 from __future__ import annotations
 
@@ -15,23 +15,22 @@ import tomlkit
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.judge.compare.as_measured import AsMeasured, as_measured
 from bemt.judge.diagnose.improve import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.judge.diagnose.wrong_rotor_check import FACTOR
 from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
+from bemt.rotors.as_measured import AsMeasured, as_measured
 from bemt.rotors.case import Case
-from bemt.rotors.case.as_built import MOVED, posterior_document
+from bemt.rotors.case.as_built import posterior_document
 from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.reading import SETTLED
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
-# Assumptions that a run of the rotor settles, besides those that move a latent number.
-_SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
 
 
 def calibrate(
@@ -151,7 +150,7 @@ def write(
     blade["known_from"] = "reference"
     blade.pop("as_built", None)
     blade["as_built"] = {"file": POSTERIOR}
-    settled = _SETTLED.union(*MOVED.values())
+    settled = SETTLED - {"rotor.hub_ratio"}
     kept = [item for item in case.written.get("assumptions", []) if item["key"] not in settled]
     source.pop("assumptions", None)
     if kept:

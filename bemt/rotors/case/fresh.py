@@ -13,7 +13,9 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers._uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
+from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, SURFACE, Unknown, label_chord, offset_of, section_of
+from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -56,7 +58,8 @@ def _blocks(*unknowns: Unknown) -> str:
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
-        found = parse_designation(label)
+        one = records().get(label.strip())
+        found = parse_designation(label) if one is None else one.designation
     except GeometryError as error:
         raise InputError([Fault("LABEL", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
@@ -139,13 +142,30 @@ def label_text(
     airspeed_m_s: float = 0.0,
     family: str | None = None,
     motor: tuple[float, int] | None = None,
+    measured: bool = True,
+    reading: str | None = None,
 ) -> str:
-    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known.
+
+    A label that names a measured propeller is that propeller, unless ``measured`` is False. A ``reading``
+    (`bemt.rotors.case.reading`) makes it the rotor that gave it.
+    """
     told = read_label(label, blades)
+    if reading is not None:
+        parse_reading(reading)
     D, B = told.diameter_in, told.blades
+    family = family or family_of(told.maker, told.blade_class)
+    told = told if told.blade_class else replace(told, blade_class=class_of(family))
     chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
-    return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
-# `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
+    offset = offset_of(family)
+    known = find(told, family) if measured else None
+    open_ = (HUB, offset, chord, *section, *SURFACE, AIR)
+    values = (chord.value, section[0].value, offset.value)
+    source = f"from its label. {_UNKNOWN}"
+    if known is not None:
+        open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
+        source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
+    return f"""# A {told.size} propeller {source}
 schema = "bemt.case/1"
 name = "{_label_name(told)}"
 title = "{_title(told)}"
@@ -159,14 +179,27 @@ hub_ratio = 0.15
 {_sense(told)}
 [blade]
 pitch_in = {told.pitch_in:g}
-beta_offset_deg = 0.7
+beta_offset_deg = {values[2]:.3g}
 chord_law = "apc_like"
-max_chord_over_R = {chord.value:.3g}
-{_series(told, family)}
+max_chord_over_R = {values[0]:.3g}
+{_series(told, family)}{_as_built(known, reading)}
 [blade.section]
-camber = {section[0].value:g}
+camber = {values[1]:g}
 thickness = 0.09
-{_tail(D * INCH, rpm, airspeed_m_s, motor, HUB, OFFSET, chord, *section, *SURFACE, AIR)}"""
+{_tail(D * INCH, rpm, airspeed_m_s, motor, *open_)}"""
+
+
+_UNKNOWN = (
+    "Each [[assumptions]] entry is an unknown with a range.\n# `bemt sweep --details` prints its effect on the thrust. "
+    "When you measure a value, enter it and delete the assumption."
+)
+
+
+def _as_built(known: MeasuredRotor | None, reading: str | None) -> str:
+    if known is None and reading is None:
+        return ""
+    rows = ([f'measured = "{known.name}"'] if known else []) + ([f'reading = "{reading}"'] if reading else [])
+    return f'known_from = "{"measured" if known else "reference"}"\n\n[blade.as_built]\n' + "\n".join(rows) + "\n"
 
 
 def _label_name(told: Designation) -> str:

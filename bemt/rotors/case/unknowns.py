@@ -147,6 +147,17 @@ def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
     return Unknown("blade.section.camber", camber, camber - 0.015, camber + 0.015, why), THICKNESS
 
 
+def offset_of(family: str | None) -> Unknown:
+    """Blade angle over the label's: that of a maker's measured series, else of any."""
+    kin = population().families.get(family or "")
+    if kin is None:
+        return OFFSET
+    far = math.sqrt(3.0) * math.hypot(kin.offset_sd_deg, population().label_deg)
+    value = round(kin.offset_deg, 2)
+    why = f"blade angle over the label's, as stations of the series {family} have it, and what labels err by"
+    return Unknown(OFFSET.key, value, round(value - far, 2), round(value + far, 2), why)
+
+
 def label_chord(
     diameter_m: float, blade_class: str | None = None, blades: int | None = None, width: int = 0
 ) -> Unknown:
