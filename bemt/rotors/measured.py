@@ -21,7 +21,7 @@ from bemt.rotors.population import population
 from bemt.rotors.reference import SESSION, ReferenceRun, apart, noise_of_run
 from geometry.designation import Designation
 
-DATABASE = "UIUC Propeller Database (Brandt, Deters, Ananda, Dantsker, Selig)"
+DATABASE = "UIUC Propeller Database"
 _CLOSE_IN = 0.011  # labels state hundredths of an inch
 
 
@@ -175,4 +175,4 @@ def table(rotors: list[MeasuredRotor]) -> str:
             f"{one.stations[k]:+.2f} deg", f"{one.stations_sd[k]:.2f}",
             f"{100 * one.stations[d]:+.0f} %", f"{100 * one.stations_sd[d]:.0f}",
         ])  # fmt: skip
-    return f"{text_table(head, rows, left=(0, 1))}\n{DATABASE}; numbers of bemt's own fit.\n"
+    return f"{text_table(head, rows, left=(0, 1))}\n{DATABASE} (Brandt, Deters, Ananda, Dantsker, Selig); numbers of bemt's own fit.\n"

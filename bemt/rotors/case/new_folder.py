@@ -33,6 +33,7 @@ class Wanted:
     kv: float | None = None
     cells: int | None = None
     campaign: bool = False
+    reading: str | None = None
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -151,6 +152,9 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
         faults.append(Fault("LABEL", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
+    if w.reading is not None and (w.fan or w.stations is not None or w.scan is not None):
+        hint = "Write blade.as_built.reading into the case"
+        faults.append(Fault("", "--reading", "without a label alone", "a label", hint))
     if w.kv is not None and w.scan is not None:
         faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
@@ -180,7 +184,7 @@ def _files(w: Wanted) -> dict[str, bytes]:
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
-        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor)
+        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor, reading=w.reading)
     if w.diameter_mm is not None:
         text = fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
         name = fresh.case_name(label) if label else ""

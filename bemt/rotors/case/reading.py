@@ -210,5 +210,6 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
 
 
 def _source_before(case: Case) -> str | None:
-    """How the blade was known before the reading."""
-    return "label" if case.file.blade.chord_law is not None else None
+    """How the blade was known before the reading: a label's chord law with a measured pitch is stations at 0.75 R."""
+    blade = case.file.blade
+    return None if blade.chord_law is None else "label" if blade.label_pitch_in is None else "stations"

@@ -22,6 +22,7 @@ from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.propagate import propagate, vary
+from bemt.rotors.case.reading import with_reading
 from bemt.rotors.case.schema import AIRSPEED
 from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
 from bemt.tools.drive.drive_model import EFFECTS, Drive, Steady
@@ -137,11 +138,14 @@ class DriveResult:
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def case_for(what: str | None, **given: float | None) -> Case:
-    """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names."""
+def case_for(what: str | None, reading: str | None = None, **given: float | None) -> Case:
+    """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names.
+
+    ``reading`` as `bemt.rotors.case.reading` takes it.
+    """
     path = Path(what or ".")
     case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
-    return with_drive(case, **given)
+    return with_drive(case if reading is None else with_reading(case, reading), **given)
 
 
 def with_drive(case: Case, **given: float | None) -> Case:
