@@ -175,4 +175,5 @@ def table(rotors: list[MeasuredRotor]) -> str:
             f"{one.stations[k]:+.2f} deg", f"{one.stations_sd[k]:.2f}",
             f"{100 * one.stations[d]:+.0f} %", f"{100 * one.stations_sd[d]:.0f}",
         ])  # fmt: skip
-    return f"{text_table(head, rows, left=(0, 1))}\n{DATABASE} (Brandt, Deters, Ananda, Dantsker, Selig); numbers of bemt's own fit.\n"
+    source = f"{DATABASE} (Brandt, Deters, Ananda, Dantsker, Selig); numbers of bemt's own fit."
+    return f"{text_table(head, rows, left=(0, 1))}\n{source}\n"

@@ -14,7 +14,18 @@ from bemt.base.units import INCH
 from bemt.data.readers._uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.reading import parse_reading
-from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, SURFACE, Unknown, label_chord, offset_of, section_of
+from bemt.rotors.case.unknowns import (
+    AIR,
+    DRIVE,
+    FAN,
+    HUB,
+    SURFACE,
+    WINDING,
+    Unknown,
+    label_chord,
+    offset_of,
+    section_of,
+)
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
@@ -90,7 +101,7 @@ density_kg_m3 = 1.225  # or temperature_C and pressure_hPa
 
 def drive_text(kv: float, cells: int) -> str:
     """Table [drive] of a motor of which the label is known."""
-    sag, drop, idle = (item.value for item in DRIVE)
+    sag, size, idle = (item.value for item in DRIVE)
     return f"""
 [drive]
 kv = {kv:g}  # rev/min/V
@@ -101,8 +112,8 @@ soc = {SOC:g}  # charge at which full throttle and hover are stated
 sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
-[drive.motor]  # instead of each share what the motor's sheet says: resistance_mohm and no_load_A
-winding_drop = {drop:g}
+[drive.motor]  # instead of both what the motor's sheet says: resistance_mohm and no_load_A; or its mass_g or stator
+size = {size:g}  # usual for K_v and cells
 idle_share = {idle:g}
 
 # [drive.vehicle]  # for hover
@@ -112,8 +123,8 @@ idle_share = {idle:g}
 
 
 def full_rpm(kv: float, cells: int) -> float:
-    """Speed at full throttle of a motor of which the label is known, by its typical losses. [rev/min]"""
-    sag, drop, _ = (item.value for item in DRIVE)
+    """Speed at full throttle of a motor with a propeller that suits it, by its typical losses. [rev/min]"""
+    sag, drop = DRIVE[0].value, WINDING.value
     return float(f"{kv * cells * float(np.interp(SOC, LIPO_SOC, LIPO_V)) * (1.0 - sag) * (1.0 - drop):.5g}")
 
 

@@ -14,6 +14,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers._uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
+from bemt.rotors.case.motor import full_speed
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,10 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         case = checked(files)
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
+    if wanted.motor is not None and wanted.rpm is None:  # a guess so far
+        text = re.sub(rb"^rpm = \S+", f"rpm = {full_speed(case):.6g}".encode(), files["case.toml"], count=1, flags=re.M)
+        files["case.toml"] = text
+        case = checked(files)
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)

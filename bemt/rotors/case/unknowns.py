@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bemt.base.units import INCH
@@ -86,16 +86,22 @@ DRIVE = (
         "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
     ),
     Unknown(
-        "drive.motor.winding_drop",
-        0.20,
-        0.05,
-        0.39,
-        "motor not known; winding, controller and leads take 11 to 31 % of the voltage in two of three of 859 motors",
+        "drive.motor.size",
+        0.0,
+        -1.3,
+        1.3,
+        "motor not known; resistance with controller and leads is half to twice the usual for K_v and cells in two of "
+        "three of 611 motors. Its mass_g narrows that to 0.7 to 1.4",
     ),
     Unknown(
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
     ),
 )
+WINDING = Unknown(
+    "drive.motor.winding_drop", 0.20, 0.05, 0.39,
+    "a motor as large as its rotor needs: winding, controller and leads take 11 to 31 % of the voltage in two of three "
+    "of 859 motors",
+)  # fmt: skip
 PAIR = (
     Unknown(
         "second_rotor.wake_radius",
@@ -130,8 +136,8 @@ ESC_DROP = Unknown(
     "drive.esc.drop", 0.07, 0.0, 0.18,
     "controller not known; it, leads and a warm winding take 2 to 13 % of the voltage in two of three of 859 motors",
 )  # fmt: skip
-_STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
-           "drive.motor.idle_share": "no_load_A"}  # fmt: skip
+_STATED = {"drive.battery.sag": ("resistance_mohm",), "drive.motor.size": ("resistance_mohm", "winding_drop"),
+           "drive.motor.idle_share": ("no_load_A",)}  # fmt: skip
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
 CHORDS = ("chord_law", "stations", "uiuc", "apc")
 
@@ -175,7 +181,7 @@ def label_chord(
 
 def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
     """Whether a table [drive] has the value itself, of which the key is a typical share."""
-    return _states(drive, key.split(".")[1], (_STATED[key],))
+    return _states(drive, key.split(".")[1], _STATED[key])
 
 
 ESC = ("resistance_mohm", "drop", "name")
@@ -195,6 +201,14 @@ def _diameter_m(rotor: Any) -> float:
         if isinstance(value, (int, float)) and 1e-3 < value * factor < 100.0:
             return value * factor
     return 10.0 * INCH
+
+
+def _sized(item: Unknown, drive: Mapping[str, Any]) -> Unknown:
+    """Range of a motor's size, narrower where its mass or stator is stated."""
+    if item.key != "drive.motor.size" or not _states(drive, "motor", ("mass_g", "stator")):
+        return item
+    why = "winding not known; resistance is 0.7 to 1.4 times the usual for K_v and mass in two of three of 584 motors"
+    return replace(item, low=-0.55, high=0.55, why=why)
 
 
 def _blades(rotor: Any) -> int | None:
@@ -230,8 +244,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(made.get("second_rotor"), dict):
         unknowns += PAIR
     if isinstance(made.get("drive"), dict):
-        unknowns += [item for item in DRIVE if not _drive_states(made["drive"], item.key)]
-        if _drive_states(made["drive"], "drive.motor.winding_drop") and not _states(made["drive"], "esc", ESC):
+        unknowns += [_sized(item, made["drive"]) for item in DRIVE if not _drive_states(made["drive"], item.key)]
+        if _states(made["drive"], "motor", ("resistance_mohm",)) and not _states(made["drive"], "esc", ESC):
             unknowns.append(ESC_DROP)
     if not isinstance(declared, list):
         return made

@@ -34,7 +34,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
+from bemt.rotors.case.unknowns import DRIVE, ESC_DROP, WINDING
 from bemt.tools.design import rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
@@ -49,7 +49,7 @@ RATIOS = (0.35, 0.45, 0.55, 0.7)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
-SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
+SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, WINDING, ESC_DROP)}
 LOADING = (15.0, 1200.0)
 """Disk loading of the labels that are tried [N/m2]."""
 DRAWS = 256

@@ -21,6 +21,7 @@ from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
 from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.reading import with_reading
 from bemt.rotors.case.schema import AIRSPEED
@@ -38,11 +39,11 @@ HOVER_SHARE = 0.5
 """Hover point as a share of full thrust where no mass is given: a thrust-to-weight ratio of 2."""
 TIPS = (126.0, 190.0, 218.0, 310.0)
 """Tip speed of K_v times the loaded voltage, without load: 68 % of 1088 motors; 95 % and 99 % below. [m/s]"""
-SHEET = ("drive.motor.winding_drop", "drive.motor.idle_share")
+SHEET = ("drive.motor.size", "drive.motor.winding_drop", "drive.motor.idle_share")
 """What a motor sheet tells."""
 OPTIONS = {
     "kv": "drive.kv", "cells": "drive.cells", "mass_kg": "drive.vehicle.mass_kg", "rotors": "drive.vehicle.rotors",
-    "capacity_Ah": "drive.battery.capacity_Ah",
+    "capacity_Ah": "drive.battery.capacity_Ah", "motor_mass_g": "drive.motor.mass_g",
 }  # fmt: skip
 """Arguments that set values of the table [drive]."""
 
@@ -138,19 +139,22 @@ class DriveResult:
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def case_for(what: str | None, reading: str | None = None, **given: float | None) -> Case:
+def case_for(
+    what: str | None, reading: str | None = None, motor: str | None = None, **given: float | None
+) -> Case:  # fmt: skip
     """Case of a label or a file, with the numbers of `OPTIONS` that are given; all faults by the options' names.
 
-    ``reading`` as `bemt.rotors.case.reading` takes it.
+    ``reading`` as `bemt.rotors.case.reading` takes it; ``motor`` a name as `bemt.rotors.case.motor.named_motor` does.
     """
     path = Path(what or ".")
     case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
-    return with_drive(case if reading is None else with_reading(case, reading), **given)
+    return with_drive(case if reading is None else with_reading(case, reading), motor, **given)
 
 
-def with_drive(case: Case, **given: float | None) -> Case:
+def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:
     """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
-    changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    changes: dict[str, Any] = {} if motor is None else dict(named_motor(motor).keys)
+    changes |= {OPTIONS[name]: v for name, v in given.items() if v is not None}
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
