@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.data.readers._uiuc_names import FAMILIES, class_of, families_of
+from bemt.data.readers._uiuc_names import FAMILIES, class_of, family_of
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.population import population
 from bemt.rotors.reference import SESSION, ReferenceRun, apart, noise_of_run
@@ -127,13 +127,12 @@ def find(told: Designation, family: str | None = None) -> MeasuredRotor | None:
     >>> [one and one.name for one in map(find, map(parse_designation, ("GWS HD 9x5", "APC 10x5E", "10x5", "APC 10x5")))]
     ['gwsdd_9x5', 'apce_10x5', None, None]
     """
-    kin = [family] if family else families_of(told.maker, told.blade_class)
-    same = [
-        one for one in records().values()
-        if one.family in kin and one.blades == (told.blades or 2) and told.width == 0
-        and abs(one.diameter_in - told.diameter_in) < _CLOSE_IN and abs(one.pitch_in - told.pitch_in) < _CLOSE_IN
-    ]  # fmt: skip
-    return same[0] if len({one.family for one in same}) == 1 else None
+    family = family or family_of(told.maker, told.blade_class, told.blades)
+    for one in records().values():
+        sized = max(abs(one.diameter_in - told.diameter_in), abs(one.pitch_in - told.pitch_in)) < _CLOSE_IN
+        if sized and one.family == family and one.blades == (told.blades or 2) and told.width == 0:
+            return one
+    return None
 
 
 def measured_rotors(query: str = "") -> list[MeasuredRotor]:

@@ -165,7 +165,7 @@ def label_text(
     if reading is not None:
         parse_reading(reading)
     D, B = told.diameter_in, told.blades
-    family = family or family_of(told.maker, told.blade_class)
+    family = family or family_of(told.maker, told.blade_class, told.blades)
     told = told if told.blade_class else replace(told, blade_class=class_of(family))
     chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
     offset = offset_of(family)
@@ -230,7 +230,7 @@ def _sense(told: Designation) -> str:
 def _series(told: Designation | None, family: str | None) -> str:
     """Keys of [blade] that say of which kind a blade is."""
     kind = told.blade_class if told else None
-    family = family or (family_of(told.maker, kind) if told else None)
+    family = family or (family_of(told.maker, kind, told.blades) if told else None)
     return (f'class = "{kind}"\n' if kind else "") + (f'family = "{family}"\n' if family else "")
 
 

@@ -47,6 +47,7 @@ SWEPT_DEG = 15.0
 """Sweep or rake of the outer half of the blade from which its loads are doubted, declared [deg]."""
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
+_CAMPAIGNS = {"measured": 1.0, "reference": 2.0}  # differences between campaigns that a band holds, as variances
 _UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
 
 
@@ -320,15 +321,16 @@ def propagate(
 def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
     """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
-    What the population expects beside the nominal result counts too, as a root sum of squares. A rotor as a run showed
-    it may do something else in another campaign.
+    What the population expects beside the nominal result counts too, as a root sum of squares. The band is that of the
+    rotor as another careful campaign finds it: of a rotor that its own run calibrated, both campaigns count; a
+    measured one has the first in its law already, others are spread over campaigns.
     """
     known = case.as_built()
     rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
     mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
-    elsewhere = 0.0 if known.reference is None else 1.0
+    elsewhere = _CAMPAIGNS.get(known.prior.known_from, 0.0)
     narrow, wide = (found.half_width(level, campaigns=elsewhere) for level in LEVELS)
     return np.hypot(narrow, off), np.hypot(wide, 2.0 * off)
 
@@ -338,8 +340,9 @@ def _of_stand(case: Case, points: Dataset, D: float) -> dict[str, Array]:
     loads = np.abs(np.array([points.CT, points.CP]))
     if case.as_built().prior.known_from != "reference":
         return {key: v**2 for key, v in loads_of(points, D, loads * STAND[:, None]).items()}
-    session, campaign = (loads_of(points, D, loads * gains) for gains in (SESSION, gains_at(CAMPAIGN, points.J)))
-    return {key: session[key] ** 2 - campaign[key] ** 2 for key in session}  # met again on its own stand
+    session = loads_of(points, D, loads * SESSION)  # met again on its own stand
+    campaigns = loads_of(points, D, loads * gains_at(math.sqrt(_CAMPAIGNS["reference"]) * CAMPAIGN, points.J))
+    return {key: session[key] ** 2 - campaigns[key] ** 2 for key in session}
 
 
 def _aside(case: Case, model: Model, found: Dataset, axial: Dataset) -> Array:
