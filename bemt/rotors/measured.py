@@ -111,11 +111,13 @@ def records() -> dict[str, MeasuredRotor]:
         raise ValueError(f"got latent numbers {raw['latents']}; expected {NAMES}")
 
     def one(i: int) -> MeasuredRotor:
-        v = {key: np.asarray(rows[i], dtype=float) for key, rows in raw.items() if rows.dtype.kind == "f"}
+        v: dict[str, Any] = {
+            key: np.asarray(rows[i], dtype=float) for key, rows in raw.items() if rows.dtype.kind == "f"
+        }
         at = Sensed(float(v.pop("diameter_m")), *(v.pop(name) for name in _SENSED))
-        plain = {key: float(value) if value.ndim == 0 else value for key, value in v.items()}
-        words = {key: str(raw[key][i]) for key in ("name", "family", "volume")}
-        return MeasuredRotor(**words, blades=int(raw["blades"][i]), at=at, **plain)
+        v = {key: float(value) if value.ndim == 0 else value for key, value in v.items()}
+        v |= {key: str(raw[key][i]) for key in ("name", "family", "volume")}
+        return MeasuredRotor(blades=int(raw["blades"][i]), at=at, **v)
 
     return {str(name): one(i) for i, name in enumerate(raw["name"])}
 
