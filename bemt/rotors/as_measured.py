@@ -73,7 +73,7 @@ def as_measured(
         full = np.broadcast_to(np.asarray(values, float), rpm.shape)
         return np.array([full[g].mean() for g in groups])
 
-    foreign = None if theirs is None else mean(theirs) > 0.5
+    foreign = None if theirs is None else mean(theirs.astype(np.float64)) > 0.5
     share = np.array([1.0 / np.sqrt(g.size) for g in groups])
     state = air_of_points({k: v if v.size == 1 else mean(v) for k, v in air_fields(air).items()})
     rpm_, J_ = mean(rpm), mean(J)

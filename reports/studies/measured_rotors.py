@@ -109,7 +109,7 @@ def pairs(seen: Sequence[Observed]) -> str:
                 known = replace(known, name=f"{known.name}@{known.volume}")
                 measured.records()[known.name] = known
                 told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
-                short = text[: text.index("[[assumptions]]")].replace("[blade.section]", told)
+                short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
                 found["with"].append((target, predicted(short, target)))
     lines = [f"{'':10}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
     for how, rows in found.items():

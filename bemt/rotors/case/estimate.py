@@ -62,9 +62,9 @@ def case_of_label(
     A chord at 0.75 R scales the chord law; a pitch measured there replaces that of the label, which the population of
     measured rotors then weighs against it. Either is of this piece: it is then none that a database measured.
     """
-    own = chord_mm is not None or measured_pitch_in is not None
+    this_piece = chord_mm is not None or measured_pitch_in is not None
     family = None if series is None else find_family(series)
-    case = case_of(fresh.label_text(label, blades, family=family, measured=not own, reading=reading))
+    case = case_of(fresh.label_text(label, blades, family=family, measured=not this_piece, reading=reading))
     changes: dict[str, Any] = {}
     known: set[str] = set()
     if chord_mm is not None:

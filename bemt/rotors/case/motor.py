@@ -100,8 +100,10 @@ class NamedMotor:
     @property
     def keys(self) -> dict[str, float | str]:
         """What it sets in a case."""
-        given = {"kv": self.kv, "motor.name": self.name, "motor.resistance_mohm": self.resistance_mohm,
-                 "motor.no_load_A": self.no_load_A, "motor.mass_g": self.mass_g}  # fmt: skip
+        given: dict[str, float | str | None] = {
+            "kv": self.kv, "motor.name": self.name, "motor.resistance_mohm": self.resistance_mohm,
+            "motor.no_load_A": self.no_load_A, "motor.mass_g": self.mass_g,
+        }  # fmt: skip
         return {f"drive.{key}": value for key, value in given.items() if value is not None}
 
 

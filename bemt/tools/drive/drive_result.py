@@ -148,13 +148,20 @@ def case_for(
     """
     path = Path(what or ".")
     case = load_case(find_cases([path])[0]) if path.exists() else case_of(fresh.label_text(str(what)))
-    return with_drive(case if reading is None else with_reading(case, reading), motor, **given)
+    named = {} if motor is None else named_motor(motor).keys
+    return _with_drive(case if reading is None else with_reading(case, reading), named | _options(given))
 
 
-def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:
+def with_drive(case: Case, **given: float | None) -> Case:
     """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
-    changes: dict[str, Any] = {} if motor is None else dict(named_motor(motor).keys)
-    changes |= {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    return _with_drive(case, _options(given))
+
+
+def _options(given: Mapping[str, float | None]) -> dict[str, float | str]:
+    return {OPTIONS[name]: v for name, v in given.items() if v is not None}
+
+
+def _with_drive(case: Case, changes: Mapping[str, float | str]) -> Case:
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
