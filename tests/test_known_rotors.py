@@ -91,7 +91,7 @@ def test_the_other_measurement_halves_the_error(shared_data: Path) -> None:
 
     errors = []
     for p in uiuc.scan_folder(shared_data / "uiuc" / "volume-1").propellers:
-        if p.name not in ("gwsdd_9x5", "apcsf_10x4.7", "grsn_9x6"):
+        if p.name not in ("gwsdd_9x5", "apcsf_10x4.7", "apce_10x7"):
             continue
         static, rpm, J, CT, CP = measured(p)
         keep = (CT > 0.4 * CT.max()) & (CP > 0.0)

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.cache import shipped_arrays
 from bemt.data.readers._uiuc_names import FAMILIES, class_of, family_of
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.population import population
@@ -105,8 +105,7 @@ def packed(rotors: list[MeasuredRotor]) -> dict[str, Any]:
 @cache
 def records() -> dict[str, MeasuredRotor]:
     """Every shipped propeller by the database's name."""
-    with resources.files("bemt.rotors").joinpath("measured.npz").open("rb") as file, np.load(file) as found:
-        raw = {key: found[key] for key in found.files}
+    raw = shipped_arrays("bemt.rotors", "measured.npz")
     if tuple(raw["latents"]) != NAMES:
         raise ValueError(f"got latent numbers {raw['latents']}; expected {NAMES}")
 
