@@ -14,7 +14,20 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
+from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.unknowns import (
+    AIR,
+    DRIVE,
+    FAN,
+    HUB,
+    SURFACE,
+    WINDING,
+    Unknown,
+    label_chord,
+    offset_of,
+    section_of,
+)
+from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -57,7 +70,8 @@ def _blocks(*unknowns: Unknown) -> str:
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
-        found = parse_designation(label)
+        one = records().get(label.strip())
+        found = parse_designation(label) if one is None else one.designation
     except GeometryError as error:
         raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
@@ -88,7 +102,7 @@ density_kg_m3 = 1.225  # or temperature_C and pressure_hPa
 
 def drive_text(kv: float, cells: int) -> str:
     """Table [drive] of a motor of which the label is known."""
-    sag, drop, idle = (item.value for item in DRIVE)
+    sag, size, idle = (item.value for item in DRIVE)
     return f"""
 [drive]
 kv = {kv:g}  # rev/min/V
@@ -99,8 +113,8 @@ soc = {SOC:g}  # charge at which full throttle and hover are stated
 sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
-[drive.motor]  # instead of each share what the motor's sheet says: resistance_mohm and no_load_A
-winding_drop = {drop:g}
+[drive.motor]  # instead of both what the motor's sheet says: resistance_mohm and no_load_A; or its mass_g or stator
+size = {size:g}  # usual for K_v and cells
 idle_share = {idle:g}
 
 # [drive.vehicle]  # for hover
@@ -110,8 +124,8 @@ idle_share = {idle:g}
 
 
 def full_rpm(kv: float, cells: int) -> float:
-    """Speed at full throttle of a motor of which the label is known, by its typical losses. [rev/min]"""
-    sag, drop, _ = (item.value for item in DRIVE)
+    """Speed at full throttle of a motor with a propeller that suits it, by its typical losses. [rev/min]"""
+    sag, drop = DRIVE[0].value, WINDING.value
     return float(f"{kv * cells * float(np.interp(SOC, LIPO_SOC, LIPO_V)) * (1.0 - sag) * (1.0 - drop):.5g}")
 
 
@@ -140,13 +154,30 @@ def label_text(
     airspeed_m_s: float = 0.0,
     family: str | None = None,
     motor: tuple[float, int] | None = None,
+    measured: bool = True,
+    reading: str | None = None,
 ) -> str:
-    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known.
+
+    A label that names a measured propeller is that propeller, unless ``measured`` is False. A ``reading``
+    (`bemt.rotors.case.reading`) makes it the rotor that gave it.
+    """
     told = read_label(label, blades)
+    if reading is not None:
+        parse_reading(reading)
     D, B = told.diameter_in, told.blades
-    chord, section = label_chord(D * INCH, told.blade_class), section_of(told.blade_class)
-    return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
-# `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
+    family = family or family_of(told.maker, told.blade_class, told.blades)
+    told = told if told.blade_class else replace(told, blade_class=class_of(family))
+    chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
+    offset = offset_of(family)
+    known = find(told, family) if measured else None
+    open_ = (HUB, offset, chord, *section, *SURFACE, AIR)
+    values = (chord.value, section[0].value, offset.value)
+    source = f"from its label. {_UNKNOWN}"
+    if known is not None:
+        open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
+        source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
+    return f"""# A {told.size} propeller {source}
 schema = "bemt.case/1"
 name = "{_label_name(told)}"
 title = "{_title(told)}"
@@ -160,14 +191,27 @@ hub_ratio = 0.15
 {_sense(told)}
 [blade]
 pitch_in = {told.pitch_in:g}
-beta_offset_deg = 0.7
+beta_offset_deg = {values[2]:.3g}
 chord_law = "apc_like"
-max_chord_over_R = {chord.value:.3g}
-{_series(told, family)}
+max_chord_over_R = {values[0]:.3g}
+{_series(told, family)}{_as_built(known, reading)}
 [blade.section]
-camber = {section[0].value:g}
+camber = {values[1]:g}
 thickness = 0.09
-{_tail(D * INCH, rpm, airspeed_m_s, motor, HUB, OFFSET, chord, *section, *SURFACE, AIR)}"""
+{_tail(D * INCH, rpm, airspeed_m_s, motor, *open_)}"""
+
+
+_UNKNOWN = (
+    "Each [[assumptions]] entry is an unknown with a range.\n# `bemt sweep --details` prints its effect on the thrust. "
+    "When you measure a value, enter it and delete the assumption."
+)
+
+
+def _as_built(known: MeasuredRotor | None, reading: str | None) -> str:
+    if known is None and reading is None:
+        return ""
+    rows = ([f'measured = "{known.name}"'] if known else []) + ([f'reading = "{reading}"'] if reading else [])
+    return f'known_from = "{"measured" if known else "reference"}"\n\n[blade.as_built]\n' + "\n".join(rows) + "\n"
 
 
 def _label_name(told: Designation) -> str:
@@ -187,7 +231,7 @@ def _sense(told: Designation) -> str:
 def _series(told: Designation | None, family: str | None) -> str:
     """Keys of [blade] that say of which kind a blade is."""
     kind = told.blade_class if told else None
-    family = family or (family_of(told.maker, kind) if told else None)
+    family = family or (family_of(told.maker, kind, told.blades) if told else None)
     return (f'class = "{kind}"\n' if kind else "") + (f'family = "{family}"\n' if family else "")
 
 

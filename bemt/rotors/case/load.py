@@ -22,15 +22,15 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of, stated_effects
+from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of
 from bemt.rotors.case.build import build_air, build_duct, build_rotor
 from bemt.rotors.case.rules import check_case, check_shape, value_at
 from bemt.rotors.case.schema import AXES, GROUPS, CaseFile
 from bemt.rotors.case.unknowns import completed
+from bemt.rotors.latents import AsBuilt, as_built
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
-    from bemt.rotors.latents import AsBuilt
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -281,11 +281,19 @@ class Case:
 
     def stated_effects(self) -> tuple[AsBuilt, ...]:
         """Give the effect of what the case states of the rotor as built, if anything."""
-        return stated_effects(self.file, self.folder)
+        drawn = self.as_built().drawn
+        return (as_built(drawn),) if drawn.any() else ()
 
     def as_built(self, counting_assumptions: bool = True) -> CaseAsBuilt:
         """Give what is known of the rotor as built, less what the declared assumptions move already."""
-        return as_built_of(self.file, self.folder, self.rotor(), counting_assumptions)
+        told = self.file.blade.as_built
+        if told is None or told.reading is None:
+            return as_built_of(self.file, self.folder, self.rotor(), counting_assumptions)
+        from bemt.rotors.case.reading import conditioned
+
+        reading = told.reading
+        found: CaseAsBuilt = self._once("as built", ("rotor", "blade"), lambda case: conditioned(case, reading), None)
+        return found
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
         """Give the state of the air; overrides as in :meth:`replaced`."""
@@ -346,8 +354,13 @@ def _exports(run: Path) -> list[Path]:
 
 
 def _assumptions(case: CaseFile) -> tuple[Assumption, ...]:
-    out = []
+    from bemt.rotors.case.reading import SETTLED
+
+    out, told = [], case.blade.as_built
+    settled = SETTLED if told is not None and told.reading is not None else frozenset()
     for item in case.assumptions:
+        if item.key in settled:
+            continue
         values = item.values if item.values is not None else (item.low, item.high)
         out.append(Assumption(item.key, value_at(case, item.key), tuple(values), item.values is not None, item.why))
     return tuple(out)

@@ -14,6 +14,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
+from bemt.rotors.case.motor import full_speed
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Wanted:
     kv: float | None = None
     cells: int | None = None
     campaign: bool = False
+    reading: str | None = None
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -71,6 +73,10 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         case = checked(files)
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
+    if wanted.motor is not None and wanted.rpm is None:  # a guess so far
+        text = re.sub(rb"^rpm = \S+", f"rpm = {full_speed(case):.6g}".encode(), files["case.toml"], count=1, flags=re.M)
+        files["case.toml"] = text
+        case = checked(files)
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
@@ -151,6 +157,9 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
         faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
+    if w.reading is not None and (w.fan or w.stations is not None or w.scan is not None):
+        hint = "Write blade.as_built.reading into the case"
+        faults.append(Fault("", "--reading", "without a label alone", "a label", hint))
     if w.kv is not None and w.scan is not None:
         faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
@@ -180,7 +189,7 @@ def _files(w: Wanted) -> dict[str, bytes]:
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
-        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor)
+        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor, reading=w.reading)
     if w.diameter_mm is not None:
         text = fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
         name = fresh.case_name(label) if label else ""

@@ -166,7 +166,8 @@ def prepare_case(
         case.axial_only()
     if not alone:
         case.one_rotor_only()
-    if case.file.polars or case.file.blade.as_built is not None or cache.watched():
+    told = case.file.blade.as_built
+    if case.file.polars or (told is not None and told.file is not None) or cache.watched():
         return _model(case, n_stations)  # of files that may have changed
     return case.once(("model", n_stations), lambda: _model(case, n_stations))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,7 @@ from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import zero_thrust
+from bemt.rotors.reference import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ SWEPT_DEG = 15.0
 """Sweep or rake of the outer half of the blade from which its loads are doubted, declared [deg]."""
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
+_CAMPAIGNS = {"measured": 1.0, "reference": 2.0}  # differences between campaigns that a band holds, as variances
 _UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
 
 
@@ -142,12 +144,27 @@ class Propagated:
     refined: Answers | None  # With twice the blade elements
     model: Model | PairModel  # The rotor of the case, prepared, or both of a pair
     model95: Answers  # 95 % half widths from the model's own error
+    # Variance of a reading on a stand beyond that of the rotor itself; negative where the stand is the one that
+    # calibrated it
+    stand: Answers = field(default_factory=dict)
 
     def half_width95(self, channel: str) -> Array:
         """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's with its tail."""
         parts = self.points.u_by
         rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
         return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
+
+    def u_reading(self, channel: str) -> Array:
+        """Standard uncertainty of what a stand shows, (P,); the bands of the points are those of the rotor itself.
+
+        A stand that nobody calibrated has `bemt.rotors.reference.STAND` besides, a rotor that others measured their
+        campaign; a rotor that its own run calibrated is met again on that stand.
+        """
+        return np.asarray(np.sqrt(self.points.u[channel] ** 2 + self.stand.get(channel, 0.0)))
+
+    def reading95(self, channel: str) -> Array:
+        """Half width of the 95 % interval of what a stand shows, (P,)."""
+        return np.asarray(np.sqrt(self.half_width95(channel) ** 2 + 4.0 * self.stand.get(channel, 0.0)))
 
     def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
         """Carry the bands through any function of the channels at all points: its values, and their u by origin.
@@ -307,23 +324,38 @@ def propagate(
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
     answer = replace(found, u={}, u_by=parts)
+    stand = _of_stand(case, found, model.upper.diameter_m if isinstance(model, PairModel) else model.diameter_m)
     lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide, stand)
 
 
 def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
     """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
-    What the population expects beside the nominal result counts too, as a root sum of squares.
+    What the population expects beside the nominal result counts too, as a root sum of squares. The band is that of the
+    rotor as another careful campaign finds it: of a rotor that its own run calibrated, both campaigns count; a
+    measured one has the first in its law already, others are spread over campaigns.
     """
     known = case.as_built()
     rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
     mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
-    return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
+    elsewhere = _CAMPAIGNS.get(known.prior.known_from, 0.0)
+    narrow, wide = (found.half_width(level, campaigns=elsewhere) for level in LEVELS)
+    return np.hypot(narrow, off), np.hypot(wide, 2.0 * off)
+
+
+def _of_stand(case: Case, points: Dataset, D: float) -> dict[str, Array]:
+    """Variance of all channels that a reading on a stand has beyond the rotor's own, (P,) each."""
+    loads = np.abs(np.array([points.CT, points.CP]))
+    if case.as_built().prior.known_from != "reference":
+        return {key: v**2 for key, v in loads_of(points, D, loads * STAND[:, None]).items()}
+    session = loads_of(points, D, loads * SESSION)  # met again on its own stand
+    campaigns = loads_of(points, D, loads * gains_at(math.sqrt(_CAMPAIGNS["reference"]) * CAMPAIGN, points.J))
+    return {key: session[key] ** 2 - campaigns[key] ** 2 for key in session}
 
 
 def _aside(case: Case, model: Model, found: Dataset, axial: Dataset) -> Array:

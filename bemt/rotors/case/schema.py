@@ -73,8 +73,8 @@ _GAP = FieldLimits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
-BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv"]
-KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
+BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv", "reversible", "pattern"]
+KnownFrom = Literal["cad", "scan", "stations", "label", "measured", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None
 Texts = str | tuple[str, ...] | None
@@ -144,6 +144,8 @@ class AsBuiltTable(Table):
     drag: float | None = entry("expected change of ln(cd)", "", -2, 2)
     drag_sd: float | None = entry("its standard deviation", "", 0, 2, _percent("drag_sd", 2.0))
     file: str | None = entry("posterior that calibrate-rotor wrote", words=FILE)
+    measured: str | None = entry("measured propeller that bemt knows, such as gwsdd_9x5")
+    reading: str | None = entry("reading of this rotor, such as rpm=5400, thrust_g=410; more behind semicolons")
 
 
 class BladeTable(Table):

@@ -12,6 +12,7 @@ from typing import Any
 from bemt.data.readers import references as reference_file
 from bemt.physics.effects import source_of
 from bemt.rotors.case import Case
+from bemt.rotors.measured import records
 
 SCHEMA = "bemt.sources/1"
 BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, compared with recordings, version {}; "
@@ -107,7 +108,10 @@ def _bands(case: Case) -> list[Source]:
     about = population.population().provenance
     words = f"{about['propellers']} measured propellers ({about['points']} points) of {len(about['families'])} families"
     found = [Source("band", "population", f"{about['source']}: {words}")]
-    if case.file.blade.as_built is not None:
+    stated = case.file.blade.as_built
+    if stated is not None and stated.measured is not None:
+        found.insert(0, Source("band", "measured", f"{records()[stated.measured].source}; numbers of bemt's own fit"))
+    elif stated is not None:
         origin = "runs of this rotor, taken in by `bemt calibrate-rotor`"
         found.insert(0, Source("band", "as built", origin))
     return found

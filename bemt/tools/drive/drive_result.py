@@ -37,11 +37,11 @@ HOVER_SHARE = 0.5
 """Hover point as a share of full thrust where no mass is given: a thrust-to-weight ratio of 2."""
 TIPS = (126.0, 190.0, 218.0, 310.0)
 """Tip speed of K_v times the loaded voltage, without load: 68 % of 1088 motors; 95 % and 99 % below. [m/s]"""
-SHEET = ("drive.motor.winding_drop", "drive.motor.idle_share")
+SHEET = ("drive.motor.size", "drive.motor.winding_drop", "drive.motor.idle_share")
 """What a motor sheet tells."""
 OPTIONS = {
     "kv": "drive.kv", "cells": "drive.cells", "mass_kg": "drive.vehicle.mass_kg", "rotors": "drive.vehicle.rotors",
-    "capacity_Ah": "drive.battery.capacity_Ah",
+    "capacity_Ah": "drive.battery.capacity_Ah", "motor_mass_g": "drive.motor.mass_g",
 }  # fmt: skip
 """Arguments that set values of the table [drive]."""
 
@@ -144,7 +144,14 @@ class DriveResult:
 
 def with_drive(case: Case, **given: float | None) -> Case:
     """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
-    changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    return _with_drive(case, _options(given))
+
+
+def _options(given: Mapping[str, float | None]) -> dict[str, float | str]:
+    return {OPTIONS[name]: v for name, v in given.items() if v is not None}
+
+
+def _with_drive(case: Case, changes: Mapping[str, float | str]) -> Case:
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
