@@ -279,8 +279,8 @@ def heading(text: str) -> Heading:
 def channel_of(text: str, unit: str = "") -> str:
     """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
 
-    >>> channel_of("V", "m s^-1"), channel_of("U [m/s]"), channel_of("Velocity", "m/s"), channel_of("T", "N"), channel_of("Q", "N m"), channel_of("J")
-    ('airspeed_m_s', 'airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
+    >>> channel_of("V", "m s^-1"), channel_of("U [m/s]"), channel_of("T", "N"), channel_of("Q", "N m"), channel_of("J")
+    ('airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
     """
     name = heading(f"{text} [{unit}]" if unit else text).name
     return USUAL.get(name, name)

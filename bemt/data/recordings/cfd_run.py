@@ -252,8 +252,8 @@ def _table(record: Dataset) -> bool:
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
-    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and channel_of(c.stem) not in _KNOWN]
-    rest = [c for c in rest if moves(c.record[c.name])]
+    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
+    rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
     if not rest:
         return
     names = ", ".join(dict.fromkeys(c.name for c in rest))

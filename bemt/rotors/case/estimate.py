@@ -238,12 +238,13 @@ def of_label(
     series: str | None = None,
     density: float | None = None,
     angle_deg: Any = 0.0,
+    reading: str | None = None,
 ) -> Estimate:
     """`document` as a Dataset, standard uncertainties in ``u``."""
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
     try:
-        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
+        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle, reading)
     except InputError as error:
         if not Path(label).exists():
             raise
@@ -251,8 +252,8 @@ def of_label(
         raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
     rows = found["rows"]
     columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
-    u = {k[2:]: v for k, v in columns.items() if k.startswith("u_")}
-    values = {k: v for k, v in columns.items() if not k.startswith(("u_", "u95_"))}
+    u = {k[2:]: v for k, v in columns.items() if k[2:] in columns and k.startswith("u_")}
+    values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
         values["sideslip_rad"] = sideslip
     flags = tuple(tuple(r["flags"]) for r in rows)

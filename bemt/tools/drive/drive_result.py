@@ -21,6 +21,7 @@ from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
 from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
@@ -142,16 +143,13 @@ class DriveResult:
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def with_drive(case: Case, **given: float | None) -> Case:
-    """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
-    return _with_drive(case, _options(given))
+def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:
+    """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent.
 
-
-def _options(given: Mapping[str, float | None]) -> dict[str, float | str]:
-    return {OPTIONS[name]: v for name, v in given.items() if v is not None}
-
-
-def _with_drive(case: Case, changes: Mapping[str, float | str]) -> Case:
+    ``motor`` is a name as `bemt.rotors.case.motor.named_motor` takes it.
+    """
+    changes: dict[str, float | str] = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    changes = changes if motor is None else {**named_motor(motor).keys, **changes}
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"
