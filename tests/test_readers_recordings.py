@@ -1314,7 +1314,7 @@ def test_a_unit_in_the_heading_of_a_stand_is_converted_or_refused(stand: str, wr
 def test_units_of_headings_that_a_mutant_changed(
     head: str, cell: str, channel: str, value: float, write: Write
 ) -> None:
-    got = named(importers.read(write(f"{head},x_A\n" + f"{cell},1\n" * 3)))
+    got = importers.read(write(f"{head},x_A\n" + f"{cell},1\n" * 3))
     assert np.allclose(got[channel], value, rtol=1e-6)
 
 
