@@ -120,8 +120,9 @@ def _bought(d: Design) -> list[str]:
         lines.append(f"no {kind} does this at any speed within the tip Mach number")
     else:
         gain = d.mean_W / d.label.mean_W - 1.0
-        words = [f"stress (in {d.need.limits.material.name})" if w == "stress" else w for w in d.label_breaks]
-        breaks = f"; it does not keep: {', '.join(words)}" if words else ""
+        others = [w for w in d.label_breaks if w != "stress"]
+        breaks = f"; it would break in {d.need.limits.material.name.upper()}" if "stress" in d.label_breaks else ""
+        breaks += f"; it is beyond the limits of {', '.join(others)}" if others else ""
         lines.append(f"{_ratio(1.0 + gain)} {d.label.name}, the best {kind}, at the speed that suits it{breaks}")
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
             lines.append("leave the rpm out, and the speed is found too")
