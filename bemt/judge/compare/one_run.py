@@ -195,8 +195,12 @@ def _sentence(points: list[dict[str, Any]]) -> str:
         tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
         size = f"{word} of BEMT is {_percent(load)}, {times:.1f} times both bands together"
         return f"CFD and BEMT differ{count}: {size}.{tail}"
-    words = "within twice both bands" if near else "within both bands"
-    return f"CFD and BEMT agree {words}.{tail}"
+    if near:
+        far = sorted(near, key=lambda item: abs(item[1]["difference"]) / item[1]["u_both"])
+        worst = dict(far)  # of each load the farthest
+        sizes = " and ".join(f"{_percent(load)} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
+        return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
+    return f"CFD and BEMT agree within both bands.{tail}"
 
 
 def _next(document: Mapping[str, Any], name: str, case: str) -> str:
@@ -246,7 +250,9 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
     if document["audit"]:
         lines += ["", "Audit of the CFD run"]
         for line in document["audit"] if details else document["audit"][:7]:
-            words = f"{line['topic']}: {line['finding']}" + (f": {line['consequence']}" if line["consequence"] else "")
+            rest = [line["finding"], line["consequence"]]
+            bare = rest[0].endswith("not stated") and rest[1] == "unknown"
+            words = f"{line['topic']}: {'not stated' if bare else ': '.join(filter(None, rest))}"
             lead = f"  {line['status']:11s}"
             lines.append(_filled(words, lead, " " * len(lead)))
     notes = [n for n in document["notes"]] if details else document["notes"][:4]

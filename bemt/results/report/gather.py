@@ -146,7 +146,7 @@ def diagnose_into(
         if len(recordings) > 1 or any(f.where != "readings" for f in error.faults):
             raise
         told = compare_run(recordings[0], found[0], progress) | about
-        few = f"Too few readings for a diagnosis ({error.faults[0].got}). {told['sentence']} Next: {told['next']}."
+        few = f"One point cannot name a cause. {told['sentence']} Next: {told['next']}."
         told |= {"verdict": "insufficient", "effects": [], "explanation": few}
         write_atomic(Path(target) / "diagnosis.json", json_text(told))
         write_atomic(Path(target) / f"{FIRST}.png", first_picture(records, found)[0].png())
