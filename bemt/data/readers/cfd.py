@@ -144,12 +144,14 @@ def unique(names: Sequence[str]) -> list[str]:
     >>> unique(["x", "y", "x"])
     ['x', 'y', 'x#2']
     """
-    taken = set(names)
+    taken, seen, tried = set(names), set[str](), dict[str, int]()
     out: list[str] = []
     for name in names:
-        new, k = name, 2
-        while new in out or (k > 2 and new in taken):
+        new, k = name, tried.get(name, 2)
+        while new in seen or (new != name and new in taken):
             new, k = f"{name}#{k}", k + 1
+        tried[name] = k
+        seen.add(new)
         out.append(new)
     return out
 
