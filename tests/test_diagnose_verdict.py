@@ -25,8 +25,8 @@ from bemt.judge.diagnose import (
     verdict,
 )
 from bemt.judge.diagnose.assemble import build
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.diagnose.record import from_series
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.proof.intervals import calibrate
 from bemt.physics import effects
 from bemt.physics.bem import model as bem

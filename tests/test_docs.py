@@ -337,7 +337,7 @@ def maker(project: Path) -> ModuleType:
 
 def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:
     from bemt.judge.diagnose import confusion, document, form, gate, plan, prior, thresholds
-    from bemt.judge.diagnose.explanation import Explanation
+    from bemt.judge.explanation import Explanation
 
     text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
     assert maker.numbers(text) == text, "run python docs/make.py"

@@ -13,9 +13,9 @@ from diagnosing import case, diagnose, left_out, points, recording
 from bemt.judge.diagnose import chain, rules, suggest, verdict, wrong_rotor_check
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.document import text
-from bemt.judge.diagnose.explanation import Explanation
 from bemt.judge.diagnose.problem import Part
 from bemt.judge.diagnose.record import Record, from_series
+from bemt.judge.explanation import Explanation
 from bemt.physics.dataset import Dataset
 from bemt.rotors.latents import AsBuilt
 

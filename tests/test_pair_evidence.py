@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from bemt.judge.diagnose import form, pair_evidence
-from bemt.judge.diagnose.explanation import NONE, Explanation
 from bemt.judge.diagnose.state import State
+from bemt.judge.explanation import NONE, Explanation
 
 PAIR = Explanation.of("ground_effect", "untwist")
 

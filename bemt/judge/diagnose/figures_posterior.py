@@ -10,8 +10,8 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
 from bemt.judge.diagnose import fit
-from bemt.judge.diagnose.explanation import Explanation
 from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.explanation import Explanation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
-from bemt.judge.diagnose.explanation import NONE
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.judge.diagnose.verdict import Decision
+from bemt.judge.explanation import NONE
 from bemt.tools.flight.balance import axes_of, features
 from bemt.tools.flight.change import FlightChange, change_in
+from bemt.tools.flight.decision import Decision
 from bemt.tools.flight.identify import Constant, Identified, identify
 from bemt.tools.flight.inflow import Inflow, inflow
 from bemt.tools.flight.judge import FALSE_ALARM, FlightVerdict, judge
@@ -160,7 +160,7 @@ def answer_on(
     mine, changed = features(log), change_in(log, placed)
     if mine is None:
         why = "the log shows no flight with all motors running"
-        said = Decision("insufficient", (), NONE, 1.0, float("nan"), (), why, "no flight")
+        said = Decision("insufficient", (), NONE, 1.0, float("nan"), why, "no flight")
         step = "log a flight of 10 s or more with the commands of the motors"
         judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
     else:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemt.judge.diagnose.verdict import BESIDE_IT, Decision
 from bemt.tools.flight.answer import FlightAnswer
+from bemt.tools.flight.decision import BESIDE_IT, Decision
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.rules import IN_FLIGHT

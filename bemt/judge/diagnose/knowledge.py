@@ -1,9 +1,8 @@
-"""What the ratios to the reference say beside a diagnosis that stays open, and what they rule out.
+"""What else is known, each as one factor of the posterior: laws of ratios, exact relations, files that are not right.
 
-The diagnosis asks which effect the solver lacks; its answer stays open where blade element theory is off for this
-blade. The ratios of :mod:`bemt.compare` know no blade: how thrust and torque changed from the reference to the test, at
-equal speed, is measured, and only some causes scale like that. Neither knows everything the other does: the class
-holds what the ratios allow and what the diagnosis holds likely and no scaling law describes.
+The signatures of the solver and those of scaling laws are two banks for the same hypotheses. Where no signature of the
+solver fits, its law of the cause may be off for this blade; how loads changed from a reference at equal speed is
+measured and needs no blade, so there the laws tell what is unknown to the solver.
 """
 
 from __future__ import annotations
@@ -11,28 +10,83 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.compare.change_document import Invocation, next_step
 from bemt.judge.compare.matched import LOADS
 from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.compare.stand_run import StandRun, stand_run
+from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.record import merged
-from bemt.judge.diagnose.suggest import Suggestion
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
     from bemt.judge.compare.drive_laws import Judgement
+    from bemt.judge.diagnose.posterior import Evidence
+    from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
 
+EXACT = 1e4
+"""Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
+many ratios fit in between [1]."""
+DOUBTFUL = 9.0
+"""Odds that a file which cannot be right, or loads of a factor of three, are a fault of file or case before any physics
+[1]."""
 # Standard deviations from which a load has changed.
 _CLEAR = 3.0
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
+
+
+def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
+    """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
+    P = _exact(found.problem, found.probability)
+    if change is not None and change.loads.ranked:
+        P = both(P, change.loads.ranked)
+    return _doubted(found.problem, P)
+
+
+def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Posterior over two banks of signatures: the laws share out what is unknown to the solver.
+
+    >>> one, two = Explanation.of("duct"), Explanation.of("section")
+    >>> found = both({one: 0.1, UNKNOWN: 0.9}, {one: 0.8, two: 0.1, UNKNOWN: 0.1})
+    >>> [round(found[k], 2) for k in (one, two, UNKNOWN)]
+    [0.82, 0.09, 0.09]
+    """
+    open_ = P.get(UNKNOWN, 0.0)
+    out = {k: p for k, p in P.items() if k != UNKNOWN}
+    for k, p in laws.items():
+        out[k] = out.get(k, 0.0) + open_ * p
+    return out
+
+
+def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Broken relations of the recording: power is torque times speed, two counters of one shaft agree."""
+    broken = {name for name, _ in other_rotor.exact_faults(problem)}
+    return _normal({k: p * (EXACT if k.ids & broken else 1.0) for k, p in P.items()})
+
+
+def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Files that cannot be right, or are of another rotor: a slip that explains it is the fault itself."""
+    wrong = bool(other_rotor.impossible(problem)) or bool(other_rotor.unrepeatable(problem))
+    foreign = other_rotor.foreign(problem) and not problem.by_laws
+    if not (wrong or foreign):
+        return dict(P)
+    slips = set(other_rotor.SLIPS)
+    open_ = {k: p for k, p in P.items() if not k.ids & slips and (foreign or k != NONE)}
+    rest = {k: p for k, p in P.items() if k not in open_}
+    share = DOUBTFUL / (1.0 + DOUBTFUL)
+    return _normal({**rest, **{k: (1.0 - share) * p for k, p in open_.items()}, DOUBT: share * sum(open_.values())})
+
+
+def _normal(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    total = sum(P.values())
+    return {k: p / total for k, p in P.items()}
 
 
 def change_of(
@@ -58,15 +112,6 @@ def change_of(
         return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
-
-
-def next_of(found: RunChange, files: Sequence[str] | None) -> Suggestion | None:
-    """What settles an answer of the ratios; None where the step of the diagnosis stands."""
-    reference, test = _paths(files) or ["REFERENCE", "RECORDING"]
-    step = next_step(found, Invocation(reference, test))
-    command = () if "CASE" in step["command"] or not step["command"] else (step["command"],)
-    text = step["text"].removeprefix("to be sure, ")
-    return Suggestion(text, (), (), 0.0, 0.0, "look", command) if text else None
 
 
 def _transient(absent: Collection[str]) -> bool:
