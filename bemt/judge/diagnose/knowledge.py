@@ -22,7 +22,7 @@ from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.compare.stand_run import StandRun, stand_run
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.record import merged
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import DOUBT, UNKNOWN, Explanation
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -72,16 +72,19 @@ def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation
 
 
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Files that cannot be right, or are of another rotor: a slip that explains it is the fault itself."""
-    wrong = bool(other_rotor.impossible(problem)) or bool(other_rotor.unrepeatable(problem))
-    foreign = other_rotor.foreign(problem) and not problem.by_laws
-    if not (wrong or foreign):
+    """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
+    where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
+    """  # noqa: D205
+    if other_rotor.foreign(problem) and not problem.by_laws:
+        open_ = {k for k in P if not k.ids & set(other_rotor.SLIPS)}
+    elif other_rotor.unrepeatable(problem):
+        open_ = {k for k in P if k.ids}
+    elif other_rotor.impossible(problem):
+        open_ = {UNKNOWN}
+    else:
         return dict(P)
-    slips = set(other_rotor.SLIPS)
-    open_ = {k: p for k, p in P.items() if not k.ids & slips and (foreign or k != NONE)}
-    rest = {k: p for k, p in P.items() if k not in open_}
-    share = DOUBTFUL / (1.0 + DOUBTFUL)
-    return _normal({**rest, **{k: (1.0 - share) * p for k, p in open_.items()}, DOUBT: share * sum(open_.values())})
+    lost = {k: (1.0 - 1.0 / (1.0 + DOUBTFUL)) * p for k, p in P.items() if k in open_}
+    return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
 
 
 def _normal(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
