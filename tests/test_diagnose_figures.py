@@ -37,7 +37,7 @@ def named(project: Path) -> chain.Diagnosis:
               "torque_Nm": points.torque_Nm + noise[1] * u["torque_Nm"]}  # fmt: skip
     without = case.replaced({"model.effects_off": [LEFT_OUT]})
     only = [LEFT_OUT, "hub_loss", "pitch_offset", "thrust_gain"]
-    return chain.diagnose([record.from_series(Dataset("bench", "own", values, u), without)], [without], only, nulls=120)
+    return chain.diagnose([record.from_series(Dataset("bench", "own", values, u), without)], [without], only)
 
 
 def seen_as(answer: chain.Diagnosis, verdict: str, effects: tuple[str, ...]) -> chain.Diagnosis:

@@ -267,7 +267,7 @@ def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
     """What the law of an effect depends on, of speed, advance ratio and density."""
-    return () if effect.kind == "stand" or effect.exact else ("J",) if effect.inviscid else tuple(_FLOW)
+    return () if effect.kind == "stand" or effect.exact or effect.geometric else ("J",) if effect.inviscid else tuple(_FLOW)
 
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
