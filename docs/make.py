@@ -39,7 +39,7 @@ def numbers(text: str) -> str:
     """Fill in the constants of the tables under "The numbers"."""
 
     def now(row: re.Match[str]) -> str:
-        value = getattr(importlib.import_module(f"bemt.diagnose.{row[1]}"), row[2])
+        value = getattr(importlib.import_module(f"bemt.judge.diagnose.{row[1]}"), row[2])
         return f"| `{row[1]}.{row[2]}` | `{value!r}` |"
 
     rows = "".join(f"| {name} | {value:g} |\n" for name, value in PRIORS.items())

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import inspect
+import re
 from dataclasses import fields, replace
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -61,3 +64,10 @@ def test_a_class_with_one_effect_in_all_of_it_has_a_set_for_each_cause() -> None
     pair = Explanation.of("thrust_gain", "duct")
     said = loss.decide({BOTH: 0.5, pair: 0.48, NONE: 0.02})
     assert said.verdict == "class" and said.sets == (("thrust_gain",), ("thrust_zero", "duct")) and not said.beside
+
+
+def test_the_page_states_the_costs(project: Path) -> None:
+    text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    for f in fields(loss.Costs):
+        found = re.search(rf"^\| `{f.name}` \| ([\d./]+) \|", text, flags=re.M)
+        assert found is not None and Fraction(found[1]) == Fraction(f.default).limit_denominator(100)

@@ -295,17 +295,18 @@ def headline(d: Diagnosis) -> str:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
+    by = f"{_moved(d)}{_in_both(d)}."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
-        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{_in_both(d)}."
+        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{by}"
     if said.verdict == "class":
         if said.beside:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{_in_both(d)}."
+            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{by}"
         if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{_in_both(d)}."
+            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{by}"
         if len(titles) > _A_GROUP:
-            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}."
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{_in_both(d)}."
+            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{by}"
+        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{by}"
     if said.verdict == "unknown":
         what = _from_reference(d) or f"Recording and model differ ({off})"
         return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
@@ -329,13 +330,23 @@ def _guess(d: Diagnosis) -> str:
     return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
 
 
-def _from_reference(d: Diagnosis) -> str:
-    """Loads of the recording over those of the reference; "" where they were not compared."""
+def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
+    """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
     if d.change is None:
-        return ""
-    loads = [(c.name, d.change.ratios[c.channel]["ratio"]) for c in d.change.loads_by_name.values()]
-    words = " and ".join(f"{name} by {_share(ratio - 1.0)}" for name, ratio in loads)
+        return []
+    return [(c.name, d.change.ratios[c.channel]["ratio"] - 1.0) for c in d.change.loads_by_name.values()]
+
+
+def _from_reference(d: Diagnosis) -> str:
+    """What the recording differs from the reference by, in words."""
+    words = " and ".join(f"{name} by {_share(v)}" for name, v in _ratios(d))
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
+
+
+def _moved(d: Diagnosis) -> str:
+    """The same behind a cause."""
+    words = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
+    return f" ({words} against the reference)" if words else ""
 
 
 def _members(ids: Sequence[str]) -> str:

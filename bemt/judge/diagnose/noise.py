@@ -9,6 +9,7 @@ declared: a rotor whose curves have the right shape may still be off by a consta
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -41,11 +42,17 @@ _MODEL_SHOWN = {(0.01, 0.33): 0.25, (0.03, 1.0): 0.25, (0.08, 1.0): 0.25, (0.25,
 _MODEL_RPM = 0.1
 _LENGTH_J = 0.3
 _LENGTH_RPM = 0.7
-# What a run may differ by from other runs of the stand (temperature of cells and blades, a mount put back), as a share,
-# with its prior weight: 0.2 % (median) and 0.4 % (nine in ten) between alternate runs of UIUC volume 1, 0.3 to 1.9 %
-# between runs of one configuration on a hobby stand.  Half of the variance is a gain, half smooth in speed and advance
-# ratio (declared).
-_SESSIONS = {0.002: 0.5, 0.007: 0.5}
+# What a run may differ by from other runs (temperature of cells and blades, a mount put back), as a share, with its
+# prior weight: of one stand and day 0.2 % (median) and 0.4 % (nine in ten) between alternate runs of UIUC volume 1, 0.3
+# to 1.9 % between runs of one configuration on a hobby stand; of other days or stands; and where several runs tell
+# themselves. Half of the variance is a gain, half smooth in speed and advance ratio (declared).
+_SESSIONS = {
+    "one": {0.002: 0.5, 0.007: 0.5},
+    "apart": {0.007: 0.3, 0.02: 0.7},
+    "told": {0.002: 0.35, 0.007: 0.35, 0.02: 0.3},
+}
+_SEVERAL = 4
+_DAY = re.compile(r"(?<!\d)((?:19|20)\d{2}[-_.]?[01]\d[-_.]?[0-3]\d)(?!\d)")
 _SESSION_GAIN = 0.5
 # Below the smooth error there is a finer one: stall and transition set in at other advance ratios than computed.
 _MODEL_FINE = 0.1
@@ -93,7 +100,7 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
         model = {k: (1.0 - _REAL) * w for k, w in model.items()}
         model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     stated = [p.record.repeatability for p in problem.parts if np.isfinite(p.record.repeatability)]
-    apart = {max(stated): 1.0} if stated else _SESSIONS
+    apart = {max(stated): 1.0} if stated else _SESSIONS[_session(problem)]
     apart = apart if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
     return tuple(
         Hyper(s, a, m, f, each * w * v, d, real)
@@ -102,6 +109,19 @@ def hypers(problem: Problem) -> tuple[Hyper, ...]:
         for (m, f, real), w in model.items()
         for d, v in apart.items()
     )
+
+
+def _session(problem: Problem) -> str:
+    """Whether all runs are of one stand and day, as far as files say: by dates in their names, and by their columns.
+
+    Several runs show themselves what they differ by.
+    """
+    records = [p.record for p in problem.parts]
+    if np.unique(problem.covariates["run"]).size >= _SEVERAL:
+        return "told"
+    days = {day for r in records for day in _DAY.findall(r.name)}
+    columns = {frozenset(r.measured) for r in records}
+    return "one" if len(days) < 2 and len(columns) == 1 else "apart"
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -267,7 +287,9 @@ def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
 
 def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
     """What the law of an effect depends on, of speed, advance ratio and density."""
-    return () if effect.kind == "stand" or effect.exact or effect.geometric else ("J",) if effect.inviscid else tuple(_FLOW)
+    if effect.kind == "stand" or effect.exact or effect.geometric:  # a blade that is bent needs no law but the solver
+        return ()
+    return ("J",) if effect.inviscid else tuple(_FLOW)
 
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
