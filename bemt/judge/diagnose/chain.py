@@ -142,7 +142,7 @@ def _diagnose(
     say("next measurement")
     step = _next(found, decision, best, given)
     if said.by == "both" and motor is not None:
-        parameters = parameters | motor.parameters
+        decision, parameters = said, parameters | motor.parameters
     return Diagnosis(
         found, decision, said, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
         after, held, step, confusion.confusion(found), absent, motor, None, change,

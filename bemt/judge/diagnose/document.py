@@ -16,6 +16,7 @@ from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.confusion import nearest
 from bemt.judge.diagnose.locate import bare
+from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
 from bemt.judge.explanation import UNKNOWN, Explanation
@@ -48,6 +49,8 @@ _A_GROUP = 5
 _GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
+# Lines of an answer, and sentences that are only in its details.
+_LINES, _DETAILS = 12, ("Model: ", "Signature: ")
 # Ratios between these are said in percent.
 _PERCENT = (0.5, 2.0)
 
@@ -170,7 +173,9 @@ def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
 
 def _with_size(d: Diagnosis, name: str) -> str:
     """Title of a named effect and, where one number is its size, that number."""
-    cls, found = effects.catalogue()[name], d.parameters.get(name, {})
+    cls, found = effects.catalogue().get(name), d.parameters.get(name, {})
+    if cls is None:
+        return _title(name)
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel']['value']}: {found['unit']['value']})"
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
@@ -208,7 +213,8 @@ def explanation(d: Diagnosis) -> list[str]:
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
-    if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
+    alone = d.problem.free.all()
+    if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
     if len(d.problem.findings) > _FINDINGS:
@@ -225,11 +231,11 @@ def explanation(d: Diagnosis) -> list[str]:
             f"Named: {', '.join(decision.effects)} (probability {decision.probability:.2f})"
             + (f": {told}." if told else ".")
         )
-        signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
+        signs = [catalogue[i].sign for i in decision.effects if i in catalogue and catalogue[i].sign]
         if signs:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
-        lead = "One of these" if len(decision.sets) < 2 else decision.why
+        lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
         lines.append(f"{lead} ({decision.probability:.2f}): {_members(decision.effects)}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
@@ -290,23 +296,23 @@ def headline(d: Diagnosis) -> str:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
         apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause: {apart}, no more than runs do; from the model, {off}."
+        return f"No cause above {LEAST:.0%}: {apart}, no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
-    by = f"{_moved(d)}{_in_both(d)}."
+    end = f"{_moved(d)}{_in_both(d)}."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
-        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{by}"
+        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
     if said.verdict == "class":
         if said.beside:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{by}"
+            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{end}"
         if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{by}"
+            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{end}"
         if len(titles) > _A_GROUP:
-            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{by}"
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{by}"
+            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{end}"
+        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{end}"
     if said.verdict == "unknown":
         what = _from_reference(d) or f"Recording and model differ ({off})"
         return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
@@ -374,19 +380,27 @@ def _share(v: float) -> str:
     return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
-def text(d: Diagnosis) -> str:
-    """Lines, and the tables behind them."""
+def text(d: Diagnosis, details: bool = False) -> str:
+    """The answer in twelve lines; with ``details`` all sentences, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
     # it explains little and takes lines
     last = [line for line in rest if line.startswith("Not tried: ")]
-    said = d.said
+    said, steps = d.said, _next(d)
     named = f" {', '.join(said.effects)}" if said.effects else ""
-    out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
+    out = [*textwrap.wrap(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied
-    out += [f"  {line}" if line.startswith("  ") else
-            textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ")
-            for line in rest if line not in last]  # fmt: skip
+    shown = {line: [f"  {line}"] if line.startswith("  ") else
+             textwrap.wrap(line, 110, initial_indent="  ", subsequent_indent="    ")
+             for line in rest if line not in last}  # fmt: skip
+    if not details:
+        left = _LINES - len(out) - sum(len(shown.get(line, ())) for line in steps)
+        for line, wrapped in shown.items():
+            told = line in steps or (not line.startswith(_DETAILS) and len(wrapped) <= left)
+            left -= len(wrapped) if told and line not in steps else 0
+            out += wrapped if told else []
+        return "\n".join(out)
+    out += [line for wrapped in shown.values() for line in wrapped]
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:

@@ -100,7 +100,7 @@ def _likely(answer: Diagnosis) -> dict[str, float]:
     """Effects of the ranking with the probability of the likeliest explanation that each is in, likeliest first."""
     share: dict[str, float] = {}
     for what, p in sorted(answer.found.probability.items(), key=lambda kv: -kv[1]):
-        for i in what.ids:
+        for i in what.ids & set(answer.found.spans):
             share.setdefault(i, p)
     return share
 
