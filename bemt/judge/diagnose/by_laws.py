@@ -15,11 +15,11 @@ from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
 from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.judge.diagnose import fit as fitting
-from bemt.judge.diagnose import posterior, signatures
+from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
 from bemt.judge.diagnose.record import Record, thinned
-from bemt.judge.explanation import DOUBT, NONE, Explanation
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem.model import acts_on_rotor
@@ -96,6 +96,8 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     A ratio of pole pairs moves the speeds apart itself, a unit the loads.
     """
     P = found.probability
+    if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
+        P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if not (pair.wind or pair.apart or pair.far_off):
         return P
     slips = set() if pair.wind else {"rpm_scale", "unit_slip"}
@@ -125,7 +127,7 @@ def weighed(
     names = [i for i in law_effects() if (only is None or i in only) and i not in gone]
     candidates, _ = signatures.candidates(problem, names)
     candidates = tuple(c for c in (_as_counted(c, pair) for c in candidates) if c is not None)
-    return posterior.weigh(problem, candidates)
+    return posterior.weigh(problem, knowledge.possible(problem, candidates))
 
 
 def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:

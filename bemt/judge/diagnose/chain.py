@@ -115,7 +115,7 @@ def _diagnose(
     # until the reference is asked
     problem = replace(problem, shared=problem.missing, told=frozenset(given.changed))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
-    candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
+    candidates = tuple(c for c in knowledge.possible(problem, candidates) if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
     say("weighing explanations")

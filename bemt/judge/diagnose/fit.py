@@ -282,7 +282,7 @@ def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Ar
         candidate, g = found.of(i), c - found.spans[i].start
         spread = found.states[0].forms[i].size if size is None else size
         shape = spread * candidate.signatures[:, g, None] * modes[i]
-        B = np.column_stack([shape, candidate.between(g)])
+        B = np.column_stack([shape, candidate.other_laws(g)])
         out += B @ B.T
     return out
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
+    from bemt.judge.diagnose.signatures import Candidate
 
 EXACT = 1e4
 """Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
@@ -42,6 +43,14 @@ _CLEAR = 3.0
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
+def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Candidates without what cannot be: a density that nobody recorded has no wrong unit."""
+    if any(p.record.air_recorded for p in problem.parts if not p.record.reference):
+        return tuple(candidates)
+    kept = (c.only(np.array([s.get("channel") != "density_kg_m3" for s in c.settings])) for c in candidates)
+    return tuple(c for c in kept if c is not None)
+
+
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
     """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
     P = _exact(found.problem, found.probability)
@@ -51,17 +60,18 @@ def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanati
 
 
 def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Posterior over two banks of signatures: the laws share out what is unknown to the solver.
+    """Posterior over two banks of signatures: causes that laws know share what is unknown to the solver.
 
     >>> one, two = Explanation.of("duct"), Explanation.of("section")
     >>> found = both({one: 0.1, UNKNOWN: 0.9}, {one: 0.8, two: 0.1, UNKNOWN: 0.1})
     >>> [round(found[k], 2) for k in (one, two, UNKNOWN)]
     [0.82, 0.09, 0.09]
     """
-    open_ = P.get(UNKNOWN, 0.0)
-    out = {k: p for k, p in P.items() if k != UNKNOWN}
+    open_, out = P.get(UNKNOWN, 0.0), dict(P)
     for k, p in laws.items():
-        out[k] = out.get(k, 0.0) + open_ * p
+        if k.ids:
+            out[k] = out.get(k, 0.0) + open_ * p
+            out[UNKNOWN] -= open_ * p
     return out
 
 

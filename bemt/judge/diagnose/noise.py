@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,14 +32,12 @@ _SCALES = {True: (0.7, 1.0, 1.6, 3.0), False: (0.15, 0.4, 1.0, 2.5)}
 _AR = (0.0, 0.6)
 _WHITE = 0.2
 # How good the solver is: smooth error over advance ratio as a share of the largest coefficient, and a factor on its own
-# nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
-# off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
-_MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
-# Probability that the rotor is a real one, of which no more is known than the case, and a reference, say; smooth error
-# beside, and size of what those differ by (heavy tails of the population, two for its six quantiles).
-_REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
-# Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
-_MODEL_SHOWN = {(0.01, 0.33): 0.25, (0.03, 1.0): 0.25, (0.08, 1.0): 0.25, (0.25, 1.0): 0.25}
+# nuisances, alike beforehand.  Declared after volume 1 of the UIUC database: thrust and torque at rest are off
+# by 3 and 5 % (median) and one propeller in ten by more than 10 %. A reference shows that error, however large.
+_MODEL = ((0.01, 0.33), (0.03, 1.0), (0.08, 1.0))
+_MODEL_SHOWN = (*_MODEL, (0.25, 1.0))
+# From this size on the rotor may be any real one of which no more is known than the case says.
+_REAL = 0.03
 _MODEL_RPM = 0.1
 _LENGTH_J = 0.3
 _LENGTH_RPM = 0.7
@@ -93,21 +92,16 @@ class Hyper:
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
     """All settings, with prior weights that add up to 1."""
-    scales = _SCALES[problem.u_known]
-    each = 1.0 / (len(scales) * len(_AR))
-    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if problem.free.all() else _MODEL_SHOWN).items()}
-    if all(p.as_built is not None for p in problem.parts):
-        model = {k: (1.0 - _REAL) * w for k, w in model.items()}
-        model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     stated = [p.record.repeatability for p in problem.parts if np.isfinite(p.record.repeatability)]
     apart = {max(stated): 1.0} if stated else _SESSIONS[_session(problem)]
     apart = apart if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
+    alone = bool(problem.free.all())
+    real = alone and all(p.as_built is not None for p in problem.parts)
+    grid = list(product(_SCALES[problem.u_known], _AR, _MODEL if alone else _MODEL_SHOWN))
     return tuple(
-        Hyper(s, a, m, f, each * w * v, d, real)
-        for s in scales
-        for a in _AR
-        for (m, f, real), w in model.items()
-        for d, v in apart.items()
+        Hyper(s, a, m, own, w / len(grid), d, 1.0 if real and m >= _REAL else 0.0)
+        for s, a, (m, own) in grid
+        for d, w in apart.items()
     )
 
 

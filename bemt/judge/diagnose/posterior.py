@@ -115,8 +115,8 @@ class _Bank:
         S = np.concatenate([np.zeros((problem.y.size, 0)), *(c.signatures for c in candidates)], axis=1)
         log_w = np.concatenate([np.zeros(0), *(np.log(c.weight) for c in candidates)])
         seen = np.zeros(log_w.size, dtype=bool)
-        for k in np.unique(problem.channel[problem.free]):
-            mine = problem.free & (problem.channel == k)
+        for k in np.unique(problem.channel[problem.changed]):
+            mine = problem.changed & (problem.channel == k)
             seen |= np.sqrt(np.mean((S[mine] / problem.scale[mine, None]) ** 2, axis=0)) > LEAST
         return cls(problem, tuple(candidates), spans, S, log_w, seen, form.form_modes(problem, candidates), {})
 
