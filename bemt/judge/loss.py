@@ -136,7 +136,8 @@ def _sets(
     share = {i: sum(p for k, p in inside.items() if i in k) for i in said}
     first = max(said, key=lambda i: share[i])
     rest = tuple(i for i in said if i != first)
-    sure = share[first] > _NEARLY_ALL * sum(inside.values())
+    total, pairs = sum(inside.values()), sum(p for k, p in inside.items() if k.pair)
+    sure = share[first] > _NEARLY_ALL * total and pairs > _ALONE * total
     return first, ((first,), rest) if sure else (said,)
 
 

@@ -126,7 +126,7 @@ def _diagnose(
     if not problem.free.all() and np.all(problem.channel == CHANNELS.index("rpm")):
         # beside a reference only supply, heat, motor and controller change the speed at a pulse width
         P = {Explanation.of(MOTOR) if k == UNKNOWN else k: p for k, p in P.items()}
-    decision = loss.decide(P)
+    decision = knowledge.reason(problem, loss.decide(P))
     said = decision if motor is None else _with_drive(decision, motor.decision)
     shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
     best, parameters = fitting.refined(found, fitting.fit(found, shown))

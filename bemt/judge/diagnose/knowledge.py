@@ -11,18 +11,19 @@ import math
 import os
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.compare.matched import LOADS
 from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.compare.stand_run import StandRun, stand_run
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.record import merged
 from bemt.judge.explanation import DOUBT, UNKNOWN, Explanation
+from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
     from bemt.judge.diagnose.signatures import Candidate
+    from bemt.judge.loss import Decision
 
 EXACT = 1e4
 """Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
@@ -38,8 +40,10 @@ many ratios fit in between [1]."""
 DOUBTFUL = 9.0
 """Odds that a file which cannot be right, or loads of a factor of three, are a fault of file or case before any physics
 [1]."""
-# Standard deviations from which a load has changed.
-_CLEAR = 3.0
+ANOTHER = 50.0
+"""Odds of another rotor over two faults at once that each shift a whole channel: as of one cause over two [1]."""
+# Faults of a cell that multiply its reading.
+_SHARES = ("gain", "cross-talk")
 _LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
 
 
@@ -54,6 +58,8 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
     """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
     P = _exact(found.problem, found.probability)
+    if not found.problem.by_laws:
+        P = _another_rotor(P)
     if change is not None and change.loads.ranked:
         P = both(P, change.loads.ranked)
     return _doubted(found.problem, P)
@@ -75,6 +81,25 @@ def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> d
     return out
 
 
+def reason(problem: Problem, said: Decision) -> Decision:
+    """The same decision; of a broken relation the relation itself is the reason."""
+    for name, finding in other_rotor.exact_faults(problem):
+        if said.effects == (name,):
+            return replace(said, why=f"{finding.evidence}, by definition")
+    return said
+
+
+def _another_rotor(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Two effects that only shift whole channels fit any two levels: one other rotor does that, too."""
+    def level(i: str) -> bool:
+        cls = effects.catalogue()[i]
+        return cls.exact or (cls.fault in _SHARES and cls.sensor in ("", *_LOADS))
+
+    share = ANOTHER / (1.0 + ANOTHER)
+    lost = {k: share * p for k, p in P.items() if k.pair and all(map(level, k))}
+    return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == UNKNOWN else 0.0) for k, p in P.items()}
+
+
 def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
     """Broken relations of the recording: power is torque times speed, two counters of one shaft agree."""
     broken = {name for name, _ in other_rotor.exact_faults(problem)}
@@ -85,15 +110,18 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
     where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
     """  # noqa: D205
-    if other_rotor.foreign(problem) and not problem.by_laws:
-        open_ = {k for k in P if not k.ids & set(other_rotor.SLIPS)}
+    share = DOUBTFUL / (1.0 + DOUBTFUL)
+    shown = any(p.record.reference for p in problem.parts)  # a reference shows the rotor
+    if other_rotor.foreign(problem) and not shown and not problem.by_laws:
+        odds = DOUBTFUL * other_rotor.odds(problem)
+        lost = {k: p * (odds / (1.0 + odds) if k.ids and k.ids <= set(other_rotor.SLIPS) else share)
+                for k, p in P.items()}  # fmt: skip
     elif other_rotor.unrepeatable(problem):
-        open_ = {k for k in P if k.ids}
+        lost = {k: share * p for k, p in P.items() if k.ids}
     elif other_rotor.impossible(problem):
-        open_ = {UNKNOWN}
+        lost = {UNKNOWN: share * P[UNKNOWN]}
     else:
         return dict(P)
-    lost = {k: (1.0 - 1.0 / (1.0 + DOUBTFUL)) * p for k, p in P.items() if k in open_}
     return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
 
 
@@ -157,16 +185,3 @@ def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun
         values["run"] = record.extra["run"]
     density = float(np.mean(record.air.rho)) if record.air_recorded else math.nan
     return StandRun(Dataset("bench", record.name, values, u), "", density, diameter_m)
-
-
-def clear_changes(change: RunChange) -> str:
-    """Loads that changed by more than three standard deviations, set-up included; "" where there is none."""
-    words = []
-    for c in change.channels.values():
-        r = change.ratios[c.channel]
-        if c.name not in LOADS or r["extrapolated"]:
-            continue
-        unsure = math.hypot(math.log(r["high95"] / r["ratio"]) / 1.96, c.session)
-        if abs(math.log(r["ratio"])) > _CLEAR * unsure:
-            words.append(f"{c.name} differs by {r['ratio'] - 1.0:+.1%}".replace("%", " %"))
-    return " and ".join(words)

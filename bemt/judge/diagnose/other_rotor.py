@@ -110,6 +110,13 @@ def _ranked(found: dict[str, float], slips: Iterable[_Slip]) -> list[Suspect]:
     return sorted(out.values(), key=lambda s: s.distance)
 
 
+def odds(problem: Problem) -> float:
+    """Odds of another rotor over a slip of a unit or of the speed, by the level of the loads alone [1]."""
+    rotor, slip = (min((s.distance for s in suspects(problem) if (s.kind in _ROTORS) is which), default=math.inf)
+                   for which in (True, False))  # fmt: skip
+    return math.exp(min(0.5 * (slip**2 - rotor**2), 50.0)) if math.isfinite(rotor) else 0.0
+
+
 def nearest_rotors(problem: Problem) -> str:
     """Rotors that would fit the level of the loads, nearest first: another pitch, chord, diameter or blade count."""
     found = {c: math.log(abs(v)) for c, v in levels(problem).items() if v}

@@ -262,13 +262,15 @@ def _pairs(bank: _Bank, state: State) -> None:
     none, some = state.log_z[NONE], {}
     gain = state.S.T @ state.r - state.half
     for name, span in bank.spans.items():
-        n = span.stop - span.start
+        n, weight = span.stop - span.start, bank.log_w[span]
         at = np.arange(n)
-        if n > _EVEN + _BEST:  # the others lend their weight to the nearest of these
-            at = np.unique([*np.linspace(0, n - 1, _EVEN).astype(int), *np.argsort(-gain[span])[:_BEST],
-                            state.best[name]])  # fmt: skip
-        near = np.argmin(np.abs(np.arange(n)[:, None] - at[None, :]), axis=1)
-        weight = np.log(np.bincount(near, np.exp(bank.log_w[span]), at.size))
+        if n > _EVEN + _BEST:  # the best ones stand for themselves, even ones for what is nearest to them
+            best = np.unique([*np.argsort(-gain[span])[:_BEST], state.best[name]])
+            even = np.setdiff1d(np.linspace(0, n - 1, _EVEN).astype(int), best)
+            rest = np.setdiff1d(at, best)
+            near = np.argmin(np.abs(rest[:, None] - even[None, :]), axis=1)
+            lent = np.log(np.bincount(near, np.exp(weight[rest]), even.size))
+            at, weight = np.concatenate([best, even]), np.concatenate([weight[best], lent])
         some[name] = span.start + at, gain[span][at] + weight + np.where(bank.seen[span][at], 0.0, _SHUT)
     tables = {}
     for a, b in combinations(bank.spans, 2):
