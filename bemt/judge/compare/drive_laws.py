@@ -239,7 +239,7 @@ def _any_change(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array
 def judge_drive(probability: Mapping[str, float]) -> Judgement:
     """Answer of least expected loss on motor, controller and battery."""
     special = {NONE: explanation.NONE, UNKNOWN: explanation.UNKNOWN}
-    P = {special.get(k) or Explanation.of(k): p for k, p in probability.items()}
+    P = {special[k] if k in special else Explanation.of(k): p for k, p in probability.items()}
     said = decide(P)
     row = law(said.effects[0]) if said.verdict == "named" and len(said.effects) == 1 else None
     return Judgement.of(replace(said, why=row.says) if row else said, P)

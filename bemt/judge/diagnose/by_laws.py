@@ -95,7 +95,8 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
 
     A ratio of pole pairs moves the speeds apart itself, a unit the loads.
     """
-    P = found.probability
+    propeller = Explanation.of("propeller")
+    P = knowledge.another_rotor(found.probability, propeller if propeller in found.probability else UNKNOWN)
     if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
         P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if not (pair.wind or pair.apart or pair.far_off):

@@ -110,7 +110,7 @@ def form_modes(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, A
     laws = {}
     for c in candidates:
         effect = effects.catalogue()[c.id]
-        laws[c.id] = key = (effect.along, noise.law_of(effect))
+        laws[c.id] = key = (effect.along, noise.law_of(effect, not problem.by_laws))
         if key not in out:
             modes = noise.smooth_modes(problem, *key)
             # instruments are exact but for what they say themselves that they follow: a drift the clock

@@ -58,11 +58,9 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
     """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
     P = _exact(found.problem, found.probability)
-    if not found.problem.by_laws:
-        P = _another_rotor(P)
     if change is not None and change.loads.ranked:
         P = both(P, change.loads.ranked)
-    return _doubted(found.problem, P)
+    return _doubted(found.problem, another_rotor(P, UNKNOWN))
 
 
 def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
@@ -89,15 +87,16 @@ def reason(problem: Problem, said: Decision) -> Decision:
     return said
 
 
-def _another_rotor(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Two effects that only shift whole channels fit any two levels: one other rotor does that, too."""
+def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Explanation, float]:
+    """Two effects that only shift whole channels fit any two levels: another ``rotor`` does that, too."""
+
     def level(i: str) -> bool:
         cls = effects.catalogue()[i]
         return cls.exact or (cls.fault in _SHARES and cls.sensor in ("", *_LOADS))
 
     share = ANOTHER / (1.0 + ANOTHER)
     lost = {k: share * p for k, p in P.items() if k.pair and all(map(level, k))}
-    return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == UNKNOWN else 0.0) for k, p in P.items()}
+    return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == rotor else 0.0) for k, p in P.items()}
 
 
 def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:

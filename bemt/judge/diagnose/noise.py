@@ -279,9 +279,9 @@ def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
     return load, falling
 
 
-def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
-    """What the law of an effect depends on, of speed, advance ratio and density."""
-    if effect.kind == "stand" or effect.exact or effect.geometric:  # a blade that is bent needs no law but the solver
+def law_of(effect: Effect | type[Effect], solved: bool = True) -> tuple[str, ...]:
+    """What the law of an effect depends on, of speed, advance ratio and density; a solved blade needs no law."""
+    if effect.kind == "stand" or effect.exact or (effect.geometric and solved):
         return ()
     return ("J",) if effect.inviscid else tuple(_FLOW)
 

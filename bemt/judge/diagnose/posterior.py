@@ -7,7 +7,7 @@ effect's law is a few more columns of that covariance, by Woodbury.  What else i
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
@@ -145,7 +145,9 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
             _pairs(bank, state)
         states.append(state)
     before = prior.log_priors(prior.prior_weights(problem, list(bank.spans)), pairs)
-    probability = _posterior(states, before)
+    rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
+             and not effects.catalogue()[c.id].exact}  # fmt: skip
+    probability = _posterior(states, before, rough)
     likeliest = max(probability, key=lambda k: probability[k])
     states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
     return Evidence(problem, tuple(candidates), tuple(states), probability, bank.spans, bank.log_w, rivals)
@@ -293,22 +295,33 @@ def _pairs(bank: _Bank, state: State) -> None:
         state.log_z[pair] = none + float(log_sum(value.ravel()))
 
 
-def _posterior(states: Sequence[State], before: dict[Explanation, float]) -> dict[Explanation, float]:
-    """Probabilities: what is too small to count is none, a second effect that adds too little is not there."""
+def _posterior(
+    states: Sequence[State], before: dict[Explanation, float], rough: Collection[str] = ()
+) -> dict[Explanation, float]:  # fmt: skip
+    """Probabilities: what is too small to count is none, a second effect that adds too little is not there.
+
+    Evidence between ``rough`` laws is tempered: they are off by a share of what they explain, so that they are told
+    apart by no less than that share of the log odds (a power likelihood, as for any model that is known to be wrong).
+    """
     weight = np.array([np.log(s.hyper.weight) for s in states])
 
     def together(values: Sequence[float]) -> float:
         return float(log_sum(np.array(values), weight))
 
     log_z = {k: together([s.log_z[k] for s in states]) for k in states[0].log_z}
+    plain = dict(log_z)
+    if near := {k: v for k, v in log_z.items() if k.ids & set(rough)}:
+        top = max(near.values())
+        power = EARNED / max(EARNED, min(form.FORM) * (top - log_z[NONE]))
+        log_z |= {k: top - power * (top - v) for k, v in near.items() if len(k) == 1}
     small = {k: together([s.small[k] for s in states]) for k in states[0].small}
     log_p = [log_z[k] + before[k] for k in log_z] + [v + before[Explanation.of(k)] for k, v in small.items()]
     p = shares(log_p)
     out = dict(zip(log_z, p.tolist(), strict=False))
     out[NONE] += float(np.sum(p[len(log_z) :]))
     for k in [k for k in out if k.pair]:
-        better = max((Explanation.of(i) for i in k.ids), key=lambda i: log_z[i])
-        if log_z[k] < log_z[better] + EARNED:
+        better = max((Explanation.of(i) for i in k.ids), key=lambda i: plain[i])
+        if plain[k] < plain[better] + EARNED:
             out[better] += out[k]
             out[k] = 0.0
     return out

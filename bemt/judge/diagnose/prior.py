@@ -56,8 +56,8 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
 
 
 def recorded_change(problem: Problem, name: str) -> bool:
-    """Whether two recordings without a case tell themselves that what an effect follows differs between them."""
-    if not problem.by_laws:
+    """Whether recording and reference tell themselves that what an effect follows differs between them."""
+    if problem.free.all():
         return False
     test, known = ([p.record.extra for p in problem.parts if p.record.reference is which] for which in (False, True))
     for v in (v for v in effects.catalogue()[name].along if v != "time_s"):
