@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from bemt.app.commands.cli import main
+from bemt.app.cli import main
 from bemt.app.library import propeller
 from diagnosing import case, points, recording
 

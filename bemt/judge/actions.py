@@ -29,12 +29,12 @@ __all__ = ["calibrate_rotor", "compare", "diagnose", "plan", "prove"]
 
 @action(
     "Recordings", "diagnose log.csv --case cases/prop_8x5", words=("recordings",), shown=True,
-    common=("case", "reference", "ruled_out", "only", "channels", "rpm", "airspeed_m_s", "out"),
+    common=("case", "reference", "ruled_out", "changed", "only", "rpm", "airspeed_m_s", "out"),
 )  # fmt: skip
 def diagnose(
     recordings: Recording | Sequence[Recording], case: Propeller | Path | Sequence[Propeller | Path], *,
     reference: Recording | Sequence[Recording] | None = None, reference_case: Propeller | Path | None = None,
-    only: Sequence[str] = (), ruled_out: Sequence[str] = (), off: Sequence[str] = (),
+    only: Sequence[str] = (), ruled_out: Sequence[str] = (), changed: Sequence[str] = (), off: Sequence[str] = (),
     baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
     rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
     along: Path | None = None, out: Path | None = None, figures: bool = True,
@@ -56,6 +56,8 @@ def diagnose(
         Consider only these effects; all by default.
     ruled_out : sequence of str
         Effects that a check has ruled out.
+    changed : sequence of str
+        Effects that you changed, such as duct ("I put a duct on"): said, weighed, checked.
     off : sequence of str
         Effects to leave out of the baseline.
     baseline : {"bemt", "k1k2"}
@@ -101,7 +103,7 @@ def diagnose(
     from bemt.judge.diagnose.ask import diagnosed
 
     return diagnosed(
-        recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, off=off, baseline=baseline,
+        recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
         channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
         out=out, figures=figures, progress=progress,
     )  # fmt: skip

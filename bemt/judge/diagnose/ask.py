@@ -102,6 +102,11 @@ class Answer:
         return "\n\n".join([text(self.diagnosis), *(c.text() for c in self.blade.values())])
 
     @property
+    def details(self) -> str:
+        """All sentences, and the tables behind them."""
+        return "\n\n".join([text(self.diagnosis, details=True), *(c.text() for c in self.blade.values())])
+
+    @property
     def improved(self) -> Propeller | None:
         """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
         from bemt.judge.diagnose.improve import improved_case
@@ -153,7 +158,7 @@ def several(given: Any) -> list[Any]:
 
 def diagnosed(
     recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
-    off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
+    changed: Sequence[str], off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
     repeatability_pct: float | None, along: Any, out: Any, figures: bool, progress: Callable[[str], None] | None,
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
@@ -165,13 +170,13 @@ def diagnosed(
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
     cases, records = load_all(files, given, known, off, only, before=lambda found: folder.check(target, found),
-                              rpm=speeds, airspeed_m_s=winds, ruled_out=ruled_out,
+                              rpm=speeds, airspeed_m_s=winds, ruled_out=[*ruled_out, *changed],
                               reference_case=theirs)  # fmt: skip
     if repeatability_pct is not None:
         records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
     chosen = cases * len(files) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
-    asked = _asked(files, given, known, only=only, ruled_out=ruled_out, off=off, baseline=baseline,
+    asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
                    reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
     heard = [CHANNELS[c] for c in channels] or None
     try:
@@ -207,7 +212,7 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
 
 def _asked(
     files: list[Any], cases: list[Any], known: list[Any], *, only: Sequence[str], ruled_out: Sequence[str],
-    off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
+    changed: Sequence[str], off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
 ) -> Given:  # fmt: skip
     """What was asked, for the command of the next step; objects of the library have a word in place of their file."""
 
@@ -223,4 +228,5 @@ def _asked(
         words += ["--repeatability-pct", f"{repeatability_pct:g}"]
     if baseline != "bemt":
         words += ["--baseline", baseline]
-    return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out))
+    return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out),
+                 tuple(changed))  # fmt: skip
