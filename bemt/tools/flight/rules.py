@@ -34,7 +34,7 @@ __all__ = ["BUILD", "DAYS", "IN_FLIGHT", "RULES", "WIDE", "BesideBalance", "Flig
 BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 IN_FLIGHT = "a change within the flight"
 """Rule whose size is that of the change, not of the whole flight."""
-_EVEN = 0.5  # probability from which another day is the reason [1]
+_EVEN = 0.5  # probability from which another day is the reason, once something moved [1]
 DAYS = "days differ"
 """Rule of a flight that another day explains."""
 _LEAST = 3  # healthy flights from which a cause is named
@@ -98,7 +98,7 @@ class FlightQuery:
         single = max((e for e in self.found if not e.pair and e != day), key=lambda e: self.P[e])
         earned = first.pair and self.log_bayes[first] - self.log_bayes[single] >= EARNED
         lead = first if earned else single
-        return day if self.P.get(day, 0.0) > self.P[lead] else lead
+        return day if self.P.get(day, 0.0) > _EVEN * (1.0 - self.P[NONE]) else lead
 
     @property
     def same(self) -> tuple[Explanation, ...]:
@@ -179,8 +179,6 @@ def _day(a: FlightQuery) -> Decision | None:
     if a.leading != day:
         return None
     why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
-    if a.P[day] < _EVEN:
-        why = "more than one rotor or weight, or another day, would do this; healthy flights of the same day would tell"
     return a.says("insufficient", why)
 
 
