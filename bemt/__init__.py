@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bemt.rotors.actions import calibrate as calibrate
     from bemt.rotors.actions import cite as cite
     from bemt.rotors.actions import estimate as estimate
+    from bemt.rotors.actions import measured_rotors as measured_rotors
     from bemt.rotors.actions import new as new
     from bemt.rotors.actions import stations as stations
     from bemt.rotors.actions import validate as validate
@@ -61,7 +62,7 @@ def _homes() -> dict[str, str]:
     """Where each public name is, ``module:name``."""
     from bemt.app import registry
 
-    actions = {registry.python_name(command): where for command, where in registry.homes().items()}
+    actions = {where.rpartition(":")[2]: where for where in registry.homes().values()}
     return actions | {name: f"{module}:{name}" for name, module in _OBJECTS.items()}
 
 

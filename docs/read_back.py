@@ -232,6 +232,7 @@ SEEN = {
 TEXT = {
     "ardupilot": "formula of its source (SIM_Motor.cpp)",
     "c81": "our reader",
+    "fan": "profile by its grammar, integrals of the rows",
     "flow360": "shapes and units",
     "px4": "formula of its source (sih.cpp), ranges of its parameters",
     "simulink": "MAT file read by SciPy",
@@ -389,7 +390,8 @@ In JSBSim the loads act as external reactions of the aircraft file, and the shaf
 {line}
 {chr(10).join(kinds["disk"])}
 
-`rotor-disk` and `su2-disk` prescribe the load from BEMT. The other two solve the inflow themselves. OpenFOAM's
+`fan`, `rotor-disk` and `su2-disk` prescribe the load from BEMT. The other two solve the inflow themselves. `fan` is a radial
+profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt`, which says axis, direction and units. OpenFOAM's
 `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the axis, and the torque lacks
 cl sin(phi). See [reports/disk](../reports/disk/README.md) for the run.
 

@@ -60,6 +60,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),
     "Theory": (
         "believe.md",
+        "promises.md",
         "theory.md",
         "oblique.md",
         "duct.md",

@@ -312,7 +312,7 @@ def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
     vane = _one(vane.intersect(between), "stator")
     out = [("stator", "centre_body", body)]
     for k in range(plan.stator.B):
-        turned = vane.moved(cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / plan.stator.B))
+        turned = vane.rotate(cq.Vector(), cq.Vector(0, 0, 1), 360.0 * k / plan.stator.B)  # copied: faces have names
         out.append(("stator", f"vane_{k + 1}", turned))
     return out
 
@@ -333,7 +333,7 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
     blade, profile = blade_solid(rotor, options)
     found: list[tuple[str, str, Any]] = []
     for k in range(rotor.B):
-        turned = blade.moved(cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), 360.0 * k / rotor.B))
+        turned = blade.rotate(cq.Vector(), cq.Vector(0, 0, 1), 360.0 * k / rotor.B)
         found.append(("blade", f"blade_{k + 1}", turned))
     exact = [("hub", profile)]
     found.append(("hub", "hub", _fixed(_turned(profile))))
@@ -356,15 +356,108 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
     return Parts(tuple(found), volumes)
 
 
-def assembly(parts: Parts, name: str) -> Any:
-    """Gather the solids in a named ``cadquery.Assembly`` for STEP."""
+COLOURS = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6),
+           "flow": (0.9, 0.95, 1.0)}  # fmt: skip
+FAR = ("far_field_inlet", "far_field_outlet", "far_field_side")
+"""Names of the box round the flow: ahead of the rotor, behind it, beside it."""
+
+
+def assembly(parts: Parts, name: str, rotor: Rotor | None = None, duct: Duct | None = None) -> Any:
+    """Gather the solids in a named ``cadquery.Assembly`` for STEP; with their rotor every face has a name, too."""
     cq = needs("cadquery", "cad")
 
-    colours = {"blade": (0.2, 0.3, 0.6), "hub": (0.4, 0.4, 0.4), "duct": (0.8, 0.8, 0.8), "stator": (0.6, 0.6, 0.6)}
     out = cq.Assembly(name=name)
     for surface, part, solid in parts.solids:
-        out.add(solid, name=part, color=cq.Color(*colours[surface]))
+        out.add(solid, name=part, color=cq.Color(*COLOURS[surface]))
+    for part, face, word in named_faces(parts, rotor, duct) if rotor is not None else ():
+        out.objects[part].addSubshape(face, name=word, layer=word)
     return out
+
+
+def named_faces(parts: Parts, rotor: Rotor, duct: Duct | None = None) -> list[tuple[str, Any, str]]:
+    """Part, face and name of all faces: what a mesher picks boundaries by.
+
+    ``blade_1``, ``blade_1_tip``, ``blade_1_root`` (in the hub), ``hub``, ``duct_lip``, ``duct_inner``, ``duct_outer``,
+    ``duct_exit``, ``centre_body``, ``vane_2``.
+    """
+    out = []
+    for surface, part, solid in parts.solids:
+        for face in solid.Faces():
+            at = np.array([v.toTuple() for v in face.Vertices()]) / MM
+            radius, z = np.hypot(at[:, 0], at[:, 1]), at[:, 2]
+            word = part
+            if surface == "blade" and face.geomType() == "CYLINDER":
+                word = f"{part}_tip" if radius.mean() > 0.5 * (rotor.R + rotor.Rhub) else f"{part}_root"
+            elif surface == "duct" and duct is not None:
+                word = _wall_name(duct, radius, duct._rotor - z)
+            out.append((part, face, word))
+    return out
+
+
+def _wall_name(duct: Duct, radius: Array, x: Array) -> str:
+    """Name of a face of the duct by its corners."""
+    near = 1e-4 * duct.length
+    if x.max() <= duct.lip_length + near:
+        return "duct_lip"
+    if x.min() >= duct.length - near:
+        return "duct_exit"
+    middle = 0.5 * (duct.inner(x) + duct.outer(x))
+    return "duct_inner" if np.sum(radius - middle) < 0.0 else "duct_outer"
+
+
+def flow_domain(
+    parts: Parts, rotor: Rotor, duct: Duct | None = None, wide: float = 10.0, ahead: float = 5.0, behind: float = 10.0
+) -> tuple[Any, list[tuple[Any, str]]]:
+    """Air round a rotor and its duct as one solid, a box less the parts, and the names of its faces.
+
+    Parameters
+    ----------
+    parts : Parts
+        From `solids`; parts that touch leave no face where they do.
+    wide, ahead, behind : float
+        Width of the box, and its reach from the rotor upstream (+z) and downstream, in diameters [1].
+
+    Returns
+    -------
+    cadquery solid, list of (face, str)
+        In millimetres; names as `named_faces` has them, and ``far_field_inlet``, ``far_field_outlet``,
+        ``far_field_side``.
+    """
+    cq = needs("cadquery", "cad")
+
+    D = rotor.D * MM
+    low = cq.Vector(-0.5 * wide * D, -0.5 * wide * D, -behind * D)
+    box = cq.Solid.makeBox(wide * D, wide * D, (ahead + behind) * D, low)
+    air = _one(box.cut(*(solid for _, _, solid in parts.solids)), "flow")
+    walls = [(face, word, face.BoundingBox()) for _, face, word in named_faces(parts, rotor, duct)]
+    out = []
+    for face in air.Faces():
+        span = face.BoundingBox()
+        if span.xlen > 0.9 * wide * D or span.ylen > 0.9 * wide * D:
+            flat = span.zlen < 1e-3 * D
+            out.append((face, FAR[2] if not flat else FAR[0] if span.center.z > 0.0 else FAR[1]))
+            continue
+        points, corners = face.tessellate(0.01 * D, 0.3)
+        spots = [[points[i] for i in c] for c in corners]
+        a, b, c = max(spots, key=lambda s: float((s[1] - s[0]).cross(s[2] - s[0]).Length))
+        spot = cq.Vertex.makeVertex(*((a + b + c) * (1.0 / 3.0)).toTuple())
+        here = spot.Center()
+        close = [(w.distance(spot), word) for w, word, box_ in walls if _near(box_, here, 0.02 * D)]
+        out.append((face, min(close)[1] if close else "wall"))
+    lost = {word for _, word, _ in walls if not word.endswith("_root")} - {word for _, word in out}
+    if lost or any(word == "wall" for _, word in out):  # the kernel loses a part without a word
+        got = f"air without {', '.join(sorted(lost)) or 'a name for every face'}"
+        raise GeometryError([("flow", got, "a boundary of every part", "Use step, and cut the box in the mesher")])
+    return air, out
+
+
+def _near(box: Any, at: Any, by: float) -> bool:
+    """Whether a point is in a bounding box, or nearly."""
+    return bool(
+        box.xmin - by < at.x < box.xmax + by
+        and box.ymin - by < at.y < box.ymax + by
+        and box.zmin - by < at.z < box.zmax + by
+    )
 
 
 def tessellate(shape: Any, tolerance: float, angle: float = 0.1) -> Mesh:

@@ -8,22 +8,18 @@ from dataclasses import dataclass
 
 from geometry.common import Faults, GeometryError
 
-BLADE_CLASSES = ("electric", "slow_flyer", "multirotor", "folding", "sport", "fpv")
-"""Kinds of blades that a label tells apart; sport is for glow engines."""
+BLADE_CLASSES = ("electric", "slow_flyer", "multirotor", "folding", "sport", "fpv", "reversible", "pattern")
+"""Kinds of blades that a label tells apart; sport is for glow engines, reversible turns both ways, pattern is F3A."""
 
-# Letters behind the size (makers' catalogues): class, and whether they mean the opposite rotation.
-_SUFFIXES: dict[str, tuple[str | None, bool]] = {
-    "": (None, False), "e": ("electric", False), "ep": ("electric", True), "sf": ("slow_flyer", False),
-    "sfp": ("slow_flyer", True), "mr": ("multirotor", False), "mrp": ("multirotor", True), "f": ("folding", False),
-    "p": (None, True), "r": (None, True), "cw": (None, False), "ccw": (None, False), "bn": ("fpv", False),
-    "s": (None, False), "c": (None, False), "w": (None, False), "n": (None, False), "pusher": (None, True),
-    "tractor": (None, False), "cf": (None, False), "carbon": (None, False), "wood": (None, False),
-    "nylon": (None, False), "pair": (None, False),
-}  # fmt: skip
+# Letters behind the size, in any combination (APC: 20.5x13.5EPN, 9x4.5MRF-RH, 8x3.7SFR), the longer first.
+_CLASS_LETTERS = {"sf": "slow_flyer", "mr": "multirotor", "pn": "pattern", "bn": "fpv", "e": "electric", "f": "folding"}
+_LETTERS = re.compile(r"(?:sf|mr|pn|bn|cf|[efwncpsr])+(?:-[rl]h)?|[rl]h|ccw|cw", re.IGNORECASE)
+_PART = re.compile(r"sf|mr|pn|bn|cf|ccw|cw|[rl]h|[efwncpsr]", re.IGNORECASE)
+_VERSION = re.compile(r"(?<![A-Za-z])V\d\w*$|(?<=[A-Za-z])V\d\w*$", re.IGNORECASE)  # of a mould
 # Words before or behind the size; the first that matches.
 _WORDS: tuple[tuple[str, str], ...] = (
-    (r"slow\W?fl(?:y|i)(?:er)?\b|\bslo\W?fly|\bsf\b", "slow_flyer"), (r"multi\W?rotor|\bmr\b", "multirotor"),
-    (r"\bfold", "folding"),
+    (r"slow\W?fl(?:y|i)(?:er)?\b|\bslo\W?fly|\bsf\b|\bgws rs\b", "slow_flyer"), (r"multi\W?rotor|\bmr\b", "multirotor"),
+    (r"\bfold", "folding"), (r"\breversible\b", "reversible"), (r"\bpattern\b", "pattern"),
     (r"thin electric|\belectric\b|\be\W?prop", "electric"), (r"\bsport\b|\bglow\b", "sport"),
     (r"\b(?:hq|hqprop|gemfan|dalprop|dal|hurricane|ethix|azure|fpv)\b|bull\W?nose", "fpv"),
 )  # fmt: skip
@@ -33,18 +29,15 @@ _USUAL_RATIO = (0.2, 1.6)  # of those whose label has no point
 _EXPECTED = "diameter x pitch in inches, such as 8x5, 10x4.7SF, 8x5x3 or 5045"
 _INCHES = re.compile(r"(?<=[\d.])\s*(?:\"|\u201d|\u2033|''|in(?:ch(?:es)?)?\b\.?)(?=\s|[x\u00d7*]|$)", re.IGNORECASE)
 _MILLIMETRES = re.compile(r"(?P<D>\d+(?:\.\d+)?)\s*(?:mm)?\s*[x\u00d7*]\s*(?P<p>\d+(?:\.\d+)?)\s*mm\b", re.IGNORECASE)
-_BLADES = re.compile(r"[\s(,-]*\b(\d)\s*-?\s*(?:b|blades?|blatt|bl\u00e4tter|pales?|palas?)\b\)?", re.IGNORECASE)
+_BLADES = re.compile(
+    r"(?<![\w.])[\s(,-]*\b(\d)\s*-?\s*(?:bl?|blades?|blatt|bl\u00e4tter|pales?|palas?)\b\)?", re.IGNORECASE
+)
 """Number of blades in words, before or behind the size."""
-_NUMBER = r"(\d+(?:\.\d*)?|\.\d+)"
+_NUMBER = r"(\d{1,3}(?:\.\d*)?|\.\d+)(?!\d)"
 _SIZE = re.compile(
-    rf"(?P<before>(?:[^\d\s.,-][^\d,]*)?){_NUMBER}\s*[x×*]\s*{_NUMBER}(?:\s*[x×*-]\s*B?(?P<blades>\d+))?"
-    r"(?P<after>\s*[A-Za-z].*)?",
-    re.IGNORECASE,
+    rf"(?<![\d.,])(?<!^-){_NUMBER}\s*[x×*]\s*{_NUMBER}(?!,\d)(?:\s*[x×*-]\s*B?(?P<blades>\d+))?", re.IGNORECASE
 )
-_DIGITS = re.compile(
-    r"(?P<before>(?:[^\d\s.,-][^\d,]*)?)(?P<digits>\d{4,5})(?:\s*[x×*-]\s*B?(?P<blades>\d))?(?P<after>\s*[A-Za-z].*)?",
-    re.IGNORECASE,
-)
+_DIGITS = re.compile(r"(?<![\d.,])(?P<digits>\d{4,5})(?![\d.,])(?:\s*[x×*-]\s*B?(?P<blades>\d))?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -56,8 +49,9 @@ class Designation:
     pitch_in: float
     blades: int | None = None
     blade_class: str | None = None  # One of `BLADE_CLASSES`
-    maker: str = ""  # Words before the size, empty without any
+    maker: str = ""  # Words beside the size, empty without any
     reverse: bool = False  # Whether it is the pusher or counter-rotating one of a pair
+    width: int = 0  # Wide blades (1), narrow ones (-1), narrower ones (-2)
 
     @property
     def size(self) -> str:
@@ -90,6 +84,8 @@ def parse_designation(text: str) -> Designation:
     >>> found = parse_designation("APC 10x4.5MR")
     >>> found.maker, found.size, found.blade_class
     ('APC', '10x4.5', 'multirotor')
+    >>> [(p.blade_class, p.width) for p in map(parse_designation, ("20.5x10.5WPN", "8x3.7SFR", "APC E V2 12x6"))]
+    [('pattern', 1), ('reversible', 0), ('electric', 0)]
     >>> parse_designation("5045").size, parse_designation("1045").size, parse_designation("Gemfan 51466").size
     ('5x4.5', '10x4.5', '5.1x4.66x3')
     >>> parse_designation("10x100")
@@ -102,32 +98,88 @@ def parse_designation(text: str) -> Designation:
     plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
     in_words = _BLADES.search(plain)
     plain = _BLADES.sub(" ", plain, 1).strip() if in_words else plain
-    digits, sized = _DIGITS.fullmatch(plain), _SIZE.fullmatch(plain)
-    match = digits or sized
-    if match is None:
-        raise GeometryError([(where, "unreadable text", _EXPECTED, _meant(plain))])
-    before, after = match["before"].strip(" -_"), (match["after"] or "").strip(" -_")
+    sizes = list(_SIZE.finditer(plain))
+    named = sizes or list(_DIGITS.finditer(plain))
+    if len({match[0].casefold() for match in named}) != 1:
+        got = " and ".join(match[0] for match in named) + ", several sizes" if named else "unreadable text"
+        raise GeometryError([(where, got, _EXPECTED, "" if sizes else _meant(plain))])
+    match = named[-1]
+    before, after = plain[: named[0].start()].strip(" -_("), plain[match.end() :]
     count = re.search(r"-\s*B?(\d)$", after, re.IGNORECASE)  # 5152S-3
     after = after[: count.start()] if count else after
     told = match["blades"] or (count[1] if count else None) or (in_words[1] if in_words else None)
     blades = int(told) if told else None
-    if digits:
-        small = bool(blades or blade_class(f"{before} {after}") == "fpv")
-        D, pitch = _from_digits(digits["digits"], where, small)
+    suffix = _Suffix.read(after, where)
+    maker, letters = _maker(before)
+    kind = suffix.kind or letters.kind or blade_class(f"{maker} {suffix.words}")
+    if sizes:
+        D, pitch = _sized(match[1], match[2], where, blades)
+    else:
+        D, pitch = _from_digits(match["digits"], where, bool(blades or kind == "fpv"))
         if blades is None and D <= _FPV_LARGEST and (glued := re.search(r"(?:^|[\s-])([TQ])-?$", before)):
             blades = {"T": 3, "Q": 4}[glued[1]]  # T5143S: makers' mark of three blades
-        blades = 3 if blades is None and len(digits["digits"]) == 5 and D <= _FPV_LARGEST else blades
-    else:
-        D, pitch = _sized(match[2], match[3], where, blades)
-    suffix = re.sub(r"V\d\w*$", "", after, flags=re.IGNORECASE).strip().lower()  # the version of a mould
-    kind, reverse = _SUFFIXES.get(suffix, (blade_class(after), False))
-    if suffix not in _SUFFIXES and kind is None:
-        known = ", ".join(key.upper() for key in _SUFFIXES if key)
-        raise GeometryError([(where, f"a suffix {after!r}", f"one of {known}, or nothing", "Leave the letters out")])
-    kind = kind or blade_class(before)
-    if kind is None and D <= _FPV_LARGEST and (digits or (blades or 2) > 2):
+        blades = 3 if blades is None and len(match["digits"]) == 5 and D <= _FPV_LARGEST else blades
+    if kind is None and D <= _FPV_LARGEST and (not sizes or (blades or 2) > 2):
         kind = "fpv"
-    return Designation(D, pitch, blades, kind, before, reverse)
+    maker = f"{maker} {suffix.words}".strip()
+    return Designation(D, pitch, blades, kind, maker, suffix.reverse, suffix.width or letters.width)
+
+
+@dataclass(frozen=True)
+class _Suffix:
+    """Letters and words behind the size."""
+
+    kind: str | None = None
+    reverse: bool = False
+    width: int = 0
+    words: str = ""  # A maker or series behind the size
+
+    @staticmethod
+    def of(letters: str) -> _Suffix:
+        """Read letters such as ``WSF`` or ``MRF-RH``; an R behind others, or with a hand, is a reversible blade."""
+        parts = [part.lower() for part in _PART.findall(letters)]
+        kinds = [_CLASS_LETTERS[part] for part in parts if part in _CLASS_LETTERS]
+        both_ways = "r" in parts and (parts.index("r") > 0 or bool({"rh", "lh"} & set(parts)))
+        kind = "reversible" if both_ways else "pattern" if "pattern" in kinds else kinds[0] if kinds else None
+        reverse = bool({"p", "lh", "ccw"} & set(parts)) or ("r" in parts and not both_ways)
+        return _Suffix(kind, reverse and "ccw" not in parts, parts.count("w") - parts.count("n"))
+
+    @staticmethod
+    def read(after: str, where: str) -> _Suffix:
+        """Read what stands behind a size; letters glued to it that mean nothing are refused."""
+        found, words = _Suffix(), []
+        glued = bool(after) and (after[0].isalnum() or after[0] in "-_")
+        for i, word in enumerate(re.split(r"[\s(),]+", after.strip(" -_(),"))):
+            word = _VERSION.sub("", word)
+            if _LETTERS.fullmatch(word):
+                own = _Suffix.of(word)
+                found = _Suffix(found.kind or own.kind, found.reverse or own.reverse, found.width or own.width)
+            elif word.casefold() == "pusher":
+                found = _Suffix(found.kind, True, found.width)
+            elif word.casefold() in _MATERIALS:
+                continue
+            elif word and ((glued and i == 0) or not re.match(r"[^\W\d_]{3}|\W", word)) and blade_class(word) is None:
+                known = "E, SF, MR, PN, F, W, N, C, P, R, BN, CW, CCW and their combinations"
+                raise GeometryError([(where, f"a suffix {word!r}", f"{known}, or nothing", "Leave the letters out")])
+            else:
+                words.append(word)
+        return _Suffix(found.kind, found.reverse, found.width, " ".join(words))
+
+
+_MATERIALS = frozenset({"", "carbon", "wood", "nylon", "pair", "tractor", "prop", "props", "propeller", "blade"})
+
+
+def _maker(before: str) -> tuple[str, _Suffix]:
+    """Maker and what letters behind its name say: ``APC E V2`` is APC's electric."""
+    words, letters = before.replace("_", " ").split(), _Suffix()
+    while len(words) > 1:
+        word = _VERSION.sub("", words[-1])
+        if word and not re.fullmatch(r"E|SF|MR|PN|F|W|WE|WSF|N|C", word):
+            break
+        own = _Suffix.of(word)
+        letters = _Suffix(letters.kind or own.kind, False, letters.width or own.width)
+        words.pop()
+    return " ".join(words), letters
 
 
 def _sized(diameter: str, pitch: str, where: str, blades: int | None) -> tuple[float, float]:

@@ -13,6 +13,7 @@ import shutil
 import tempfile
 import zipfile
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from geometry.mesh import MeshModel, Options, build
 from geometry.rotor import Rotor
 from geometry.solid import Mesh
 
-FORMATS = ("stl", "step", "obj", "3mf", "openfoam")
+FORMATS = ("stl", "step", "flow", "obj", "3mf", "openfoam")
 UNITS = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
 SCHEMA = "geometry.export/1"
 MANIFEST = "manifest.json"
@@ -64,6 +65,8 @@ def export(
         for word in dict.fromkeys(formats):
             if word == "step":
                 files.append(_step(rotor, duct, work, name, unit, model, volumes))
+            elif word == "flow":
+                files.append(_flow(rotor, duct, work, name, unit, model))
             elif word == "openfoam":
                 files += _openfoam(model, work)
             elif word == "3mf":
@@ -242,9 +245,8 @@ def _step(
 ) -> dict[str, Any]:
     """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
     cq = needs("cadquery", "cad")
-    from cadquery.occ_impl.exporters.assembly import exportAssembly
 
-    from geometry.cad import Parts, assembly, printed_solid, solids
+    from geometry.cad import Parts, assembly, named_faces, printed_solid, solids
 
     options = model.options
     if options.printed is None:
@@ -255,10 +257,8 @@ def _step(
     volumes["volume_rotor_cad"] = parts.rotor_volume
     meshed = volumes["volume_rotor_mesh"]
     path = work / f"{name}.step"
-    export_parts: Any = exportAssembly
-    export_parts(assembly(parts, name), str(path), outputUnit=unit.upper())
-    text = path.read_text(encoding="utf-8", errors="replace")
-    path.write_text(re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1), encoding="utf-8")
+    faced = options.printed is None
+    _write_step(assembly(parts, name, rotor if faced else None, duct), path, unit)
     back: list[Any] = cq.importers.importStep(str(path)).solids().vals()
     total = sum(solid.Volume() for solid in back) * 1e-9
     faults = Faults()
@@ -270,8 +270,47 @@ def _step(
         faults.add(path.name, f"a rotor of {parts.rotor_volume:g} m^3", f"that of the mesh, {meshed:g} m^3")
     faults.check()
     surfaces = [{"name": key, "volume_m3": value} for key, value in parts.volumes.items() if value > 0.0]
+    faces = sorted({word for _, _, word in named_faces(parts, rotor, duct)}) if faced else []
     return {"path": path.name, "format": "step", "unit": unit, "watertight": True, "surfaces": surfaces,
-            "solids": [part for _, part, _ in parts.solids]}  # fmt: skip
+            "solids": [part for _, part, _ in parts.solids], "faces": faces}  # fmt: skip
+
+
+def _flow(
+    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel
+) -> dict[str, Any]:
+    """Air round the parts, in a box, its faces named; read back it must be one valid solid of the same volume."""
+    cq = needs("cadquery", "cad")
+
+    from geometry.cad import COLOURS, flow_domain, solids
+
+    if model.options.printed is not None:
+        raise GeometryError([("flow", "a printed rotor", "the aerodynamic shape", "Leave out the options of printing")])
+    air, faces = flow_domain(solids(rotor, duct, model.options), rotor, duct)
+    whole = cq.Assembly(name=name)
+    whole.add(air, name="flow", color=cq.Color(*COLOURS["flow"]))
+    for face, word in faces:
+        whole.objects["flow"].addSubshape(face, name=word, layer=word)
+    path = work / f"{name}_flow.step"
+    _write_step(whole, path, unit)
+    back = cq.importers.importStep(str(path)).solids().vals()
+    if len(back) != 1 or not back[0].isValid() or abs(back[0].Volume() / air.Volume() - 1.0) > 1e-4:
+        got = f"{len(back)} solids when read back"
+        raise GeometryError([(path.name, got, "one valid solid of the same volume", "")])
+    return {"path": path.name, "format": "flow", "unit": unit, "watertight": True,
+            "surfaces": [{"name": "flow", "volume_m3": air.Volume() * 1e-9}], "solids": ["flow"],
+            "faces": sorted({word for _, word in faces})}  # fmt: skip
+
+
+def _write_step(whole: Any, path: Path, unit: str) -> None:
+    """Write an assembly with the names of its faces; the same shape gives the same file."""
+    from cadquery.occ_impl.exporters.assembly import exportStepMeta
+
+    export_parts: Any = exportStepMeta
+    export_parts(whole, str(path), outputUnit=unit.upper())
+    text = path.read_text(encoding="utf-8", errors="replace")
+    text = re.sub(r"\d{4}-\d\d-\d\dT[\d:]{8}", "2000-01-01T00:00:00", text, count=1)
+    mark, number = "NEXT_ASSEMBLY_USAGE_OCCURRENCE('", count(1)  # the kernel counts on from file to file
+    path.write_text(re.sub(rf"{re.escape(mark)}\d+", lambda _: f"{mark}{next(number)}", text), encoding="utf-8")
 
 
 def _said_unit(path: Path) -> str | None:

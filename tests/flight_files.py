@@ -64,6 +64,14 @@ class Hover:
         command = command * (1.0 + 0.01 * slow @ A / 2.0 + 0.004 * rng.normal(size=command.shape))
         return command, self.full_rpm * np.sqrt(command / self.battery)
 
+    def demands(self, t: Array, gains: tuple[float, float, float]) -> Array:
+        """Roll, pitch, yaw and thrust that a mixer of these gains turns into the commands of four rotors, (N, 4)."""
+        placed = layout_of(self.layout, self.rotors)
+        assert placed is not None
+        rows = effect_matrix(placed)
+        rows = rows / np.abs(rows).max(axis=1, keepdims=True) * np.array([*gains, 1.0])[:, None]
+        return np.asarray(self.drives(t)[0] @ np.linalg.inv(rows), dtype=float)
+
     def acceleration(self, t: Array) -> Array:
         """Specific force, z up, (N, 3): noise, and the rotor that shakes."""
         rng = np.random.default_rng(self.seed + 1000)
@@ -77,8 +85,13 @@ class Hover:
         return out
 
 
-def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: tuple[int, int] = (1, 1)) -> bytes:
-    """A DataFlash log: FMT, PARM, RCOU, ESC, BAT, ATT, XKF1, IMU, and ISBH with ISBD."""
+def dataflash(
+    flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: tuple[int, int] = (1, 1), motors: bool = True
+) -> bytes:
+    """A DataFlash log: FMT, PARM, RCOU, ESC, BAT, ATT, XKF1, IMU, and ISBH with ISBD.
+
+    Without motors RATE, VIBE and GPS stand in the place of RCOU and ESC.
+    """
     letters = {"Q": "Q", "H": "H", "B": "B", "f": "f", "c": "h", "N": "16s", "a": "64s", "h": "h", "I": "I"}
     kinds: dict[str, tuple[int, struct.Struct]] = {}
     out = bytearray()
@@ -105,6 +118,9 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
     fmt(135, "IMU", "QBffffff", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ")
     fmt(136, "ISBH", "QHBBHHQf", "TimeUS,N,type,instance,mul,smp_cnt,SampleUS,smp_rate")
     fmt(137, "ISBD", "QHHaaa", "TimeUS,N,seqno,x,y,z")
+    fmt(138, "RATE", "Qffffffffffff", "TimeUS,RDes,R,ROut,PDes,P,POut,YDes,Y,YOut,ADes,A,AOut")
+    fmt(139, "VIBE", "QBfffI", "TimeUS,IMU,VibeX,VibeY,VibeZ,Clip")
+    fmt(140, "GPS", "QBIH", "TimeUS,I,GMS,GWk")
     B = flight.rotors
     params = {"FRAME_CLASS": frame[0], "FRAME_TYPE": frame[1], "MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}
     for name, value in (params | {f"SERVO{i + 1}_FUNCTION": 33 + i for i in range(B)}).items():
@@ -112,8 +128,18 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
     t = np.arange(0.0, flight.seconds, 0.02)
     command, rpm = flight.drives(t)
     height = np.clip(t - 1.0, 0.0, 3.0)
+    asked = None if motors else flight.demands(t, (0.5, 0.5, 0.5))
+    if asked is not None:
+        put("GPS", 60_000_000, 0, 3 * 86_400_000, 2311)
     for k, s in enumerate(t):
         us = round(1e6 * s) + 60_000_000
+        if asked is not None:
+            r, p, y, a = asked[k] * (height[k] > 0.0)
+            put("RATE", us, 0.0, 0.0, r, 0.0, 0.0, p, 0.0, 0.0, y, 0.0, 0.0, a)
+            put("VIBE", us, 0, 3.0, 4.0, 5.0, 0)
+            put("XKF1", us, 0, 0.0, 0.0, 0.0, 0.0, 0.0, -height[k])
+            put("ATT", us, 0, 0, 0, 0, 0, 0, 0.0)
+            continue
         pulses = [round(1000.0 + 1000.0 * c) if height[k] > 0.0 else 1000 for c in command[k]] + [0] * (14 - B)
         put("RCOU", us, *pulses)
         put("XKF1", us, 0, 0.0, 0.0, 0.0, 0.0, 0.0, -height[k])
@@ -138,11 +164,13 @@ def dataflash(flight: Hover, imu_hz: float = 50.0, bursts: bool = False, frame: 
     return bytes(out)
 
 
-def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0) -> bytes:
+def ulog(
+    flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0, motors: bool = True
+) -> bytes:
     """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery.
 
     With the number of an airframe it is one of before the allocation: pulse widths, and no speeds; below zero, of the
-    allocation, with motor 1 at the last output.
+    allocation, with motor 1 at the last output. Without motors actuator_controls_0 stands in their place.
     """
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
 
@@ -154,6 +182,7 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
     shapes = {
         "actuator_motors": "uint64_t timestamp;float[12] control;",
         "actuator_outputs": "uint64_t timestamp;uint32_t noutputs;float[16] output;",
+        "actuator_controls_0": "uint64_t timestamp;float[8] control;",
         "esc_status": "uint64_t timestamp;esc_report[8] esc;",
         "esc_report": "int32_t esc_rpm;float esc_current;uint8_t actuator_function;",
         "sensor_combined": "uint64_t timestamp;float[3] gyro_rad;float[3] accelerometer_m_s2;",
@@ -189,18 +218,20 @@ def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int
     t = np.arange(0.0, flight.seconds, 0.02)
     command, rpm = flight.drives(t)
     height = np.clip(t - 1.0, 0.0, 3.0)
-    gap = [float("nan")] * (12 - B)
+    gap, asked = [float("nan")] * (12 - B), None if motors else flight.demands(t, (0.5**0.5, 0.5**0.5, 1.0))
     for k, s in enumerate(t):
         us = round(1e6 * s) + 1_000_000
         there = command[k] if height[k] > 0.0 else 0.0 * command[k]
-        if airframe:
+        if asked is not None:
+            put("actuator_controls_0", "Q8f", us, *(asked[k] * (height[k] > 0.0)), 0.0, 0.0, 0.0, 0.0)
+        elif airframe:
             pulses = 1075.0 + 875.0 * there[:: np.sign(airframe)]
             put("actuator_outputs", "QI16f", us, 16, *pulses, *[900.0] * (16 - B))
         else:
             put("actuator_motors", "Q12f", us, *there, *gap)
         put("vehicle_attitude", "Q4f", us, 1.0, 0.0, 0.0, 0.0)
         put("vehicle_local_position", "Q6f", us, 0.0, 0.0, -height[k], 0.0, 0.0, 0.0)
-        if k % 5 == 0 and not airframe:
+        if k % 5 == 0 and not airframe and motors:
             order = list(reversed(range(B)))  # the controllers are wired the other way round
             escs = [v for i in order for v in (int(rpm[k, i]), 5.0, 101 + i)] + [0, 0.0, 0] * (8 - B)
             put("esc_status", "Q" + "ifB" * 8, us, *escs)

@@ -118,3 +118,20 @@ def test_a_cache_hit_needs_no_neuralfoil(own_cache: Path) -> None:
     env = os.environ | {"BEMT_CACHE": str(own_cache), "PYTHONPATH": str(root)}
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True, cwd=root)
     assert done.stdout.strip() == "[]"
+
+
+def test_without_a_folder_that_can_be_written_the_kernel_still_compiles_and_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    from numba.core import caching
+
+    from bemt.physics.bem import vecmath
+
+    def read_only(_: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(caching._CacheLocator, "ensure_cache_path", read_only)
+    vecmath._say_unkept.cache_clear()
+    entries = [vecmath.njit(lambda x, n=n: x + n) for n in (1.0, 2.0)]
+    assert [vecmath.ready(entry)(1.0) for entry in entries] == [2.0, 3.0]
+    assert [r.getMessage() for r in caplog.records if "NUMBA_CACHE_DIR" in r.getMessage()] == [caplog.messages[0]]

@@ -118,7 +118,7 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
     at = found.over_rpm
     words = propagate(case, rpm, V, bands=False).points.flags
     assert all(any(kind in told for told in found.flags) for f in words for kind in f) or len(words) > 1
-    return [(at["thrust_N"][i], at.u["thrust_N"][i], at["torque_Nm"][i], at.u["torque_Nm"][i], words[i])
+    return [(at.thrust_N[i], at.u["thrust_N"][i], at.torque_Nm[i], at.u["torque_Nm"][i], words[i])
             for i in range(len(words))]  # fmt: skip
 
 

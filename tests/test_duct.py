@@ -14,6 +14,7 @@ is 2 to 8 % too large here, see docs/duct.md.
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ from bemt.physics.bem.model import Model, flow_of, respond
 from bemt.physics.effects.oblique_inflow import ObliqueInflow
 from bemt.physics.effects.tip_gap import TipGap
 from bemt.rotors.case import load_case
+from bemt.rotors.case.load import case_of
 from bemt.rotors.case.prepare import duct_unknowns, prepare_case
 from bemt.rotors.case.propagate import propagate
 from geometry.duct import Duct
@@ -246,6 +248,74 @@ def test_the_ds30_beside_our_cfd_that_settled(project: Path) -> None:
     p = prepare_case(case).solve(case.rpm, 0.0, case.air())
     assert p.thrust_N[0] == pytest.approx(np.mean([float(r["thrust_N"]) for r in found]), rel=0.08)
     assert p.torque_Nm[0] == pytest.approx(np.mean([float(r["torque_Nm"]) for r in found]), rel=0.08)
+
+
+ALIKE = {  # ours, of alike(): mass flow [kg/s] and share of the duct at DFDC's thrust of the rotor, J 0 to 0.55
+    "F1": ([1.2135, 1.2218, 1.2509, 1.3088, 1.3918], [0.519, 0.415, 0.303, 0.182, 0.077]),
+    "F2": ([0.2889, 0.2902, 0.2934, 0.2989, 0.3063], [0.493, 0.411, 0.319, 0.213, 0.110]),
+    "F3": ([0.5701, 0.5732, 0.5868, 0.6145, 0.6547], [0.648, 0.554, 0.454, 0.348, 0.258]),
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_the_duct_of_three_fans_is_that_of_dfdc_where_neither_has_losses(shared_data: Path, name: str) -> None:
+    found = fans.alike(shared_data, name)
+    assert found.known.J == pytest.approx([0.0, 0.12, 0.25, 0.4, 0.55])
+    assert found.ours == pytest.approx(ALIKE[name][0], rel=1e-3)
+    assert found.share == pytest.approx(ALIKE[name][1], abs=1e-3)
+    assert np.max(np.abs(found.ours / found.flow - 1.0)) < 0.02
+    assert np.max(np.abs(found.share - found.known.share)) < 0.02
+
+
+@pytest.mark.parametrize("open_body", [False, True], ids=["as stated", "exit body not stated"])
+@pytest.mark.parametrize(("name", "folder"), [("F1", "002"), ("F2", "004"), ("F3", "011")])
+def test_bands_of_a_fan_hold_what_dfdc_gives_it(shared_data: Path, name: str, folder: str, open_body: bool) -> None:
+    """As a user states it: NACA name, nominal gap, losses that DFDC does not have."""
+    text = (shared_data / "concealed_2" / folder / "case.toml").read_text()
+    if open_body:
+        text = "\n".join(line for line in text.splitlines() if not line.startswith("exit_hub"))
+    case = case_of(text, shared_data / "concealed_2" / folder)
+    table = np.array(json.loads((shared_data / "concealed_2" / "tables3.json").read_text())[f"{name}:nom"])
+    rpm, J, CT, duct, CQ = table[np.isclose(table[:, 0], np.unique(table[:, 0])[1])][:, :5].T
+    p = propagate(case, rpm, J * rpm / 60.0 * case.diameter_m).points
+    assert np.max(np.abs(p.CT - CT) / p.u["CT"]) < 2.0
+    assert np.max(np.abs(p.CP - 2.0 * np.pi * CQ) / p.u["CP"]) < 2.0
+    assert np.max(np.abs(p.duct_share - duct / CT) / p.u["duct_share"]) < 2.7  # no losses at all: its ends of ranges
+    assert p.u["CT"][0] < 0.25 * p.CT[0]
+
+
+UNSTATED = {
+    "duct.exit_hub_diameter_mm": (0.0, 66.0), "duct.lip_radius_mm": (0.0, 30.0), "duct.rotor_position_mm": (20.0, 78.0),
+    "duct.lip_loss": (0.0, 0.16), "duct.wall_friction": (0.003, 0.007), "duct.gap_loss": (1.0, 2.0),
+}  # fmt: skip
+"""Keys of a duct that a case may leave out, and what they may be for F1."""
+
+
+@pytest.mark.parametrize("key", UNSTATED)
+def test_what_a_case_does_not_say_of_its_duct_lies_in_its_bands(f1_case: Any, tmp_path: Path, key: str) -> None:
+    out = (key.removeprefix("duct."), "lip_loss")
+    text = "\n".join(line for line in fans.F1.splitlines() if not line.startswith(out))
+    tables = {name: (f1_case.case.folder / f"{name}.csv").read_text() for name in ("stations", "polar")}
+    case = fans.made(tmp_path, text.replace("tip_gap_mm = 0", "tip_gap_mm = 1.5"), **tables)
+    assert key in {item.key for item in duct_unknowns(case)}
+    V = f1_case.airspeed(np.array([0.0, 0.3]))
+    found = propagate(case, case.rpm, V).points
+    for value in UNSTATED[key]:
+        moved = prepare_case(case.replaced({key: value})).solve(case.rpm, V, case.air())
+        for name in ("thrust_N", "torque_Nm", "duct_share"):
+            assert np.all(
+                np.abs(moved[name] - found[name]) <= 2.5 * found.u[name]
+            )  # ends of a range that is not centred
+        changed = case.replaced({key: value})
+        assert key not in {item.key for item in duct_unknowns(changed)}
+
+
+def test_the_share_of_the_balance_is_that_of_the_solver_without_swirl(f1: Model) -> None:
+    air = Air.from_density(1.225)
+    p = f1.solve(4898.98, np.array([0.0, 5.0, 10.0]), air)
+    assert f1.duct is not None
+    found = f1.duct.share_at(p.thrust_N / air.rho, p.airspeed_m_s)
+    assert found == pytest.approx(p.duct_share, abs=0.01)
 
 
 # Losses that a case may state ---------------------------------------------------------------------------------------

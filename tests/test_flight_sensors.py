@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flight_files import Hover, dataflash
+from flight_files import Hover, dataflash, ulog
 
 from bemt.base.errors import InputError
 from bemt.tools.flight import read as reading
@@ -101,7 +101,8 @@ def test_recorded_sensors_at_fault(shared_data: Path, name: str) -> None:
     """Named with the ratio; thrust constant within 3 % of the sound flights, mass within 4 %, no motor accused."""
     folder, (motor, mass) = shared_data / "flight_logs", IMRC[name]
     stem = name.rpartition("_")[0]
-    files = [*(folder / "imrc").glob(f"{stem}_*"), *folder.glob(f"cf21_{stem.replace('payload', 'brushless_payload')}_*")]
+    others = folder.glob(f"cf21_{stem.replace('payload', 'brushless_payload')}_*")
+    files = [*(folder / "imrc").glob(f"{stem}_*"), *others]
     sound = [p for p in files if p.stem not in IMRC and p.suffix == ".usdlog"]
     answer = fly(folder / "imrc" / f"{name}.usdlog", mass_kg=mass, healthy=sound, healthy_mass_kg=mass).flights[0]
     (sensor,) = answer.log.sensors
@@ -231,6 +232,36 @@ def test_commands_of_a_mixer_balance_its_demands(layout: str) -> None:
         assert loads[axis] > 0.05 and np.allclose(np.delete(loads, axis), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["ardupilot", "px4", "crazyflie"])
+def test_demands_stand_in_for_motors(kind: str, tmp_path: Path) -> None:
+    """The commands are those of the mixer, the damaged rotor is found, and the log says where they come from."""
+    pytest.importorskip("pymavlink")
+    pytest.importorskip("pyulog")
+
+    def written(flight: Hover) -> FlightLog:
+        file = tmp_path / "log"
+        if kind == "crazyflie":
+            t = np.arange(0.0, flight.seconds, 0.02)
+            heads = ["timestamp", *(f"controller.cmd_{a}" for a in ("roll", "pitch", "yaw", "thrust"))]
+            rows = np.column_stack([1000.0 * t, 65535.0 * flight.demands(t, (0.5, 0.5, 1.0))])
+            file.write_text("\n".join([",".join(heads), *(",".join(map(str, r)) for r in rows)]))
+        else:
+            file.write_bytes(dataflash(flight, motors=False) if kind == "ardupilot" else ulog(flight, motors=False))
+        return read_log(file)
+
+    layout = "crazyflie" if kind == "crazyflie" else "quad-x"
+    flights = [Hover(layout, seconds=12.0, seed=k) for k in range(4)]
+    cut = written(Hover(layout, seconds=12.0, seed=9, loss=((2, 0.25),)))
+    calm = [written(f) for f in flights]
+    truth = flights[0].drives(np.arange(0.0, 12.0, 0.02))[0]
+    assert calm[0].command is not None and calm[0].mixed and calm[0].rpm is None
+    np.testing.assert_allclose(calm[0].command[-1], truth[-1], rtol=1e-3)
+    got = answer_on(cut, calm, day="same")
+    assert got.judged.said.effects[0] == "damaged blade, motor 3" and got.demand
+    if kind == "ardupilot":
+        assert cut.date == "2024-04-24" and got.vibration.rms == (3.0, 4.0, 5.0) and got.vibration.stated
+
+
 def test_recorded_logs_without_motors(shared_data: Path) -> None:
     """They say what they show, with a number, and no rotors are counted as none."""
     pytest.importorskip("pyulog")
@@ -255,8 +286,8 @@ def test_curve_of_an_autopilot(expo: float) -> None:
     rpm = 9000.0 * np.sqrt(thrust) * (1.0 + 0.002 * rng.normal(size=x.shape))
     log = FlightLog("f", "PX4 ULog", t, command=x, rpm=rpm, layout="px4-x")
     got = thrust_curve(log)
-    assert abs(got["THR_MDL_FAC"].value - expo) < got["THR_MDL_FAC"].half + 0.01 and got["THR_MDL_FAC"].half < 0.1
-    assert abs(got["MPC_THR_HOVER"].value - thrust.mean()) < got["MPC_THR_HOVER"].half + 0.005
+    assert abs(got["THR_MDL_FAC"].value - expo) < 0.03 and 0.1 < got["THR_MDL_FAC"].half < 0.5
+    assert abs(got["MPC_THR_HOVER"].value - thrust.mean()) < 0.01 + got["MPC_THR_HOVER"].half / 4.0
 
 
 @pytest.mark.parametrize("heads", ["t_s,rpm1,rpm2,rpm3,rpm4", "time,motor_1_rpm,motor_2_rpm,motor_3_rpm,motor_4_rpm"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -267,6 +268,7 @@ except ImportError as error:  # pragma: no cover - where the system's graphics l
     pytest.skip(f"cadquery cannot be loaded (it needs libGL, libX11 and libexpat): {error}", allow_module_level=True)
 
 from geometry.cad import planar_sections, solids, tessellate  # noqa: E402
+from geometry.export import export  # noqa: E402
 
 
 @pytest.mark.parametrize("name", ["prop_8x5", pytest.param("prop_10x5", marks=pytest.mark.slow),
@@ -314,3 +316,52 @@ def test_what_makes_no_cad_solid_is_refused_with_the_reason() -> None:
                      anchors=naca4(0.0, 0.4, 0.1))  # fmt: skip
     with pytest.raises(GeometryError, match="round the shaft"):
         solids(Rotor(wide, 2), options=Options())
+
+
+@pytest.fixture(scope="module")
+def small_fan(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, set[str]]]:
+    """STEP of the parts and of the air around a fan of two blades and two vanes, with the names of their faces."""
+    rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
+    duct = around(rotor, 0.07, 0.0008, 0.005, exit_area_ratio=0.95, exit_hub_radius=0.01, stator=Stator(2, 0.02))
+    folder = tmp_path_factory.mktemp("flow")
+    made = export(rotor, duct, folder, ["step", "flow"], name="fan")
+    return folder, {item["format"]: set(item["faces"]) for item in made["files"]}
+
+
+WALLS = {"blade_1", "blade_2", "blade_1_tip", "blade_2_tip", "hub", "duct_lip", "duct_inner", "duct_outer", "duct_exit",
+         "centre_body", "vane_1", "vane_2"}  # fmt: skip
+
+
+def test_every_face_of_a_step_has_the_name_of_its_boundary(small_fan: tuple[Path, dict[str, set[str]]]) -> None:
+    folder, names = small_fan
+    assert names["step"] == WALLS | {"blade_1_root", "blade_2_root"}
+    assert names["flow"] == WALLS | {"far_field_inlet", "far_field_outlet", "far_field_side"}
+    for file, expected in (("fan.step", names["step"]), ("fan_flow.step", names["flow"])):
+        written = re.findall(r"ADVANCED_FACE\('([^']*)'", (folder / file).read_text())
+        assert set(written) == expected
+    assert written.count("far_field_side") == 4 and written.count("far_field_inlet") == 1
+
+
+def test_a_mesher_picks_the_boundaries_by_name(small_fan: tuple[Path, dict[str, set[str]]]) -> None:
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+        gmsh.open(str(small_fan[0] / "fan_flow.step"))
+        found: dict[str, list[int]] = {}
+        for dim, tag in gmsh.model.getEntities(2):
+            found.setdefault(gmsh.model.getEntityName(dim, tag).split(" & & ")[-1], []).append(tag)
+        assert set(found) == small_fan[1]["flow"]
+        area = {name: sum(gmsh.model.occ.getMass(2, tag) for tag in tags) for name, tags in found.items()}
+        assert area["blade_1"] == pytest.approx(area["blade_2"], rel=1e-3)
+        assert area["far_field_inlet"] == pytest.approx(1000.0**2, rel=1e-6)  # ten diameters wide [mm2]
+        for name, tags in found.items():
+            gmsh.model.addPhysicalGroup(2, tags, name=name)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 100.0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 12)
+        gmsh.model.mesh.generate(2)
+        for tags in found.values():
+            assert all(gmsh.model.mesh.getElements(2, tag)[1][0].size for tag in tags)
+    finally:
+        gmsh.finalize()

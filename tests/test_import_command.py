@@ -115,7 +115,7 @@ def test_a_refused_file_is_2_and_the_others_are_shown(
     code, found = call(capsys, bad, good, good.parent / "absent.out")
     assert code == 2
     assert "an OpenFOAM dictionary or field" in found["files"][0]["error"] and found["files"][1]["error"] is None
-    assert "absent.out: got No such file" in found["files"][2]["error"] and found["files"][2]["channels"] == {}
+    assert "absent.out: got no such file" in found["files"][2]["error"] and found["files"][2]["channels"] == {}
     assert main(["import", str(good)]) == 0
     text = capsys.readouterr().out
     assert "fluent_report (cfd), 300 rows" in text and "  ! report files state no units" in text

@@ -65,6 +65,7 @@ CONTRACTS = {("bemt.tools.cfd.openfoam.target", "bemt.tools.exports.base")}
 MAY: dict[str, set[str]] = {
     "bemt.app.*": {"print", "files", "environment", "clock"},  # and nothing else prints
     "bemt.base.cache": {"files", "environment"},
+    "bemt.base.packed": {"files"},
     "bemt.base.checkout": {"files"},
     "bemt.base.folders": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -69,3 +72,27 @@ def test_it_is_short() -> None:
     lines = [line for name in ("prandtl", "mass_flow", "solve_plain")
              for line in inspect.getsource(getattr(plain, name)).splitlines()]  # fmt: skip
     assert len(lines) <= 100
+
+
+def test_the_worked_element_of_the_theory_page_is_that_of_the_plain_method(project: Path) -> None:
+    """Every number of the section follows from docs/element.py, to its digits."""
+    spec = importlib.util.spec_from_file_location("docs_element", project / "docs" / "element.py")
+    assert spec is not None and spec.loader is not None
+    element = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(element)
+    n = element.numbers()
+    page = (project / "docs" / "theory.md").read_text(encoding="utf-8")
+    page = " ".join(page[page.index("**Worked number.**") : page.index("## The residual of one")].split())
+    for pattern, value in {
+        r"= ([\d.]+) deg\. Without": n["beta_deg"], r"= ([\d.]+) deg\. 2\.": n["onset_deg"],
+        r"`phi` = ([\d.]+) deg": n["phi_deg"], r"`alpha` = ([\d.]+) deg": n["alpha_deg"], r"`cl` = ([\d.]+)": n["cl"],
+        r"W = ([\d.]+) m/s": n["W"], r"`w = W sin\(phi\)` = ([\d.]+) m/s": n["w"], r"factor is F = ([\d.]+)\. ": n["F"],
+        r"0\.457 = ([\d.]+) N": n["dT"], r"3\.04 = ([\d.]+) N": n["dT"], r"torque is ([\d.]+) mN": n["dQ_mNm"],
+        r"efficiency of the element ([\d.]+)\. ": n["eta"], r"\(1\) ([\d.]+) N": n["dT_rest"],
+        r"No: ([\d.]+) N": n["dT_three"], r"N, ([\d.]+) times": n["dT_three"] / n["dT"],
+        r"\(3\) ([\d.]+) m/s": n["V_none"],
+    }.items():  # fmt: skip
+        found = re.search(pattern, page)
+        assert found is not None, pattern
+        digits = len(found[1].partition(".")[2])
+        assert float(found[1]) == pytest.approx(value, abs=0.51 * 10.0**-digits), pattern

@@ -323,7 +323,8 @@ def test_stations_are_the_same_blade_however_they_are_written(text: str, tmp_pat
     [
         (_table("r/R,c/R,beta_deg", scales=(1.0, 8.0, 1.0)), "tip radius"),  # 1.4 R wide: a chord in another unit
         (_table("r/R,c/R,beta_deg", scales=(1.0, 1.0, np.pi / 180.0)), "radians"),
-        (_table("r/R,c/R,twist_deg"), "beta_deg"), (_table("r/R,c/R,beta"), "beta_deg"),
+        (_table("r/R,c/R,twist_deg"), "beta_deg"),
+        (_table("r/R,c/R,beta", scales=(1.0, 1.0, np.pi / 180.0)), "radians"),
         (_table("r_mm,chord_mm,beta_deg", scales=(5.0, 5.0, 1.0)), "tip radius 127 mm"),
         (_table("r/R,c/R,c/D,beta_deg"), "one of them"),
     ],

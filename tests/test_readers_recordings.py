@@ -961,7 +961,7 @@ def test_a_point_at_which_the_vendors_code_failed_is_a_flagged_row(write: Write)
     [
         ("Thrust - gf", "thrust_N", "N"), ("Torque - N*m", "torque_Nm", "Nm"), ("Thrust, N", "thrust_N", "N"),
         ("Thrust in N", "thrust_N", "N"), ("thrust kgf", "thrust_N", "N"), ("Thrust / N", "thrust_N", "N"),
-        ("I/A", "I_A", "A"), ("U/V", "U_V", "V"), ("T/K", "T_K", "K"), ("P/W", "P_W", "W"),
+        ("I/A", "I_A", "A"), ("U/V", "voltage_V", "V"), ("T/K", "T_K", "K"), ("P/W", "P_W", "W"),
         ("Torque (N.m)", "torque_Nm", "Nm"),
         ("Thrust (Newtons)", "thrust_N", "N"), ("Torque (N-mm)", "torque_Nm", "Nm"), ("Temp (ºC)", "temp_K", "K"),
         ("Omega [rad s^-1]", "omega_rad_s", "rad_s"), ("ESC signal (Âµs)", "pulse_width_s", "s"),
@@ -1276,3 +1276,51 @@ def test_a_flight_log_is_read_whole_or_refused(tmp_path: Path, version: int) -> 
     path.write_bytes(flight()[:40])
     with pytest.raises(InputError):
         import_file(path)
+
+
+STANDS = {  # a table of each stand whose headings are known, {} the unit of a column
+    "coaxial_stand": ("PWM Left [us],PWM Right [us],Thrust Left [g],Thrust Right [g],Torque Left [{}],Speed Left [rpm],"
+                      "Speed Right [rpm]", "1500,1000,100,0,0.{k}5,5000,0",
+                      "torque_Nm", {"Nm": 1.0, "Nmm": 1e-3, "gf cm": 9.80665e-5}, "V"),
+    "jmajew": ("Motor Output,ESCT RPM,Thrust [{}],Torque [G cm],RPM [1/min]", "1200,400,1.{k},2.5,5714",
+               "thrust_N", {"G": 9.80665e-3, "N": 1.0, "kgf": 9.80665}, "A"),
+    "crazyflie_bench": ("pwm,vbat[{}],rpm1,rpm2,rpm3,rpm4,weight[g]", "30000,3.{k},9000,9000,9000,9000,20",
+                        "voltage_V", {"V": 1.0, "mV": 1e-3}, "N"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("stand", STANDS)
+def test_a_unit_in_the_heading_of_a_stand_is_converted_or_refused(stand: str, write: Write) -> None:
+    head, row, channel, factors, wrong = STANDS[stand]
+    rows = "".join(row.format(k=k) + "\n" for k in range(1, 8))
+
+    def column(unit: str) -> np.ndarray:
+        got = importers.read(write(f"{head.format(unit)}\n{rows}", f"{stand}.csv"))
+        assert got.provenance["format"] == stand
+        return got[channel]
+
+    first = column(next(iter(factors)))
+    for unit, factor in factors.items():
+        assert np.allclose(column(unit) / factor, first / next(iter(factors.values())), rtol=1e-9, equal_nan=True), unit
+    with pytest.raises(InputError, match=f"{wrong}.*a unit such as"):
+        column(wrong)
+
+
+@pytest.mark.parametrize(
+    ("head", "cell", "channel", "value"),
+    [("Efficiency (kgf/W)", "0.008", "efficiency_N_W", 0.008 * 9.80665), ("Prop speed (Hz)", "80", "rpm", 4800.0),
+     ("Propeller speed (1/s)", "80", "rpm", 4800.0)],
+)  # fmt: skip
+def test_units_of_headings_that_a_mutant_changed(
+    head: str, cell: str, channel: str, value: float, write: Write
+) -> None:
+    read = importers.read(write(f"{head},x_A\n" + f"{cell},1\n" * 3))
+    got = {**read.values, **named(read).values}
+    assert np.allclose(got[channel], value, rtol=1e-6)
+
+
+def test_loads_before_the_tare_are_left_out(write: Write) -> None:
+    head, row, channel, *_ = STANDS["coaxial_stand"]
+    first = "1000,1000,3,3,0.3,10,10\n"
+    got = importers.read(write(head.format("Nm") + "\n" + first + "".join(row.format(k=k) + "\n" for k in range(1, 6))))
+    assert np.isnan(got[channel][0]) and np.isfinite(got[channel][1:]).all() and said(got, "before the tare")

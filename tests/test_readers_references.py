@@ -146,7 +146,7 @@ def test_header_faults(tmp_path: Path, head: str, words: str) -> None:
 def test_empty_and_missing_files(tmp_path: Path) -> None:
     assert "no rows" in faults(save(tmp_path))[0]
     assert "an empty file" in faults(save(tmp_path, head=""))[0]
-    assert "No such file" in faults(tmp_path / "none.csv")[0]
+    assert "no such file" in faults(tmp_path / "none.csv")[0]
 
 
 def test_series_by_kind_and_source(tmp_path: Path) -> None:

@@ -246,7 +246,7 @@ def test_stations_as_people_write_them(name: str, tmp_path: Path) -> None:
 
 
 REFUSED: dict[str, tuple[str, str, Callable[[str], str]]] = {
-    "no units": ("r,c,beta\n" + _rows(X * TIP * 1e3, C * TIP * 1e3, BETA), r"r \(mm\), c \(mm\), beta \(deg\)",
+    "no units": ("r,c,beta\n" + _rows(X * TIP * 1e3, C * TIP * 1e3, BETA), r"r \(mm\), c \(mm\)",
                  lambda t: t.replace("r,c,beta", "r (mm),c (mm),beta (deg)")),
     "twist": ("r/R,c/R,Twist (deg)\n" + _rows(X, C, BETA), "beta_deg", lambda t: t.replace("Twist (deg)", "beta_deg")),
     "chord over D called c/R": ("r/R,c/R,beta (deg)\n" + _rows(X, 10 * C, BETA), "chord_over_D|tip radius",

@@ -24,7 +24,7 @@ ORDER = (
 def homes() -> dict[str, str]:
     """Where each action is, ``module:function``, by the name of its command."""
     own = {name: f"{wing}.actions:{name.replace('-', '_')}" for name, wing in _HOME.items()}
-    own["import"] = "bemt.judge.import_files:import_"
+    own |= {"import": "bemt.judge.import_files:import_", "rotors": "bemt.rotors.actions:measured_rotors"}
     return own | {name.replace("_", "-"): where for name, where in offered("ACTIONS").items()}
 
 
@@ -35,9 +35,9 @@ def find(name: str) -> Callable[..., Any]:
 
 
 def python_name(command: str) -> str:
-    """Name of an action in the library.
+    """Name of an action in the library, that of its function.
 
-    >>> python_name("calibrate-rotor"), python_name("import")
-    ('calibrate_rotor', 'import_')
+    >>> python_name("calibrate-rotor"), python_name("import"), python_name("rotors")
+    ('calibrate_rotor', 'import_', 'measured_rotors')
     """
-    return "import_" if command == "import" else command.replace("-", "_")
+    return homes()[command].rpartition(":")[2]

@@ -7,7 +7,7 @@ left out of the document while it is None.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
 from types import NoneType, UnionType
@@ -81,14 +81,16 @@ def rows_of(kind: type[T], found: Any, lenient: bool = False) -> tuple[T, ...]:
         if lenient:
             return ()
         raise TypeError(f"got {type(found).__name__}; expected a list")
-    out = []
-    for item in found:
+    return tuple(item for _, item in _each(kind, enumerate(found), lenient))
+
+
+def _each(kind: Any, found: Iterable[tuple[Any, Any]], lenient: bool) -> Iterator[tuple[Any, Any]]:
+    for key, item in found:
         try:
-            out.append(typed(kind, item, lenient))
+            yield key, typed(kind, item, lenient)
         except TypeError:
             if not lenient:
                 raise
-    return tuple(out)
 
 
 def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
@@ -111,7 +113,7 @@ def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
     elif origin is tuple and isinstance(value, list | tuple) and len(value) == len(inner):
         return tuple(typed(one, item, lenient) for one, item in zip(inner, value, strict=True))
     elif origin is Mapping and isinstance(value, Mapping):
-        return {str(key): typed(inner[1], item, lenient) for key, item in value.items()}
+        return {str(key): item for key, item in _each(inner[1], value.items(), lenient)}
     elif origin is None and issubclass(kind, Documented):
         return kind.from_document(value, lenient)
     elif origin is None and isinstance(value, int | float if kind is float else kind):

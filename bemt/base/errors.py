@@ -105,13 +105,17 @@ class InputError(ValueError):
         return (type(self), (self.faults,))
 
 
-def system_fault(error: OSError) -> Fault:
-    """Say what the system would not do.
+def system_fault(error: OSError, file: str = "", expected: str = "a file or folder that can be used") -> Fault:
+    """Say what the system would not do; what is missing is called missing.
 
     Parameters
     ----------
     error : OSError
         With the system's word, `strerror`; an error of a library may have none, and is quoted.
+    file : str
+        As the user called it; empty: as the error does.
+    expected : str
+        What would have been right.
 
     Returns
     -------
@@ -123,7 +127,10 @@ def system_fault(error: OSError) -> Fault:
     >>> print(system_fault(OSError(28, "No space left on device", "out/grid.csv")))
     out/grid.csv: got No space left on device; expected a file or folder that can be used.
     """
-    return Fault(str(error.filename or ""), "", error.strerror or str(error), "a file or folder that can be used")
+    place = file or str(error.filename or "")
+    if isinstance(error, FileNotFoundError):
+        return Fault(place, "", "no such file or folder", expected, "Check the path")
+    return Fault(place, "", error.strerror or str(error), expected)
 
 
 def needs(module: str, extra: str) -> Any:

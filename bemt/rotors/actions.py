@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from bemt.rotors.case.sources import Sources
     from bemt.rotors.propeller import Propeller
 
-__all__ = ["calibrate", "cite", "estimate", "new", "stations", "validate"]
+__all__ = ["calibrate", "cite", "estimate", "measured_rotors", "new", "stations", "validate"]
 
 
 @action(
     "Propellers and fans", "estimate 10x5 --rpm 6000", words=("label",), shown=True,
-    common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "angle_deg"),
+    common=("rpm", "airspeed_m_s", "blades", "chord_mm", "series", "reading", "angle_deg"),
 )  # fmt: skip
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
-    density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0,
+    density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0, reading: str | None = None,
 ) -> Estimate:  # fmt: skip
     """Estimate thrust and power from a label such as 10x5, with bands; K1/K2 for comparison.
 
@@ -52,6 +52,9 @@ def estimate(
         Air density; 1.225 by default, with 1.16 to 1.29 in the band. [kg/m3]
     angle_deg : array_like
         Angles between wind and shaft: 0 climb, 90 edgewise, 180 descent. [deg]
+    reading : str, optional
+        One reading of this propeller, or several: ``rpm=5400,thrust_g=410`` with
+        ``airspeed_m_s`` and ``power_W`` if known.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def estimate(
 
     density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3, finite=False)
     return of_label(
-        label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg
+        label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg, reading
     )
 
 
@@ -92,7 +95,7 @@ def new(
     scan: str | os.PathLike[str] | None = None, unit: Literal["mm", "m", "in"] | None = None,
     diameter_mm: float | None = None, diameter_in: float | None = None, fan: bool = False,
     blades: Count | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, series: str | None = None,
-    kv: float | None = None, cells: Count | None = None, campaign: bool = False,
+    kv: float | None = None, cells: Count | None = None, reading: str | None = None, campaign: bool = False,
     out: str | os.PathLike[str] | None = None,
 ) -> Told:  # fmt: skip
     """Write a new case: from a label, blade stations, a scan, or a fan's diameter.
@@ -123,6 +126,8 @@ def new(
         Speed constant of the motor. [rev/min/V]
     cells : int, optional
         LiPo cells in series, with K_v.
+    reading : str, optional
+        With a label: one reading of this propeller, ``rpm=5400,thrust_g=410``.
     campaign : bool
         Also write ``cfd/campaign.toml``: OpenFOAM runs on three grids.
     out : str or path, optional
@@ -156,7 +161,7 @@ def new(
     diameter_mm = diameter_mm if diameter_in is None else diameter_in * 25.4
     table, solid = (None if path is None else os.fspath(path) for path in (stations, scan))
     wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
-                               cells, campaign)  # fmt: skip
+                               cells, campaign, reading)  # fmt: skip
     folder, files = new_folder.write(wanted, None if out is None else os.fspath(out))
     typed = shlex.quote(folder.as_posix())
     lines = [f"{folder.as_posix()}: {', '.join(files)}", f"next: bemt sweep {typed}"]
@@ -239,6 +244,32 @@ def cite(case: Propeller | str | os.PathLike[str]) -> Sources:
     from bemt.rotors.propeller import rotor_of
 
     return sources(rotor_of(case).case)
+
+
+@action("Propellers and fans", "rotors apc 10x5", words=("query",), command="rotors")
+def measured_rotors(query: str | Sequence[str] = "") -> Told:
+    """List propellers that a database measured: they are found by maker and label at every door.
+
+    Parameters
+    ----------
+    query : str
+        Words such as ``apc 10x5``; all propellers by default.
+
+    Returns
+    -------
+    Told
+        Schema ``bemt.rotors/1``: label, name and source of each.
+
+    Examples
+    --------
+    >>> [one["label"] for one in measured_rotors("gws direct 9x5").to_dict()["rotors"]]
+    ['GWS Direct Drive 9x5']
+    """
+    from bemt.rotors import measured
+
+    found = measured.measured_rotors(query if isinstance(query, str) else " ".join(query))
+    rows = [{"label": one.label, "name": one.name, "source": one.source} for one in found]
+    return Told({"schema": "bemt.rotors/1", "rotors": rows}, measured.table(found))
 
 
 @action("Models and checks", "validate uiuc", words=("folders",))

@@ -16,8 +16,9 @@ from bemt.physics.effects.base import Effect
 if TYPE_CHECKING:
     from bemt.physics.effects.base import RotorBuild
 
-KNOWN_FROM = ("cad", "scan", "stations", "label", "reference")
-"""How the blade of a case is known; ``reference``: from a run of this very rotor."""
+KNOWN_FROM = ("cad", "scan", "stations", "label", "measured", "reference")
+"""How the blade of a case is known; ``measured``: from another piece of the same propeller in a database,
+``reference``: from a run of this very rotor."""
 
 # A camber acts on attached flow only: whole up to 30 deg, gone at 60.
 _ATTACHED, _SEPARATED = math.radians(30.0), math.radians(60.0)

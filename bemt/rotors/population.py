@@ -188,8 +188,8 @@ class Population:
         blade_class: str | None = None,
     ) -> Prior:  # fmt: skip
         """What is known of one rotor."""
-        if known_from not in KNOWN_FROM or known_from == "reference" or section not in SECTIONS:
-            raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-1]} and of {SECTIONS}")
+        if known_from not in KNOWN_FROM[:-2] or section not in SECTIONS:
+            raise ValueError(f"got {known_from!r}, {section!r}; expected one of {KNOWN_FROM[:-2]} and of {SECTIONS}")
         kin = self.families.get(family or "")
         mean, cov = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
         both = np.ix_([_DRAG, _CAMBER], [_DRAG, _CAMBER])

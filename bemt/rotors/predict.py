@@ -14,7 +14,7 @@ from bemt.rotors.conditioning import tangents
 from bemt.rotors.latents import NAMES, Prior, Sensed, inflow_angle_deg
 from bemt.rotors.mixture import LEVELS, pair_half_width
 from bemt.rotors.population import WEIGHTS, Population
-from bemt.rotors.reference import ReferenceRun
+from bemt.rotors.reference import CAMPAIGN, ReferenceRun, apart, gains_at
 
 Solve = Callable[[Array, Array, Array, NDArray[np.intp]], Array]
 """(K,) latent numbers, (P,) rpm, (P,) advance ratio and the points whose air holds, (P,), to (2, P) CT and CP."""
@@ -36,6 +36,7 @@ class Prediction:
     weights: Array
     rest_sizes: Array
     rest_weights: Array
+    campaign_sd: Array | float = 0.0  # (2, P) From one campaign to the next [1]
 
     @property
     def chances(self) -> Array:
@@ -57,9 +58,14 @@ class Prediction:
         logs = -0.5 * ((y - self.mean)[..., None] / sds) ** 2 - np.log(sds) - 0.5 * math.log(2.0 * math.pi)
         return np.asarray(logsumexp(logs, axis=-1, b=self.chances))
 
-    def half_width(self, level: float = LEVELS[0], noise: bool = False) -> Array:
-        """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1]."""
+    def half_width(self, level: float = LEVELS[0], noise: bool = False, campaigns: float = 0.0) -> Array:
+        """Half width of the interval that holds the rotor's own coefficient (with noise: a reading), (2, P) [1].
+
+        ``campaigns``: how many times the difference between two campaigns counts, as a variance; 1 for a rotor as its
+        own run showed it.
+        """
         still = np.hypot(self.rest_sd, self.noise_sd) if noise else self.rest_sd
+        still = np.hypot(still, math.sqrt(campaigns) * self.campaign_sd)
         sizes, weights = (self.sizes, self.rest_sizes), (self.weights, self.rest_weights)
         return pair_half_width(level, self.latent_sd, still, sizes, weights)
 
@@ -106,4 +112,8 @@ def predict(
         told = 1.0 - np.divide(left, rest, out=np.ones_like(rest), where=rest > 0.0) ** 2
         mean, rest = mean + shift, left * np.sqrt(told * max(reference.size / usual, 1.0) ** 2 + 1.0 - told)
     latent = np.sqrt(np.maximum(np.einsum("ckp,kj,cjp->cp", T, prior.cov, T), 0.0))
-    return Prediction(mean, latent, rest, p.noise_sd(at), prior.sizes, prior.weights, p.rest_sizes, WEIGHTS)
+    gains = apart(at.diameter_m) if prior.known_from == "measured" else CAMPAIGN
+    return Prediction(
+        mean, latent, rest, p.noise_sd(at), prior.sizes, prior.weights, p.rest_sizes, WEIGHTS,
+        gains_at(gains, at.J) * np.abs(mean),
+    )  # fmt: skip

@@ -7,6 +7,7 @@ Prints the tables of docs/duct.md and draws docs/img/duct.png. The folder of the
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import tempfile
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from bemt.base.units import KGF
 from bemt.rotors.case import Case
-from bemt.rotors.case.load import case_of
+from bemt.rotors.case.load import case_of, load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 
@@ -142,6 +143,95 @@ def f1(data: Path, folder: Path) -> Known:
              if (r["geometry"], float(r["tip_gap_mm"]), float(r["exit_ratio"])) == ("F1", 0.0, 1.0)]  # fmt: skip
     J, CT, duct, CQ = (np.array([float(r[k]) for r in found]) for k in ("J", "CT_momentum", "CT_duct", "CQ"))
     return Known("F1, DFDC", made(folder, F1, **tables), J, CT, CQ, duct / CT)
+
+
+FANS = {"F1": "002", "F2": "012", "F3": "011"}
+"""Folders of ``concealed_2`` with blade and duct of the fans that DFDC computed; the gaps closed: tables ``F?:g0``."""
+
+
+@dataclass(frozen=True)
+class Alike:
+    """A fan of DFDC without gap beside ours without losses, over the advance ratio."""
+
+    known: Known  # with our case: no gap, no friction, no loss of the lip
+    flow: Array  # DFDC's mass flow [kg/s]
+    ours: Array  # that of our duct at DFDC's thrust of the rotor [kg/s]
+    share: Array  # our duct's share at that thrust [1]
+
+
+def alike(data: Path, name: str) -> Alike:
+    """F1, F2 or F3 under the conditions of DFDC.
+
+    The duct alone, at the pressure that DFDC's rotor makes, so that neither sections nor blades count. DFDC's mass flow
+    is T / (Vj - V), as its folder says of the momentum.
+    """
+    folder = data / "concealed_2" / FANS[name]
+    case = case_of((folder / "case.toml").read_text(), folder).replaced(
+        {f"duct.{key}": 0.0 for key in ("tip_gap_mm", "lip_loss", "wall_friction")}
+    )
+    table = np.array(json.loads((folder.parent / "tables3.json").read_text())[f"{name}:g0"])
+    rpm, J, CT, duct, CQ = table[:, :5].T
+    case = case.replaced({"operating.rpm": float(rpm[0])})
+    known = Known(f"{name}, DFDC", case, J, CT, CQ, duct / CT)
+    V, rho, flow = known.airspeed(J), case.air().rho, prepare_case(case).duct
+    assert flow is not None
+    unit = rho * (rpm / 60.0) ** 2 * case.diameter_m**4
+    jet = np.sqrt(V**2 + 2.0 * (CT - duct) * unit / (rho * flow.area))
+    low, high = np.zeros_like(V), 5.0 * jet
+    for _ in range(60):  # speed through the disk at which our jet has that of DFDC
+        middle = 0.5 * (low + high)
+        below = flow.jet_speed(middle, V) < jet
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    ours = rho * flow.area * low
+    return Alike(known, CT * unit / (jet - V), ours, 1.0 - (CT - duct) * unit / (ours * (jet - V)))
+
+
+DS30_OFF = {"duct.stator.recovery": 0.0}
+DS30 = (  # what, what BEMT leaves out: overrides of the case
+    ("vanes, gap 0.4 mm, Mach, body ends, losses (the case)", {}),
+    ("body through the exit", {"duct.exit_hub_diameter_mm": 25.4}),
+    ("no vanes", DS30_OFF),
+    ("no vanes, no gap", DS30_OFF | {"duct.tip_gap_mm": 0.0}),
+    ("no vanes, no gap, no Mach number (as our CFD)",
+     DS30_OFF | {"duct.tip_gap_mm": 0.0, "model.effects_off": ("compressibility", "drag_divergence")}),
+    ("no vanes, no gap, no losses of lip and wall (as DFDC)",
+     DS30_OFF | {"duct.tip_gap_mm": 0.0, "duct.lip_loss": 0.0, "duct.wall_friction": 0.0}),
+    ("vanes, no gap, no losses of lip and wall (as DFDC)",
+     {"duct.stator.recovery": 1.0, "duct.tip_gap_mm": 0.0, "duct.lip_loss": 0.0, "duct.wall_friction": 0.0}),
+)  # fmt: skip
+
+
+def ds30(data: Path) -> list[str]:
+    """Rows of a Markdown table: who computed the DS-30 with what, thrust, torque and the duct's share."""
+    case = load_case(HOME / "cases" / "ds30")
+    out = ["| thesis | Fluent; vanes, gap, body and speed not stated | 23.5 | - | - |"]
+    for name, words in (("ds30_spinner", "no vanes"), ("ds30_vanes", "vanes")):
+        found = [r for r in rows(HOME / "reports" / "cfd" / name / "recording.csv") if r["converged"] == "1"]
+        for gap, told in ((False, "gap closed"), (True, "gap 0.4 mm")):
+            some = [r for r in found if (float(r["tip_gap_mm"]) > 0.1) == gap]
+            T, Q, rotor = (np.array([float(r[k]) for r in some]) for k in ("thrust_N", "torque_Nm", "thrust_rotor_N"))
+            if some:
+                grids = f"{len(some)} grid{'s' if len(some) > 1 else ''}"
+                text = f"| own CFD | {words}, {told}, no Mach number, body ends; {grids} |"
+                out.append(f"{text} {_ends(T)} | {_ends(Q, 3)} | {_ends(100.0 * (1.0 - rotor / T), 0)} |")
+    unit = case.air().rho * (case.rpm / 60.0) ** 2 * case.diameter_m**4
+    for r in rows(data / "dfdc" / "reference.csv"):
+        if r["geometry"] == "DS30" and r["exit_ratio"] == "0.925" and float(r["tip_gap_mm"]) in (0.0, 0.4):
+            T, duct, Q = float(r["CT_momentum"]), float(r["CT_duct"]), float(r["CQ"]) * unit * case.diameter_m
+            gap = "gap 0.4 mm" if float(r["tip_gap_mm"]) else "no gap"
+            vanes = "no vanes" if r["stator"] == "none" else "vanes"
+            text = f"| DFDC | {vanes}, {gap}, Mach, body ends, no losses; {r['section_lift']} |"
+            out.append(f"{text} {T * unit:.1f} | {Q:.3f} | {100 * duct / T:.0f} |")
+    for words, changes in DS30:
+        p = prepare_case(case.replaced(changes)).solve(case.rpm, 0.0, case.air())
+        out.append(f"| BEMT | {words} | {p.thrust_N[0]:.1f} | {p.torque_Nm[0]:.3f} | {100 * p.duct_share[0]:.0f} |")
+    return out
+
+
+def _ends(v: Array, digits: int = 1) -> str:
+    """Range of some values."""
+    ends = [f"{x:.{digits}f}" for x in (v.min(), v.max())]
+    return " to ".join(dict.fromkeys(ends))
 
 
 def x22a(data: Path, folder: Path, angle: int) -> Known:
@@ -270,6 +360,16 @@ def main() -> None:
         first = f1(data, at / "f1")
         x = [x22a(data, at / str(angle), angle) for angle in (19, 29)]
         ka = [nozzle_19a(data, at / f"ka{pitch}", pitch) for pitch in (0.6, 0.8, 1.0, 1.2, 1.4)]
+        print("| fan | J | mass flow, kg/s: ours / DFDC | % | share of the duct, %: ours / DFDC | points |")
+        print("|---|---|---|---|---|---|")
+        for name in FANS:
+            a = alike(data, name)
+            for i, J in enumerate(a.known.J):
+                flow = f"{a.ours[i]:.4f} / {a.flow[i]:.4f} | {100 * (a.ours[i] / a.flow[i] - 1):+.1f}"
+                own, other = 100 * a.share[i], 100 * a.known.share[i]
+                print(f"| {name} | {J:.2f} | {flow} | {own:.1f} / {other:.1f} | {own - other:+.1f} |")
+        print("\n| who | with what | thrust, N | torque, N m | share of the duct, % |")
+        print("\n".join(["|---|---|---|---|---|", *ds30(data)]), "\n")
         print("| rotor | J | CT: ours / known | % | CQ, % | share of the duct, %: ours / known |")
         print("|---|---|---|---|---|---|")
         smooth = replace(first, name="F1, no friction", case=first.case.replaced({"duct.wall_friction": 0.0}))

@@ -121,14 +121,20 @@ def transfer(seen: Sequence[Observed], numbers: Any, say: Say = None) -> dict[st
 
 
 def conditioned(seen: Observed, p: Population, on: str) -> Expected:
-    """Expectation after conditioning on points of one kind; those of the other count.
+    """Expectation after conditioning on points of one kind, see `conditioned_law`; those of the other count."""
+    return lying(seen, p, *conditioned_law(seen, p, on))
 
-    ``on`` is ``static``, ``forward``, or ``static_and_one``: the forward point nearest to half of the zero-thrust J
-    too.
+
+def conditioned_law(seen: Observed, p: Population, on: str) -> tuple[Prior, ReferenceRun]:
+    """Latent numbers of a propeller and rows of the run after conditioning on some of its points.
+
+    ``on`` is ``static``, ``forward``, ``all``, or ``static_and_one``: the forward point nearest to half of the
+    zero-thrust J too.
     """
     m, drawn = seen.record, seen.drawn
     good = counted(drawn)
-    here = np.logical_or.reduce(list(good.values())) & np.isfinite(drawn.CT_bemt)
+    good["all"] = np.logical_or.reduce(list(good.values()))
+    here = good["all"] & np.isfinite(drawn.CT_bemt)
     rpm, J = drawn.rpm[here], drawn.J[here]
     run = np.flatnonzero(good[on.removesuffix("_and_one")][here])
     run = run[np.unique(np.linspace(0, run.size - 1, min(run.size, RUN_POINTS)).round().astype(int))]
@@ -144,8 +150,7 @@ def conditioned(seen: Observed, p: Population, on: str) -> Expected:
         lambda z: seen.solve(z, rpm[run], J[run]).reshape(-1) + bias, prior, y.reshape(-1), noise, p.rest_sizes, WEIGHTS
     )
     reference = ReferenceRun.given(at, noise, y.reshape(-1), found)
-    posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
-    return lying(seen, p, posterior, reference)
+    return Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference"), reference
 
 
 def log_score(total: dict[str, Any]) -> float:

@@ -30,9 +30,9 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
-from bemt.data.readers._packed import MAX_BYTES, packed, unpacked
 
 __all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
 
@@ -140,12 +140,15 @@ def _shown_code(head: bytes) -> str | None:
 
 
 def load_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Bytes of a file, or `InputError` with what the system says."""
+    """Bytes of a file, or `InputError` with what the system says, or with its size if it is too large."""
     try:
-        return Path(path).read_bytes()
+        with Path(path).open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)  # a device has no size
     except OSError as error:
-        fault = Fault(os.fspath(path), "", error.strerror or str(error), "a readable file", "Check the path")
-        raise InputError(fault) from error
+        raise InputError(system_fault(error, os.fspath(path), "a readable file")) from error
+    if len(raw) > MAX_BYTES:
+        raise InputError(Fault(os.fspath(path), "", f"more than {MAX_BYTES} bytes", "less", "Part the file"))
+    return raw
 
 
 def load_text(path: str | os.PathLike[str]) -> SourceText:
@@ -170,8 +173,6 @@ def load_text(path: str | os.PathLike[str]) -> SourceText:
     raw = load_bytes(path)
     digest = hashlib.sha256(raw).hexdigest()
     raw = unpacked(raw, name)
-    if len(raw) > MAX_BYTES:
-        raise InputError(Fault(name, "", f"{len(raw)} bytes or more", f"at most {MAX_BYTES}", "Export less"))
     if _binary(raw):
         raise InputError(Fault(name, "", "binary data (NUL bytes)", "a text file", "Export the data as plain text"))
     return SourceText(name, decode(raw), digest)
@@ -311,9 +312,9 @@ def _head(target: Path, place: Collector) -> bytes:
     try:
         with target.open("rb") as stream:
             head = stream.read(HEAD_BYTES)
-            return unpacked(head + stream.read(), place.file, HEAD_BYTES) if packed(head) else head
+        return unpacked(load_bytes(target), place.file, HEAD_BYTES) if packed(head) else head
     except OSError as error:
-        place.refuse("", error.strerror or str(error), "a readable file or folder", "Check the path")
+        raise InputError(system_fault(error, place.file, "a readable file or folder")) from error
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Any:  # noqa: A002 - the key of the case file

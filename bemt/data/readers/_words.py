@@ -58,8 +58,14 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "battery current": "ibat i~bat i~in i~batt akkustrom batteriestrom",
     "motor rotation speed": "motordrehzahl",
     "propeller rotation speed": "propellerdrehzahl luftschraubendrehzahl rotordrehzahl",
-    "radius": "半径",
-    "chord": "弦长",
+    "radius": "半径 半徑 rayon raggio radio halbmesser promien радиус radialposition position~radiale posicion~radial "
+    "posizione~radiale",
+    "chord": "弦长 弦長 sehne sehnenlange profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
+    "longueur~de~corde",
+    "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "
+    "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
+    "kat~nastawienia угол~установки",
+    "pitch": "steigung pas passo paso",
     "static": "statisch statique estatico estatica statico statica 静态",
     "mean": "mittlerer mittlere mittelwert moyen moyenne medio media 平均 average avg",
     "ambient": "umgebung ambiant ambiante ambiente ambientale 环境 環境 室 room lab laboratory outside outdoor amb "
@@ -86,7 +92,7 @@ NEUTRAL = {"mean", "measured", "corrected", "filtered", "net", "static", "of", "
 _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, its own words, words that change nothing
     "thrust": ("force", {"thrust"}, {"force", "propeller", "rotor", "motor", "output"}),
     "torque": ("torque", {"torque"}, {"propeller", "rotor", "motor", "shaft", "reaction", "output"}),
-    "voltage": ("voltage", {"voltage", "v"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
+    "voltage": ("voltage", {"voltage", "v", "u"}, {"battery", "supply", "input", "bus", "dc", "esc"}),
     "current": ("current", {"current"},
                 {"battery", "supply", "input", "bus", "dc", "esc", "draw", "total", "electrical"}),
     "electrical power": ("power", {"power"}, {"electrical", "input", "battery", "supply", "esc", "dc", "total"}),
@@ -99,7 +105,7 @@ _HEADS: dict[str, tuple[str, set[str], set[str]]] = {  # quantity: dimension, it
                     {"width", "servo", "input", "command", "motor"}),
     "rpm": ("angular_speed", {"rotation", "rpm", "speed", "n"},
             {"propeller", "rotor", "shaft", "tachometer", "tach", "hall", "rotational"}),
-    "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream"},
+    "airspeed": ("speed", {"airspeed", "speed", "wind", "freestream", "v", "u", "v0", "u0", "va"},
                  {"air", "flow", "free", "stream", "tunnel", "inflow", "flight", "true", "speed", "wind", "ambient"}),
     "temperature": ("temperature", {"temperature"}, {"ambient", "air", "tunnel", "inlet"}),
     "pressure": ("pressure", {"pressure"}, {"ambient", "air", "tunnel"}),

@@ -144,12 +144,15 @@ def unique(names: Sequence[str]) -> list[str]:
     >>> unique(["x", "y", "x"])
     ['x', 'y', 'x#2']
     """
-    taken = set(names)
+    taken, used = set(names), set[str]()
+    next_number: dict[str, int] = {}
     out: list[str] = []
     for name in names:
-        new, k = name, 2
-        while new in out or (k > 2 and new in taken):
+        new, k = name, next_number.get(name, 2)
+        while new in used or (new != name and new in taken):
             new, k = f"{name}#{k}", k + 1
+        next_number[name] = k
+        used.add(new)
         out.append(new)
     return out
 

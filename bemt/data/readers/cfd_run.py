@@ -19,6 +19,7 @@ KIND = "cfd_run"
 QUANTITIES: dict[str, tuple[str, str]] = {
     "thrust": ("force", "N"), "duct_thrust": ("force", "N"), "torque": ("torque", "N m"), "power": ("power", "W"),
     "rpm": ("angular_speed", "rpm"), "airspeed": ("speed", "m/s"), "density": ("density", "kg/m3"),
+    "cells": ("none", "-"),
 }  # fmt: skip
 """What a column of a run may be: dimension, usual unit."""
 
@@ -49,6 +50,7 @@ class RunColumns(Table):
     rpm: RunColumn | None = entry("speed of rotation")
     airspeed: RunColumn | None = entry("speed of flight")
     density: RunColumn | None = entry("density of the fluid")
+    cells: RunColumn | None = entry("cells of the grid: rows of one condition are a grid study")
 
     def rules(self) -> Iterable[tuple[str, ...]]:
         """Units of the right dimension."""
@@ -64,7 +66,7 @@ class RunColumns(Table):
 class RunHead(Table):
     """[run]: files and operating point."""
 
-    files: tuple[str, ...] = entry("exports of the run, relative to this file", required=True)
+    files: tuple[str, ...] = entry("exports of the run, relative to this file", default=())
     rpm: float | None = entry("speed of rotation, if no column has it", "rev/min", 1.0, 1e6)
     airspeed_m_s: float | None = entry("speed of flight", "m/s", 0.0, 400.0)
     density_kg_m3: float | None = entry("density of the fluid", "kg/m3", 0.01, 1100.0)
@@ -77,6 +79,13 @@ class RunHead(Table):
     duct_zones: tuple[str, ...] | None = entry("those of the zones that are the duct; by their names if omitted")
 
 
+class GridTable(Table):
+    """[[grids]]: one grid of a study, in place of run.files."""
+
+    files: tuple[str, ...] = entry("exports of the run on it, a folder of them, or its run.toml", required=True)
+    cells: float | None = entry("cells of the grid; as its run.toml states if omitted", low=10, high=1e12)
+
+
 class ReferenceTable(Table):
     """[reference]: what force and moment coefficients rest on."""
 
@@ -84,6 +93,7 @@ class ReferenceTable(Table):
     length_m: float | None = entry("length of moments", "m", 1e-6, 1e4)
     speed_m_s: float | None = entry("speed", "m/s", 1e-3, 2000.0)
     density_kg_m3: float | None = entry("density", "kg/m3", 0.01, 1100.0)
+    sound_m_s: float | None = entry("speed of sound, of disks in Flow360", "m/s", 1.0, 6000.0)
 
 
 class SetupTable(Table):
@@ -104,21 +114,35 @@ class SetupTable(Table):
 
 
 class RunToml(Table):
-    """run.toml: one CFD run."""
+    """run.toml: one CFD run, or one condition on several grids: a study."""
 
-    run: RunHead
+    run: RunHead = RunHead()
+    grids: tuple[GridTable, ...] = ()
     columns: RunColumns = RunColumns()
     reference: ReferenceTable = ReferenceTable()
     setup: SetupTable = SetupTable()
 
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Files of one grid, or grids."""
+        if bool(self.run.files) == bool(self.grids):
+            got = "files and [[grids]]" if self.grids else "no files"
+            yield "run.files", got, "the exports of one run, or [[grids]] with two grids or more"
+        elif len(self.grids) == 1:
+            yield "grids", "one grid", "two or more"
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files, of the run or of its grids."""
+        return self.run.files + tuple(f for g in self.grids for f in g.files)
+
 
 def sniff(head: bytes | str) -> bool:
-    r"""Tell whether a text has the table of a run. [run]
+    r"""Tell whether a text has the table of a run, or of the grids of a study.
 
     >>> sniff('[run]\nfiles = ["thrust.out"]\n'), sniff("[recording]\n")
     (True, False)
     """
-    return any(line.split("#")[0].strip() == "[run]" for line in head_text(head).splitlines())
+    return any(line.split("#")[0].strip() in ("[run]", "[[grids]]") for line in head_text(head).splitlines())
 
 
 def read(path: str | os.PathLike[str]) -> RunToml:

@@ -1,9 +1,9 @@
 """Tables of the New Dexterity coaxial stand: two rotors, ``Left`` upstream and ``Right`` downstream, a row per setting.
 
 PWM [us], thrust [g: gram-force], torque [Nm, its sign is the sense of rotation], voltage, current and optical speed per
-side (IEEE 9720993, An Open-Source Benchmarking Platform for Coaxial Rotor Systems). If only one side turned, its
-columns get the plain names; two that turned keep ``left`` and ``right``. The first row is read before the tare: its
-loads are left out.
+side, in these units where the heading states no other (IEEE 9720993, An Open-Source Benchmarking Platform for Coaxial
+Rotor Systems). If only one side turned, its columns get the plain names; two that turned keep ``left`` and ``right``.
+The first row is read before the tare: its loads are left out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from bemt.base import units
 from bemt.data.readers import first_cells
 from bemt.data.readers.columns import Channel
-from bemt.data.readers.headings import known
 from bemt.data.readers.recording import Builder
 from bemt.physics.dataset import Dataset
 
@@ -47,9 +46,10 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     for k, text in enumerate(build.table.headings):
         if found := _HEAD.fullmatch(text.strip()):
             name, unit = _COLUMNS[found[1]]
-            build.add(k, known(text, f"{name}_{found[2].lower()}".lstrip("_"), unit))
-        elif text.strip() == "Time [s]":
-            build.add(k, known(text, "time", "s"))
+            build.add_usual(k, f"{name}_{found[2].lower()}".lstrip("_"), unit)
+        elif re.fullmatch(r"Time(?: \[[^\]]*\])?", text.strip()):
+            build.add_usual(k, "time", "s")
+    build.check()
     needed = [f"{k}_{side}_{unit}" for k, unit in (("pulse_width", "s"), ("thrust", "N")) for side in _SIDES]
     for name in (*needed, *(f"{side}_rpm" for side in _SIDES)):
         if name not in build.channels:

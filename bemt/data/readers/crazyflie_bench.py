@@ -24,9 +24,8 @@ KIND = "crazyflie_bench"
 FULL = 65535.0
 """Largest command. [counts]"""
 _COLUMNS = {
-    "pwm": ("throttle", "-"), "vbat[V]": ("voltage", "V"), "v[V]": ("supply_voltage", "V"),
-    "i[A]": ("supply_current", "A"), "p[W]": ("supply_power", "W"), "weight": ("total_thrust", "gf"),
-    "weight[g]": ("total_thrust", "gf"), "thrust[g]": ("total_thrust", "gf"),
+    "pwm": ("throttle", "-"), "vbat": ("voltage", "V"), "v": ("supply_voltage", "V"), "i": ("supply_current", "A"),
+    "p": ("supply_power", "W"), "weight": ("total_thrust", "gf"), "thrust": ("total_thrust", "gf"),
 } | {f"rpm{k}": (str(k), "rpm") for k in (1, 2, 3, 4)}  # fmt: skip
 _SPEEDS = ("1_rpm", "2_rpm", "3_rpm", "4_rpm")
 
@@ -37,17 +36,23 @@ def sniff(head: bytes | str) -> bool:
     >>> sniff("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n"), sniff("pwm,rpm,thrust[g]\n")
     (True, False)
     """
-    cells = first_cells(head)
-    return {"pwm", "rpm1", "rpm2", "rpm3", "rpm4"} <= cells and bool({"weight", "weight[g]", "thrust[g]"} & cells)
+    cells = set(map(_base, first_cells(head)))
+    return {"pwm", "rpm1", "rpm2", "rpm3", "rpm4"} <= cells and bool({"weight", "thrust"} & cells)
+
+
+def _base(text: str) -> str:
+    return text.partition("[")[0].strip()
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table."""
     build = Builder.of_stand(path, KIND)
     for k, text in enumerate(h.strip() for h in build.table.headings):
-        if text in _COLUMNS:
-            head = known(text, *_COLUMNS[text])
-            build.add(k, replace(head, unit=units.Unit("", "none", 1.0 / FULL)) if text == "pwm" else head)
+        if text == "pwm":
+            build.add(k, replace(known(text, *_COLUMNS["pwm"]), unit=units.Unit("", "none", 1.0 / FULL)))
+        elif _base(text) in _COLUMNS:
+            build.add_usual(k, *_COLUMNS[_base(text)])
+    build.check()
     build.need("total_thrust_N", "throttle", *_SPEEDS)
     build.check()
     speeds = np.array([build.channels.pop(name).values for name in _SPEEDS])

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -153,7 +154,8 @@ def _sums(entries: Sequence[Entry], damaged: bool, line: int) -> list[str]:
     notes: list[str] = []
     table = {(e.name, e.zone): e.value for e in entries}
     if len(table) < len(entries):
-        repeated = {e.zone for e in entries if sum(e.name == x.name and e.zone == x.zone for x in entries) > 1}
+        count = Counter((e.name, e.zone) for e in entries)
+        repeated = {zone for (_, zone), n in count.items() if n > 1}
         return [f"line {line}: zone {', '.join(sorted(repeated))} is repeated; sums not checked"]
     zones = list(dict.fromkeys(e.zone for e in entries))
     names = list(dict.fromkeys(e.name for e in entries))

@@ -40,6 +40,20 @@ _WORDS = {  # heading in lower case that `_words` has no quantity for, or leaves
     "accx": ("acceleration_x", "acceleration"), "accy": ("acceleration_y", "acceleration"),
     "accz": ("acceleration_z", "acceleration"),
 }  # fmt: skip
+USUAL: dict[str, str] = {
+    "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
+    "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
+    "mechanical_power_W": "power_W", "shaft_power_W": "power_W", "T_K": "temperature_K", "P_Pa": "pressure_Pa",
+    "air_temperature_K": "temperature_K", "air_pressure_Pa": "pressure_Pa", "rho_kg_m3": "density_kg_m3",
+    "air_density_kg_m3": "density_kg_m3", "P_el_W": "electrical_power_W", "P_in_W": "electrical_power_W",
+    "input_power_W": "electrical_power_W", "P_mech_W": "power_W", "P_shaft_W": "power_W",
+    "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
+    "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
+    "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
+    "freestream_m_s": "airspeed_m_s", "pull_N": "thrust_N", "force_N": "thrust_N", "load_N": "thrust_N",
+    "load_cell_N": "thrust_N", "loadcell_N": "thrust_N",
+}  # fmt: skip
+"""Usual name of a channel that headings of benches and of CFD name in another way."""
 _THRUSTS = re.compile(
     r"((motor|propeller|prop|rotor|static|max|mean|average|avg|measured|total) )*"
     r"(thrust|lift|pull|force|load|load ?cell)( (static|force|mean|average|measured))*|t|f"
@@ -115,6 +129,26 @@ def known(text: str, base: str, unit: str) -> Heading:
     found = units.Unit("", "none", 1.0) if unit == "-" else unit_of(unit)
     assert isinstance(found, units.Unit), unit
     return Heading(text, _channel(base, found).lstrip("_"), found)
+
+
+def in_usual_unit(text: str, base: str, unit: str) -> Heading:
+    """Heading of a stand's own column: its usual unit, or the one that it states; unit None if that does not fit.
+
+    >>> [in_usual_unit(f"Torque Left {u}", "torque", "Nm").unit.factor for u in ("", "[Nm]", "[Nmm]")]
+    [1.0, 1.0, 0.001]
+    >>> in_usual_unit("Thrust [g]", "thrust", "gf").unit.suffix, in_usual_unit("Torque [V]", "torque", "Nm").unit
+    ('gf', None)
+    """
+    found, said = known(text, base, unit), re.search(r"[\[(]([^()\[\]]*)[)\]]\s*$", text)
+    if not said or said[1].lower().strip(" -") in ("", unit.replace("gf", "g").lower()) or found.unit is None:
+        return found
+    goes = unit_for(found.unit.dimension, said[1].strip())
+    if goes is None:
+        return replace(found, unit=None, doubt=f"{said[1].strip()!r} is no unit of it")
+    made = goes[0]
+    if made.dimension == "angular_speed" and made.suffix != "rpm":
+        made = units.Unit("", "angular_speed", made.factor / units.RPM)
+    return replace(found, unit=made)
 
 
 def _channel(base: str, unit: units.Unit) -> str:
@@ -242,7 +276,17 @@ def heading(text: str) -> Heading:
     return found
 
 
-def _splits(text: str) -> Iterator[tuple[str, str]]:
+def channel_of(text: str, unit: str = "") -> str:
+    """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
+
+    >>> channel_of("V", "m s^-1"), channel_of("U [m/s]"), channel_of("T", "N"), channel_of("Q", "N m"), channel_of("J")
+    ('airspeed_m_s', 'airspeed_m_s', 'thrust_N', 'torque_Nm', 'J')
+    """
+    name = heading(f"{text} [{unit}]" if unit else text).name
+    return USUAL.get(name, name)
+
+
+def splits(text: str) -> Iterator[tuple[str, str]]:
     """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
     for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
         yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
@@ -270,7 +314,7 @@ def _by_words(text: str) -> Heading | None:
     ):
         if unit.dimension == "time":
             return Heading(text, "time_s", unit)
-    for base, unit in _splits(bare):
+    for base, unit in splits(bare):
         words = english(base)
         for name, dimension in quantities(words):
             if not unit:

@@ -31,13 +31,12 @@ _COLUMNS = {
     "v": ("voltage", "V"), "a": ("current", "A"), "pin": ("electrical_power", "W"), "theff": ("efficacy", "gf/W"),
 }  # fmt: skip
 _RAW = {
-    "Motor Output": ("pulse_width", "us"), "Motor Level [%]": ("throttle", "pct"), "Thrust [G]": ("thrust", "gf"),
-    "Torque [G cm]": ("torque", "gf_cm"), "RPM [1/min]": ("", "rpm"), "VoltBatt [V]": ("voltage", "V"),
-    "CurrBatt [A]": ("current", "A"), "Power In [W]": ("electrical_power", "W"),
-    "Power Out [W]": ("mechanical_power", "W"), "Efficiency [%]": ("motor_efficiency", "pct"),
-    "Thrust Efficiency [G/W]": ("efficacy", "gf/W"),
+    "Motor Output": ("pulse_width", "us"), "Motor Level": ("throttle", "pct"), "Thrust": ("thrust", "gf"),
+    "Torque": ("torque", "gf_cm"), "RPM": ("", "rpm"), "VoltBatt": ("voltage", "V"), "CurrBatt": ("current", "A"),
+    "Power In": ("electrical_power", "W"), "Power Out": ("mechanical_power", "W"),
+    "Efficiency": ("motor_efficiency", "pct"), "Thrust Efficiency": ("efficacy", "gf/W"),
 }  # fmt: skip
-_RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust [G]", "Torque [G cm]"}
+_RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust", "Torque"}
 
 
 def sniff(head: bytes | str) -> bool:
@@ -47,15 +46,18 @@ def sniff(head: bytes | str) -> bool:
     (True, False)
     """
     cells = first_cells(head)
-    return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or cells >= _RAW_KEYS
+    return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or set(map(_base, cells)) >= _RAW_KEYS
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table or a raw record. ["form"]"""
     build = Builder.of_stand(path, KIND)
-    raw = set(build.table.headings) >= _RAW_KEYS
+    raw = set(map(_base, build.table.headings)) >= _RAW_KEYS
     for k, text in enumerate(build.table.headings):
-        build.add(k, _raw_heading(text) if raw else _table_heading(text))
+        if raw and _base(text) in _RAW and (_base(text) != text or text == "Motor Output"):
+            build.add_usual(k, *_RAW[_base(text)])
+        else:
+            build.add(k, Heading(text, slug(text), None, "counts or telemetry") if raw else _table_heading(text))
     if not build.faults:
         build.need("thrust_N", "torque_Nm", "rpm")
     form = "raw" if raw else "table"
@@ -78,10 +80,8 @@ def _table_heading(text: str) -> Heading:
     return known(text, f"{name}_err".lstrip("_") if base != text and base != "theff" else name, unit)
 
 
-def _raw_heading(text: str) -> Heading:
-    if text in _RAW:
-        return known(text, *_RAW[text])
-    return Heading(text, slug(text), None, "counts of a converter or telemetry")
+def _base(text: str) -> str:
+    return text.partition("[")[0].strip()
 
 
 def _name(stem: str) -> dict[str, str]:

@@ -25,7 +25,15 @@ from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers._words import english, quantities
 from bemt.data.readers.columns import Channel, dataset
-from bemt.data.readers.headings import Heading, heading, may_be_shaft_speed, meanings, slug, surely_shaft_speed
+from bemt.data.readers.headings import (
+    Heading,
+    heading,
+    in_usual_unit,
+    may_be_shaft_speed,
+    meanings,
+    slug,
+    surely_shaft_speed,
+)
 from bemt.data.readers.samples import clock_seconds, spikes
 from bemt.data.readers.split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.physics.dataset import Dataset
@@ -74,6 +82,14 @@ class Builder:
         for name in sorted({h for h in names if h and names.count(h) > 1}):
             build.fault("1", f"a second column {name!r}", "each column once")
         return build
+
+    def add_usual(self, index: int, base: str, unit: str) -> None:
+        """Add a stand's own column in its usual unit or in the one that its heading states; no such unit is a fault."""
+        head = in_usual_unit(self.table.headings[index].strip(), base, unit)
+        if head.unit is None:
+            self.fault(f"{self.table.headings_line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
+        else:
+            self.add(index, head)
 
     def fault(self, where: object, got: str, expected: str, hint: str = "") -> None:
         """Note a fault."""

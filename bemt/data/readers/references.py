@@ -229,8 +229,11 @@ def read(path: str | os.PathLike[str]) -> list[Reference]:
     reader = csv.reader(io.StringIO(text), skipinitialspace=True)
     references: list[Reference] = []
     header: list[str] = []
-    for cells in reader:
-        line = reader.line_num
+    try:
+        rows = [(reader.line_num, cells) for cells in reader]
+    except csv.Error as error:
+        source.refuse(reader.line_num, str(error), "cells of some words")
+    for line, cells in rows:
         if not any(cell.strip() for cell in cells):
             continue
         if not header:

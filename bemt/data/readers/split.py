@@ -22,6 +22,8 @@ from bemt.data.readers.unit_text import unit_of
 
 DELIMITERS = (";", "\t", ",", "|")
 MAX_FAULTS = 20
+LONGEST = 100_000
+"""Characters that a line may have: less than the largest cell of the csv module."""
 SHEET_ERRORS = frozenset({"#div/0!", "#n/a", "#value!", "#ref!", "#num!", "#name?", "#null!"})
 """What a spreadsheet writes into a cell that it could not compute."""
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "\u2013", "\u2014", "null", "none"}) | SHEET_ERRORS
@@ -317,6 +319,8 @@ def split_table(
     used = [(i, t) for i, t in used if t.strip(" \t;,|")]
     if not used:
         source.refuse("", "no data", "a heading line and rows of numbers")
+    if (longest := max(used, key=lambda line: len(line[1]))) and len(longest[1]) > LONGEST:
+        source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
     notes = [f"{comments} comment lines left out"] if comments else []
     notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
@@ -328,8 +332,6 @@ def split_table(
             [] if _EXCEL.fullmatch(used[0][1]) else [f"{number_of(start, 'line')} above the headings left out: {above}"]
         )
         used = used[start:]
-    if any(len(t) > 100_000 for _, t in used):
-        source.refuse("", "a line of more than 100000 characters", "a table of short lines")
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)

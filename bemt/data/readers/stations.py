@@ -13,21 +13,20 @@ from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text
-from bemt.data.readers._words import plain
+from bemt.data.readers._words import english, plain
+from bemt.data.readers.headings import splits
 from bemt.data.readers.split import decimal_mark, split_table
-from bemt.data.readers.unit_text import unit_of
+from bemt.data.readers.unit_text import unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 WIDEST = 0.8
 """Largest chord over the tip radius that a blade has: that of the Kaplan propeller Ka 4-70 is 0.78 [1]."""
-_WORDS = {  # in English, German, French, Italian, Spanish, Chinese
-    "r": "r|radius|radial position|radial station|station|x|rayon|raggio|radio|半径",
-    "chord": "c|chord|chord length|width|blade width|sehne|profiltiefe|blatttiefe|corde|corda|cuerda|弦长",
-    "beta": "beta|b|blade angle|pitch angle|theta|einstellwinkel|blattwinkel|steigungswinkel|calage|angle de calage"
-    "|calettamento|angolo di calettamento|angulo de paso|桨叶角|安装角",
-    "pitch": "pitch|local pitch|steigung|pas|passo|paso|p",
+_HEADS: dict[str, tuple[set[str], set[str]]] = {  # column: its own words, words that change nothing
+    "r": ({"r", "radius", "station", "x"}, {"radial", "position", "blade", "local", "of"}),
+    "chord": ({"c", "chord", "width"}, {"blade", "length", "local", "section", "of"}),
+    "beta": ({"beta", "β", "theta", "θ", "b", "angle"}, {"blade", "pitch", "setting", "section", "local", "of"}),
+    "pitch": ({"pitch", "p"}, {"blade", "local", "geometric", "of"}),
 }
-_NAMES = {word: name for name, words in _WORDS.items() for word in words.split("|")}
 _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
 """What lengths are shares of, in tip radii."""
 _TWIST = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
@@ -44,32 +43,49 @@ class _Column:
     heading: str
 
 
+def _meaning(text: str) -> str:
+    """Column that the words of a heading mean; empty for another.
+
+    >>> [_meaning(t) for t in ("Rayon", "chord_c", "Einstellwinkel β", "local pitch", "angle", "twist angle")]
+    ['r', 'chord', 'beta', 'pitch', '', '']
+    """
+    said = set(english(text))
+    return next((n for n, (own, harmless) in _HEADS.items() if said & own and said <= own | harmless
+                 and said != {"angle"}), "")  # fmt: skip
+
+
+def _share(text: str) -> tuple[str, float] | None:
+    """Column and scale of a length over the tip radius or the diameter: ``r/R``, ``2 c/D``."""
+    found = re.fullmatch(r"(2 ?)?(.+?) ?/ ?(.+)", text.strip())
+    if not found or plain(found[3]) not in _TIPS or (name := _meaning(found[2])) not in ("r", "chord", "pitch"):
+        return None
+    return name, _TIPS[plain(found[3])] * (0.5 if found[1] else 1.0)
+
+
 def _column(at: int, text: str, R: float) -> _Column | None:
-    """What a heading stands for; None for another."""
-    words = " ".join(plain(text).split())
-    share = re.fullmatch(r"(2 ?)?(.+?) ?(?:/| over ) ?(.+?)( ?[\[(] ?[-%]? ?[\])])?", words)
-    if share and share[3] in _TIPS and (name := _NAMES.get(share[2])) in ("r", "chord", "pitch"):
-        scale = _TIPS[share[3]] * (0.5 if share[1] else 1.0) * (0.01 if "%" in (share[4] or "") else 1.0)
-        return _Column(at, str(name), scale, True, text)
-    parts = re.fullmatch(r"(.+?) ?[\[(] ?(.+?) ?[\])]|(.+) (\S+)", words)
-    whole = re.fullmatch(r".*?[\[(] ?(.+?) ?[\])]|.+[_ ](\S+)", " ".join(text.split()))
-    name = _NAMES.get(parts[1] or parts[3]) if parts else None
-    if not name or not whole:
-        return None
-    unit = unit_of(whole[1] or whole[2])
-    wanted = "angle" if name == "beta" else "length"
-    if not isinstance(unit, units.Unit) or unit.dimension != wanted:
-        return None
-    return _Column(at, name, unit.factor / units.DEG if name == "beta" else unit.factor / R, False, text)
+    """What a heading stands for; None for another. An angle without a unit is in degrees, or refused as too small."""
+    bare = re.sub(r"[ _]over[ _]", "/", " ".join(text.split()))
+    ways = [*splits(bare), *([(tail[1], "in")] if (tail := re.fullmatch(r"(.+) in", bare)) else [])]
+    for base, unit in ways:
+        if unit in ("", "-", "1", "%") and (share := _share(base)):
+            return _Column(at, share[0], share[1] * (0.01 if unit == "%" else 1.0), True, text)
+        name = _meaning(base)
+        if (share := _share(unit)) and share[0] == name:  # radius [r/R]
+            return _Column(at, name, share[1], True, text)
+        of_tip = re.fullmatch(r"(%?) ?(?:of )?R|-", unit)
+        if name == "r" and of_tip or name == "chord" and of_tip and unit != "-":
+            return _Column(at, name, 0.01 if of_tip[1] else 1.0, True, text)  # type: ignore[index]
+        if name in ("beta", "pitch") and (angle := unit_for("angle", unit)):
+            return _Column(at, "beta", angle[0].factor / units.DEG, False, text)
+        if name in ("r", "chord", "pitch") and (length := unit_for("length", unit)):
+            return _Column(at, name, length[0].factor / R, False, text)
+    return _Column(at, "beta", 1.0, False, text) if _meaning(bare) == "beta" else None
 
 
 def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
     """Reason why a table of stations lacks a column."""
-    bare = [h for h in headings if _NAMES.get(plain(h)) in lacking]
-    if bare:
-        unit = {"beta": "deg"}
-        told = ", ".join(f"{h} ({unit.get(_NAMES[plain(h)], 'mm')})" for h in bare)
-        return f"Write the units, such as {told}"
+    if bare := [h for h in headings if _meaning(h) in lacking]:
+        return f"Write the units, such as {', '.join(f'{h} (mm)' for h in bare)}; shares of the tip radius are r/R, c/R"
     return _TWIST if "beta" in lacking else ""
 
 

@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.tables import number_of
 from bemt.data.readers import HEAD_BYTES
 from bemt.data.readers.uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
@@ -253,7 +253,7 @@ def read(path: str | os.PathLike[str]) -> Any:
     try:
         role = role_of(_head(target))
     except OSError as error:
-        raise InputError(Fault(os.fspath(path), "", error.strerror or "unreadable", "a readable file")) from error
+        raise InputError(system_fault(error, os.fspath(path), "a readable file")) from error
     if role is None:
         expected = "one of the headers r/R c/R beta, RPM CT CP, J CT CP eta, r/R t/c"
         raise InputError(Fault(os.fspath(path), "1", "no header of this archive", expected))

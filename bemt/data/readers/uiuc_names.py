@@ -58,16 +58,43 @@ FAMILIES = {
 """Maker and series by family, as the site heads them; other families import too."""
 
 
-def family_of(maker: str, kind: str | None) -> str | None:
+_SHORT = {"ma": "master airscrew", "hd": "direct drive", "rs": "", "aerocam": "aeronaut cam",
+          "aerocarbon": "aeronaut carbon", "grp": "graupner", "thin": "", "prop": "", "electric": "",
+          "folding": "", "folder": "", "sport": "", "pusher": "", "series": "", "g/f": "gf"}  # fmt: skip
+"""Words of makers' series as shops and databases write them; words of a class tell by the class."""
+
+
+def _words(name: str) -> frozenset[str]:
+    split = re.findall(r"[a-z0-9/]+", re.sub(r"slow fly(?:er)?|\d-blade", "", name.casefold()))
+    return frozenset(" ".join(_SHORT.get(word, word) for word in split).split())
+
+
+def families_of(maker: str, kind: str | None, blades: int | None = None) -> list[str]:
+    """Families that a maker's words and a class of blades may mean: those of just these words, else of these and more.
+
+    >>> families_of("GWS Direct Drive", None), families_of("GWS HD", None), families_of("APC", "electric")
+    (['gwsdd'], ['gwsdd'], ['apce'])
+    >>> families_of("Graupner CAM", None), families_of("Graupner CAM Slim", None), families_of("Nobody", None)
+    (['grcp'], ['grcsp'], [])
+    """
+    said, kind = _words(maker), None if kind == "fpv" else kind  # which size and blades told, not the maker
+    if not said:
+        return []
+    own = [key for key in FAMILIES if key == maker.casefold()]
+    kin = own or [key for key in FAMILIES if said <= _words(FAMILIES[key]) and (kind is None or class_of(key) == kind)]
+    if THREE_BLADES & set(kin):  # a series of its own
+        kin = [key for key in kin if (key in THREE_BLADES) == (blades == 3)]
+    exact = [key for key in kin if said == _words(FAMILIES[key]) and class_of(key) == kind]
+    return exact if len(exact) == 1 else kin
+
+
+def family_of(maker: str, kind: str | None, blades: int | None = None) -> str | None:
     """Family of a maker's class of blades, None where the label does not say which series it is.
 
     >>> family_of("APC", "electric"), family_of("gws", "slow_flyer"), family_of("APC", None)
     ('apce', 'gwssf', None)
     """
-    if not maker or kind is None:
-        return None
-    names = (key for key, name in FAMILIES.items() if name.casefold().startswith(maker.casefold().split()[0]))
-    found = [key for key in names if class_of(key) == kind]
+    found = families_of(maker, kind, blades)
     return found[0] if len(found) == 1 else None
 
 

@@ -31,6 +31,9 @@ _SAME = {
     "min -1": "rpm", "kts": "kt", "fps": "ft_s", "kph": "km_h", "kmh": "km_h", "kilowatt": "kW", "millivolt": "mV",
     "sek": "s", "seg": "s", "secondes": "s", "sekunden": "s", "segundos": "s", "secondi": "s", "秒": "s", "с": "s",
     "в": "V", "а": "A", "вт": "W", "н": "N", "нм": "Nm", "н м": "Nm", "安": "A", "伏": "V", "瓦": "W", "牛": "N",
+    "zoll": "in", "pouce": "in", "pouces": "in", "pulgadas": "in", "pollici": "in", "дюйм": "in", "英寸": "in",
+    "мм": "mm", "毫米": "mm", "millimeter": "mm", "millimetre": "mm", "grad": "deg", "gradi": "deg", "grados": "deg",
+    "degrés": "deg", "degres": "deg", "度": "deg",
     "pct.": "pct", "prozent": "pct", "kg/cubic metre": "kg_m3", "kp cm": "kgf_cm", "kpcm": "kgf_cm", "kgcm": "kgf_cm",
 }  # fmt: skip
 TWO_MEANINGS = {
@@ -69,7 +72,8 @@ WEIGHTS = {
 FORCES = {"gf": "gram-force", "kgf": "kilogram-force", "lbf": "pound-force", "ozf": "ounce-force"}
 _ANY_CASE = {"v": "V", "a": "A", "w": "W", "n": "N", "nm": "Nm", "gf": "gf", "kgf": "kgf", "lbf": "lbf", "s": "s",
              "kw": "kW", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "c": "C", "f": "F", "k": "K", "ncm": "Ncm", "hp": "hp",
-             "us": "us", "kn": "kN", "m/s": "m_s"}  # fmt: skip
+             "us": "us", "kn": "kN", "m/s": "m_s", "mm": "mm", "cm": "cm", "m": "m", "in": "in", "deg": "deg",
+             "rad": "rad"}  # fmt: skip
 """Units that capitals do not change where the quantity is known."""
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
-from bemt.data.readers import polar_c81, uiuc
+from bemt.base.packed import packed, unpacked
+from bemt.data.readers import load_bytes, polar_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.references import Reference
@@ -29,7 +30,7 @@ _EXPORT = (
 )
 _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
-    (b"PK\x03\x04", "a zip archive or an Excel workbook", "Unpack it, or save the sheet as CSV"),
+    (b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),
     (b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
     (b"\x89PNG", "a picture", ""),
     (b"\xff\xd8\xff", "a picture", ""),
@@ -46,7 +47,7 @@ _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
 )
 _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
-    (re.compile(rb"^\s*(#.*\s+)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
+    (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
     (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
      "Import the propeller's own file, PER3_*.dat"),
     (re.compile(rb"^\s*Force vector: \(", re.MULTILINE), "a force report of Fluent 6 or older",
@@ -55,11 +56,13 @@ _INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
 
 
 def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
-    """Identify a file that no reader takes: what it is, and a hint."""
+    """Identify a file that no reader takes: what it is, and a hint; None: the reason of the readers says it."""
     try:
         with Path(path).open("rb") as stream:
             head = stream.read(16384)
-    except OSError:
+        if packed(head):
+            head = unpacked(load_bytes(path), os.fspath(path), 16384)
+    except (OSError, InputError):
         return None
     if not head.strip():
         return ("an empty file", "Did the export finish?")
@@ -75,7 +78,7 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
         return ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
     if b"\0" in head:
         zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
-        if zeros > 0.8 * len(head[:400]) / 2:
+        if zeros > 0.8 * len(head[:400]) / 2 and bytes(16) not in head:
             return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
         return None
     for pattern, got, hint in _INSIDE:

@@ -15,11 +15,12 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bemt.base.errors import Fault, InputError
+from bemt.base.packed import MAX_BYTES
 from bemt.base.tables import file_hash, number_of
 
 MAX_ARCHIVE = 500_000_000
 """Bytes that an archive may have."""
-MAX_UNPACKED = 1_000_000_000
+MAX_UNPACKED = MAX_BYTES
 """Bytes that its files may have together."""
 MAX_FILES = 50_000
 """Files that it may hold."""

@@ -16,9 +16,10 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
+from bemt.base.units import Unit
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import may_be_shaft_speed
+from bemt.data.readers.headings import channel_of, may_be_shaft_speed, meanings
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.physics.dataset import Dataset
 
@@ -34,13 +35,18 @@ _WORDS: dict[str, str] = {
     "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
     "power": r"power|leistung",
     "duct_thrust": r"duct|shroud|nozzle",
-    "airspeed": r"air_?speed|inlet[-_ ]?velocity|free_?stream|^[vu]_?inf|advance[-_ ](speed|velocity)|flight[-_ ]speed",
-    "density": r"density|^rho\b|^rho_kg",
+    "airspeed": r"inlet[-_ ]?(velocity|speed)|advance[-_ ](speed|velocity)|flight[-_ ]speed",
+    "cells": r"^((number|no\.?)[-_ ]of[-_ ]|n[-_ ]?|mesh[-_ ]|grid[-_ ])*(cells|elements)$"
+    r"|^(cell|element)s?[-_ ]count$",
 }
-"""Heading of a quantity."""
+"""Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
+CELLS = re.compile(_WORDS["cells"], re.IGNORECASE)
+"""Heading of the cells of a grid."""
 CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
 """Channel of a load."""
+_MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
+_DISK = re.compile(r"(Disk\d+)_(Force|Moment|Power)(?:_([xyz]))?")  # Flow360: BET and actuator disks
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +61,7 @@ class LoadColumn:
     part: str  # force, moment, or "" where only the heading tells
     unit: str
     record: Dataset
+    of_sound: bool = False  # made dimensionless by the speed of sound and one unit of the grid
 
 
 def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
@@ -66,7 +73,11 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     for name in record.values:
         if name in clock or name.startswith(("center_of_pressure", "force_coefficient", "moment_coefficient")):
             continue
-        if _PART.match(name):
+        if _PART.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):
+            continue
+        if form == "flow360_forces" and (m := _DISK.fullmatch(name)):
+            part, axis = m[2].lower().replace("power", ""), m[3] or ""
+            out.append(LoadColumn(file, name, m[2], m[1], axis, part, "", record, True))
             continue
         match = re.fullmatch(r"(.+?)\s*\(([^()]*)\)", name) if form != "openfoam_forces" else None
         if form == "fluent_transcript" and match is None:  # residuals
@@ -98,6 +109,7 @@ class OpenRun:
     end: float = math.inf
     notes: list[str] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
+    used: set[str] = field(default_factory=set)  # names of columns that became something
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
         """Note a fault of a column's file, or of the run."""
@@ -125,18 +137,23 @@ class OpenRun:
                 continue
             if _NOT.search(c.stem) and unit is None:
                 continue
-            word = re.sub(r"-op$|-rfile$", "", c.stem)
+            word = re.sub(r"[-_ ](op|rfile)$", "", c.stem)
+            word = word.removesuffix(f"_{c.unit}") if c.unit else word
             if quantity == "rpm":
                 fits = may_be_shaft_speed(word) or unit is not None
             else:
                 part = {"thrust": "force", "torque": "moment"}.get(quantity)
-                fits = c.part == part or re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
+                words = quantity in _WORDS and re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
+                fits = (c.part == part if c.part else words) or _means(word, unit, quantity)
             if fits:
                 out.append(c)
         return _recorded(out)
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
+        self.used.add(c.name)
+        if quantity == "cells":
+            return c.record[c.name]
         told = self.fact(quantity).unit
         unit = unit_of(told) if told else unit_of(c.unit)
         stated = unit_of(c.unit)
@@ -144,8 +161,8 @@ class OpenRun:
             got = f"{told}, where the file says {c.unit}"
             self.fault(c, c.name, got, "the unit of the file", f"Leave out --unit {quantity}=...")
             return None
-        if c.part and c.axis and not c.unit and not told:
-            factor = self._reference(c)
+        if not c.unit and not told and (c.of_sound or (c.part and c.axis)):
+            factor = self._of_sound(c) if c.of_sound else self._reference(c)
             return None if factor is None else c.record[c.name] * factor
         if unit is None:
             usual = QUANTITIES[quantity][1]
@@ -156,6 +173,20 @@ class OpenRun:
             return None
         scale = unit.factor / (math.pi / 30.0) if quantity == "rpm" else unit.factor
         return np.asarray(c.record[c.name] * (1.0 if unit.suffix == "rpm" else scale))
+
+    def _of_sound(self, c: LoadColumn) -> float | None:
+        """Newtons, newton metres or watts for one of Flow360: rho a^2 L^2, rho a^2 L^3 and rho a^3 L^2.
+
+        Flow360, "BET Loading Output", defBETForce and defBETMoment; the power by the same scales (not checked).
+        """
+        ref = self.run.reference
+        rho, a, unit = ref.density_kg_m3 or self.run.run.density_kg_m3, ref.sound_m_s, ref.length_m
+        if not (rho and a and unit):
+            hint = "--reference density=RHO,sound=A,length=L in kg/m3, m/s and m: L is one unit of the grid"
+            got = "no newtons: Flow360 divides loads of disks by density, speed of sound and the unit of the grid"
+            self.fault(c, c.name, got, "what it divided by", hint)
+            return None
+        return rho * a**2 * unit**2 * {"force": 1.0, "moment": unit}.get(c.part, a)
 
     def _reference(self, c: LoadColumn) -> float | None:
         """Newtons, or newton metres, for one of a coefficient."""
@@ -211,6 +242,8 @@ class OpenRun:
                 got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
                 usual = '--unit rpm=rpm, or --unit rpm="rad/s", says its unit' if not stated else "Leave out --rpm"
                 self.fault(own[0], own[0].name, got, "one source of the speed", usual)
+        if own and (head.rpm is None or told.column is not None):
+            self.used |= {c.name for c in own}
         if own and head.rpm is None:
             values = self.si("rpm", own[0])
             if values is not None:
@@ -224,6 +257,14 @@ class OpenRun:
         if head.rpm is None:
             self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
         return np.array([math.nan if head.rpm is None else head.rpm])
+
+
+def _means(word: str, unit: Unit | None, quantity: str) -> bool:
+    """Whether a heading means a quantity in the words of any recording; without a unit only what nothing else is."""
+    if unit is not None:
+        name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
+        return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
+    return quantity in ("airspeed", "density") and quantity in meanings(word)
 
 
 def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
@@ -263,6 +304,7 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
         c.zone or (c.stem if len({(f.stem, f.zone) for f in found}) > 1 and c not in total[:1] else "") for c in found
     ]
     out: dict[str, LoadColumn] = {}
+    run.used |= {c.name for c in found}
     twice = 0
     for label, c in zip(labels, found, strict=True):
         twice += label in out

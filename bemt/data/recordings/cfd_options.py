@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
 from bemt.data import readers
+from bemt.data.readers import number
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
 from bemt.data.recordings.cfd_loads import DUCT
@@ -100,16 +101,36 @@ def run_from(
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
             "zones": tuple(_split(zones)) or None}  # fmt: skip
-    document = {
+    told = _setup(setup, faults)
+    document: dict[str, Any] = {
         "run": {k: v for k, v in head.items() if v is not None}, "columns": columns,
-        "reference": _numbers(reference, faults), "setup": _setup(setup, faults),
+        "reference": _numbers(reference, faults), "setup": told,
     }  # fmt: skip
+    if grids := _grids(files, told, faults):
+        document["grids"] = grids
+        del document["run"]["files"], told["cells"]
     out = Collector("")
     made = validated(RunToml, document, out)
     faults += [Fault("", _option(f.where), f.got, f.expected, f.hint) for f in out.faults]
     if faults or made is None:
         raise InputError(faults)
     return made
+
+
+def _grids(files: Sequence[str], told: dict[str, Any], faults: list[Fault]) -> list[dict[str, Any]]:
+    """Grids of a study, one file each: every run.toml of several, or files whose cells are listed; [] for one run."""
+    cells = told.get("cells")
+    if isinstance(cells, str) and "," in cells:
+        each = [number(part) for part in cells.split(",")]
+        if len(each) == len(files) and None not in each:
+            return [{"files": (f,), "cells": n} for f, n in zip(files, each, strict=True)]
+        got = f"cells={cells} for {len(files)} files"
+        faults.append(Fault("", "--setup", got, "one number for each file, in their order", "A folder counts as one"))
+        told["cells"] = None
+        return []
+    made = [(Path(f) / "run.toml").as_posix() if (Path(f) / "run.toml").is_file() else f for f in files]
+    told.setdefault("cells", None)
+    return [{"files": (f,)} for f in made] if len(made) > 1 and all(_is_run(Path(f)) for f in made) else []
 
 
 def _option(where: str) -> str:
@@ -156,18 +177,26 @@ def _is_run(path: Path) -> bool:
 
 
 def write_run(run: RunToml, out: str) -> Path:
-    """Write ``run.toml``; its files are named relative to it."""
+    """Write ``run.toml``, or the ``study.toml`` of several grids; its files are named relative to it."""
     path = Path(out)
     path = path if path.suffix == ".toml" else path / "run.toml"
     if path.is_file() and not _is_run(path):
         raise InputError(Fault("--out", "", f"{path.as_posix()}, which is no run", "a new name, or a run to replace"))
     path.parent.mkdir(parents=True, exist_ok=True)
-    files = tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in run.run.files)
-    document: Mapping[str, Any] = run.model_dump(exclude_unset=True) | {
-        "run": run.run.model_dump(exclude_unset=True) | {"files": files}
-    }
+
+    def near(files: Sequence[str]) -> tuple[str, ...]:
+        return tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in files)
+
+    document: dict[str, Any] = run.model_dump(exclude_unset=True, exclude_none=True)
+    if run.grids:
+        document["run"].pop("files", None)
+        document["grids"] = [g | {"files": near(g["files"])} for g in document["grids"]]
+    else:
+        document["run"]["files"] = near(run.run.files)
     text = toml_text(
-        RunToml.model_validate(document), "One CFD run, written by bemt import. Give this file in place of the exports."
+        RunToml.model_validate(document),
+        f"{'One condition on several grids' if run.grids else 'One CFD run'}, written by bemt import. "
+        "Give this file in place of the exports.",
     )
     write_atomic(path, text)
     return path

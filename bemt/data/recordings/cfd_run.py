@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,13 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
-from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
+from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
 from bemt.data.recordings.cfd_setup import with_grid_floor
+from bemt.data.recordings.cfd_study import by_grid, groups, together
+from bemt.data.recordings.channels import moves
 from bemt.data.recordings.grid_study import COVERAGE
 from bemt.physics.dataset import Dataset
 
@@ -33,6 +36,8 @@ MOVING = 0.01
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
+"""Names of columns that say the loads once more."""
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
 
 
@@ -82,9 +87,12 @@ def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
 def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
-    One point, or one for each design point, from files relative to `folder`. ``provenance``: ``conditions``,
-    ``averaged``, ``drift``. InputError with everything that has to be said first: units, zones, speed.
+    One point, or one for each design point, from files relative to `folder`; runs of one condition on several grids
+    (``[[grids]]``, or rows of unlike cells) are one point. ``provenance``: ``conditions``, ``averaged``, ``drift``,
+    ``studies`` (`cfd_study.by_grid`). InputError with everything that has to be said first: units, zones, speed.
     """
+    if run.grids:
+        return _grids(run, folder, name)
     paths = [folder / f for f in run.run.files]
     read, faults = read_run(paths)
     homes = {
@@ -111,6 +119,8 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         if not pool:
             continue
         counted, ducts = counted_zones(work, quantity, pool)
+        if not counted:
+            continue
         found = {
             z: work.mean(quantity, pool[z])
             for z in {*(z for _, z in counted), *(ducts if quantity == "thrust" else ())}
@@ -132,6 +142,34 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     if work.faults:
         raise InputError(list(dict.fromkeys(work.faults)))
     return _dataset(work, values, u, about, read)
+
+
+def _grids(run: RunToml, folder: Path, name: str) -> Dataset:
+    """Runs on several grids, the options the same for all of them, as one study."""
+    parts: list[Dataset] = []
+    faults: list[Fault] = []
+    for grid in run.grids:
+        at = [folder / f for f in grid.files]
+        made = at[0] / "run.toml" if (at[0] / "run.toml").is_file() else at[0]
+        try:
+            if len(at) == 1 and made.is_file() and readers.detect(made) == "cfd_run":
+                part = assemble(readers.read(made), made.parent, str(made))
+            else:
+                files = tuple(str(f) for path in at for f in (cfd_files(path) if path.is_dir() else (path,)))
+                own = run.run.model_copy(update={"files": files})
+                setup = run.setup.model_copy(update={"cells": None})
+                part = assemble(run.model_copy(update={"run": own, "grids": (), "setup": setup}), Path(), str(at[0]))
+        except InputError as error:
+            faults += error.faults
+            continue
+        if grid.cells is not None:
+            conditions = {**part.provenance["conditions"], "cells": grid.cells}
+            part = replace(part, provenance={**part.provenance, "conditions": conditions})
+        parts.append(part)
+    if faults:
+        raise InputError(list(dict.fromkeys(faults)))
+    found = together(parts, name=name)
+    return replace(found, provenance={**found.provenance, "files": run.files})
 
 
 def _nothing(work: OpenRun) -> None:
@@ -161,6 +199,9 @@ def _applied(
     head = work.run.run
     sector = head.sector or 1
     values: dict[str, Array] = {"rpm": rpm}
+    if own := work.named("cells")[:1]:
+        values["cells"] = own[0].record[own[0].name]
+        work.used.add(own[0].name)
     for name, quantity, given in (
         ("airspeed_m_s", "airspeed", head.airspeed_m_s),
         ("density_kg_m3", "density", head.density_kg_m3),
@@ -168,9 +209,7 @@ def _applied(
         own = [] if given is not None else work.named(quantity)
         if given is not None:
             values[name] = np.array([given])
-        elif (
-            own and (unit_of(own[0].unit) or work.fact(quantity).unit) and (v := work.si(quantity, own[0])) is not None
-        ):
+        elif own and (v := work.si(quantity, own[0])) is not None:
             values[name] = v[-1:] if own[0].record.provenance.get("clock") in ("time", "iteration") else v
     u: dict[str, Array] = {}
     over: dict[str, str] = {}
@@ -197,7 +236,33 @@ def _applied(
         _coefficients(work, values, u, over)
     if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
         _nothing(work)
+    elif "airspeed_m_s" not in values and "J" not in values:
+        for c in [c for c in work.columns if channel_of(c.stem) == "J" and _table(c.record)][:1]:
+            values["J"] = c.record[c.name]
+            work.used.add(c.name)
+    if not work.faults:
+        _unused(work, values)
     return values, u, {"averaged": over, "drift": drift}
+
+
+def _table(record: Dataset) -> bool:
+    """Whether the rows of an export are runs, and no history."""
+    return record.provenance.get("clock") not in ("time", "iteration") and len(record) > 1
+
+
+def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
+    """Name columns that vary and became nothing: rows that differ in one of them only are no repeats."""
+    rest = [c for c in work.columns if _table(c.record) and c.name not in work.used and moves(c.record[c.name])]
+    rest = [c for c in rest if channel_of(c.stem) not in _KNOWN]
+    if not rest:
+        return
+    names = ", ".join(dict.fromkeys(c.name for c in rest))
+    state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
+    apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if "cells" not in state and state else not state
+    end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
+    work.notes.insert(
+        0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
+    )
 
 
 def _coefficients(work: OpenRun, values: dict[str, Array], u: dict[str, Array], over: dict[str, str]) -> None:
@@ -218,14 +283,17 @@ def _dataset(
     run, name = work.run, work.name
     rows = max(v.size for v in values.values())
     bad = [k for k, v in values.items() if v.size not in (1, rows)]
+    each = values.get("cells")
     if bad:
         got = ", ".join(f"{k} {values[k].size}" for k in values)
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
-    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items()}
+    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k != "cells"}
     clocks = {str(r.provenance.get("clock")) for _, r in read}
     told = {k: v for k, v in run.setup.given().items() if v is not None}
     program = " + ".join(dict.fromkeys(PROGRAMS[str(r.provenance["format"])] for _, r in read))
     cells = next((float(r.provenance["cells"]) for _, r in read if str(r.provenance.get("cells", "")).isdigit()), None)
+    if each is not None and np.unique(each).size == 1:
+        cells = float(each[0])
     steady = False if "time" in clocks else True if "iteration" in clocks else None
     found = {"program": program, "cells": cells, "steady": steady, "thrust_from": "forces"}
     conditions = {k: v for k, v in found.items() if v is not None} | told
@@ -253,6 +321,9 @@ def _dataset(
         made = Dataset("cfd", made.name, {k: v[index] for k, v in full.items()}, {k: made.u[k][index] for k in u}, (),
                        provenance, tuple(labels[i] for i in index) if labels else (),
                        notes=(*made.notes, f"{number_of((~keep).sum(), 'point')} without a load left out"))  # fmt: skip
+        each = None if each is None else np.broadcast_to(each, (rows,))[index]
+    if each is not None and np.unique(each).size > 1:
+        return by_grid(made, each)
     return with_grid_floor(made, conditions.get("u_grid", math.nan))
 
 
@@ -264,7 +335,7 @@ def document(d: Dataset) -> dict[str, Any]:
     ]  # fmt: skip
     told = {k: d.provenance[k] for k in ("averaged", "drift", "conditions")}
     head = {"name": str(d.provenance["file"]), "files": list(d.provenance["files"]), "points": points}
-    return head | told | {"notes": list(d.notes)}
+    return head | told | {"studies": [s.document() for s in d.provenance.get("studies", ())], "notes": list(d.notes)}
 
 
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]", "duct_thrust_N": "of it duct [N]",

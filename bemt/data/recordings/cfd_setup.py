@@ -61,23 +61,28 @@ def _flies(d: Dataset) -> NDArray[np.bool_]:
     return out
 
 
-def with_grid_floor(d: Dataset, u_grid: float = math.nan) -> Dataset:
-    """Loads of CFD with what their grid is worth: a stated uncertainty [1], else the floor; the note says which."""
+def with_grid_floor(
+    d: Dataset, u_grid: float | Mapping[str, NDArray[np.float64]] = math.nan, notes: tuple[str, ...] = ()
+) -> Dataset:
+    """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say."""
     random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
     numerics: dict[str, Any] = {}
     flies = _flies(d)
+    bare = np.zeros(len(d), dtype=bool)
     for name in ("thrust_N", "duct_thrust_N", "torque_Nm", "power_W", "CT", "CQ", "CP"):
         if name in d:
             least = np.array([grid_floor(name, bool(f)) for f in flies])
-            numerics[name] = np.abs(d[name]) * (least if math.isnan(u_grid) else u_grid)
+            own = np.asarray(u_grid.get(name, math.nan) if isinstance(u_grid, Mapping) else u_grid, dtype=float)
+            open_ = np.broadcast_to(np.isnan(own), least.shape)
+            bare |= open_
+            numerics[name] = np.abs(d[name]) * np.where(open_, least, own)
     parts = {"random": {k: np.nan_to_num(v) for k, v in random.items() if k in numerics}, "numerics": numerics}
-    note = (
-        floor_note(bool(flies.any()), bool(flies.all()))
-        if math.isnan(u_grid)
-        else f"u of the grid {u_grid:.2%}, as stated"
-    )
+    if bare.any() or not numerics:
+        notes = (floor_note(bool(flies.any()), bool(flies.all())), *notes)
+    elif not notes:
+        notes = (f"u of the grid {u_grid:.2%}, as stated",)
     kept = {k: v for k, v in random.items() if k not in numerics}
-    return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (note, *d.notes), d.units,
+    return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (*notes, *d.notes), d.units,
                    d.lines, d.texts)  # fmt: skip
 
 

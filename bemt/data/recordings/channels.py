@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
+from bemt.data.readers.headings import USUAL
 from bemt.data.readers.recording import FULL_THROTTLE
 from bemt.physics.dataset import Dataset
 
@@ -33,19 +34,6 @@ MEASURED = (
     "sideslip_deg", "second_rotor_rad_s", "CT", "CP", "CQ", "eta",
 )  # fmt: skip
 """Channels that a reduced recording may have."""
-_ALIASES = {
-    "T_N": "thrust_N", "F_N": "thrust_N", "Q_Nm": "torque_Nm", "M_Nm": "torque_Nm", "U_V": "voltage_V",
-    "I_A": "current_A", "pulse_width_s": "pwm_s", "V_m_s": "airspeed_m_s", "gap_m": "tip_gap_m",
-    "mechanical_power_W": "power_W", "shaft_power_W": "power_W", "T_K": "temperature_K", "P_Pa": "pressure_Pa",
-    "air_temperature_K": "temperature_K", "air_pressure_Pa": "pressure_Pa", "rho_kg_m3": "density_kg_m3",
-    "air_density_kg_m3": "density_kg_m3", "P_el_W": "electrical_power_W", "P_in_W": "electrical_power_W",
-    "input_power_W": "electrical_power_W", "P_mech_W": "power_W", "P_shaft_W": "power_W",
-    "speed_m_s": "airspeed_m_s", "velocity_m_s": "airspeed_m_s", "U_inf_m_s": "airspeed_m_s",
-    "V_inf_m_s": "airspeed_m_s", "Vinf_m_s": "airspeed_m_s", "wind_speed_m_s": "airspeed_m_s",
-    "wind_m_s": "airspeed_m_s", "tunnel_speed_m_s": "airspeed_m_s", "freestream_velocity_m_s": "airspeed_m_s",
-    "freestream_m_s": "airspeed_m_s", "pull_N": "thrust_N", "force_N": "thrust_N", "load_N": "thrust_N",
-    "load_cell_N": "thrust_N", "loadcell_N": "thrust_N",
-}  # fmt: skip
 _SPEEDS = ("optical_rpm", "electrical_rpm")
 _DRIVE_SPEEDS = {
     "motor_rpm": "right only if the motor turns the propeller without a gear",
@@ -138,7 +126,7 @@ def named(d: Dataset) -> Dataset:
     for name, v in d.values.items():
         if not d.unit(name) and name not in ("run", "rpm", *_SPEEDS):
             continue
-        target = _ALIASES.get(name, name)
+        target = USUAL.get(name, name)
         if target != name and (target in d or target in values):
             continue
         if target not in MEASURED and _base_of_u(name) is None:
@@ -148,10 +136,10 @@ def named(d: Dataset) -> Dataset:
             shown = ", ".join(f"{x:.3g}" for x in v[far][:3]) + (", ..." if far.sum() > 3 else "")
             out += lost(d, np.flatnonzero(far), target, f"{shown}: no physical magnitude")
         values[target], names[target] = np.where(far, np.nan, v) if far.any() else v, name
-    u = {_ALIASES.get(key, key): v for key, v in stated(d).items() if _ALIASES.get(key, key) in values}
+    u = {USUAL.get(key, key): v for key, v in stated(d).items() if USUAL.get(key, key) in values}
     for name in [k for k in values if _base_of_u(k) is not None]:
         base = _base_of_u(name) or ""
-        base = _ALIASES.get(base, base)
+        base = USUAL.get(base, base)
         column = values.pop(name)
         names.pop(name)
         if base in values:

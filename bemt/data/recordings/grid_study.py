@@ -26,7 +26,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text
 
 FS_THREE = 1.25
 """Safety factor with three grids."""
@@ -56,6 +58,56 @@ class GridStudy:
     safety: float  # Factor Fs [1]
     u_relative: float  # Standard uncertainty of f1 by the grid, relative [1]
     flags: tuple[str, ...]  # What is wrong with the study; empty when nothing is
+
+
+LOADS = {"thrust_N": "N", "duct_thrust_N": "N", "torque_Nm": "N m", "power_W": "W", "CT": "", "CQ": "", "CP": ""}
+"""Loads that are extrapolated, and their units."""
+
+
+class LoadStudy(Documented):
+    """Grid study of one load at one condition; the finest grid comes first."""
+
+    channel: str
+    cells: tuple[float, ...]
+    values: tuple[float, ...]  # unit of the channel
+    u_relative: float  # Standard uncertainty on the finest grid [1]
+    # As in `GridStudy`, of the finest three grids
+    order: float | None = None
+    extrapolated: float | None = None
+    gci_fine: float | None = None
+    gci_coarse: float | None = None
+    asymptotic: float | None = None
+    flags: tuple[str, ...] = ()
+    rpm: float = math.nan
+    airspeed_m_s: float = math.nan
+    density_kg_m3: float = math.nan
+    J: float = math.nan
+
+    @property
+    def name(self) -> str:
+        """Load in words."""
+        return self.channel if not LOADS[self.channel] else self.channel.rsplit("_", 1)[0].replace("_", " ")
+
+    def sentence(self) -> str:
+        """What the grids say.
+
+        >>> s = grid_study([7.57, 7.42, 7.05], ratios([5.8e6, 1.7e6, 0.5e6]))
+        >>> told = s.u_relative, s.order, s.extrapolated, s.gci_fine
+        >>> LoadStudy("thrust_N", (5.8e6, 1.7e6, 0.5e6), s.values, *told, rpm=6000.0).sentence()
+        'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.671 N at cell size 0, GCI 1.68 %, u 1.5 %'
+        """  # noqa: E501
+        unit, many = LOADS[self.channel], max(self.cells) >= 1e5
+        grids = ", ".join(f"{c / (1e6 if many else 1.0):.3g}" for c in self.cells)
+        state = "one speed" if math.isnan(self.rpm) else f"{self.rpm:g} rev/min"
+        state += f", {self.airspeed_m_s:g} m/s" if self.airspeed_m_s > 0.0 else ""
+        state += f", J {self.J:g}" if self.J > 0.0 else ""
+        values = ", ".join(f"{v:.4g}" for v in self.values)
+        lead = f"{self.name} on {grids}{' million' if many else ''} cells at {state}: {values} {unit}".rstrip()
+        end = f"u {100 * self.u_relative:.1f} %" + (f" ({'; '.join(self.flags)})" if self.flags else "")
+        if self.order is None or self.gci_fine is None:
+            return f"{lead}; no order: three times their spread is taken, {end}"
+        best = f"{number_text(self.extrapolated, 4)} {unit}".rstrip()
+        return f"{lead}; order {self.order:.2f}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %, {end}"
 
 
 def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:

@@ -38,6 +38,7 @@ from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import adapt, damaged_export, recognised
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.choice import Choice, averaged
 from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.data.recordings.reduce import reduction
@@ -89,6 +90,8 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
+    elif record.provenance["format"] == "table":
+        record = of_table(record)
     elif record.provenance.get("clock") == "time":
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
@@ -184,6 +187,8 @@ def document(
             records[name] = import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
+    told = {r["name"] for r in runs}
+    runs += [cfd_run.document(d) for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told]
     notes = _restart_notes(names, records)
     files = []
     for name in names:
@@ -195,14 +200,45 @@ def document(
 
 
 def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list[dict[str, Any]], str | None]:
-    """CFD runs among the paths: a run.toml each, and the exports together; what they need to become one."""
+    """CFD runs among the paths, as plain values; what exports need to become one."""
+    found, to_do = runs_of(names, run, insist)
+    return [cfd_run.document(d) for d in found], to_do
+
+
+def runs_of(
+    names: Sequence[str], run: RunToml | None = None, insist: bool = False
+) -> tuple[list[Dataset], str | None]:  # fmt: skip
+    """CFD runs of files as the options of `run` say (`cfd_options.run_from`).
+
+    Parameters
+    ----------
+    names : sequence of str
+        A run.toml each, and exports, which are one run together; with ``run.grids`` all of them are one study.
+    run : RunToml or None
+        What the exports do not say.
+    insist : bool
+        Whether it is an error when they are no run.
+
+    Returns
+    -------
+    list of Dataset, str or None
+        The runs, as every command takes them; what exports that are no run yet need.
+    """
+    if run is not None and run.grids:
+        if not insist and all(g.cells is None for g in run.grids):
+            return merged([import_file(f) for f in run.files]), None
+        found = cfd_run.assemble(run, Path(), f"{len(run.grids)} grids")
+        if not found.provenance["studies"]:
+            got = "runs of unlike conditions: no two of them are one speed and airspeed on two grids"
+            raise InputError(Fault("--out", "", got, "one condition on several grids", "Import each run by itself"))
+        return [found], None
     runs, exports = [], list[str]()
     for name in names:
         try:
             if Path(name).is_dir() and not (Path(name) / "run.toml").is_file():
                 exports += map(str, cfd_files(Path(name)))
             elif Path(name).is_dir() or importers.detect(name) == RUN:
-                runs.append(cfd_run.document(import_file(name)))
+                runs.append(import_file(name))
             elif importers.detect(name) in PROGRAMS:
                 exports.append(name)
         except (InputError, OSError):
@@ -218,7 +254,7 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
     whole = run.model_copy(update={"run": head}) if run else RunToml(run=head)
     name = " + ".join(Path(e).name for e in exports[:3])
     try:
-        return [*runs, cfd_run.document(cfd_run.assemble(whole, Path(), name))], None
+        return [*runs, cfd_run.assemble(whole, Path(), name)], None
     except Exception as error:
         if insist:
             raise
@@ -282,6 +318,8 @@ def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
 
 def _file_text(file: Mapping[str, Any]) -> str:
     if file["error"] is not None:
+        if not os.path.exists(file["path"]):
+            return str(file["error"])
         return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
     lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
     rows, plain = [], []
@@ -323,8 +361,14 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
         lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
     if wrote or found["runs"]:
         name = "" if wrote else str(found["runs"][0]["name"])
-        file = wrote or (name if name.endswith(".toml") else "run.toml")
-        lead = f"{wrote} written. " if wrote else "" if file == name else "With --out run.toml: "
+        study = bool(found["runs"][0]["studies"])
+        usable = (
+            Path(name).is_file()
+            and name.endswith(".toml")
+            or any(f["path"] == name and f["format"] == RUN for f in found["files"])
+        )
+        file = wrote or ("study.toml" if study and not usable else name if usable else "run.toml")
+        lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
         step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
         return "\n".join([*lines, step])
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]

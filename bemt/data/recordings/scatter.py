@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +17,13 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 SAME_SPEED = 0.005
 """Relative difference in speed up to which points are repeats."""
 NEAR_SPEED = 0.03
 """Relative difference in speed up to which points of two runs are compared."""
+MOST_RUNS = 64
+"""Runs that are compared, each with each; of more every second, third, ... Their scatter is known to 9 % then."""
 MOST_NOISE = 0.2
 """Scatter of single comparisons above which nothing is said of the runs. [1]"""
 OUTLIER = 6.0
@@ -77,7 +82,7 @@ def repeats(load: Array, rpm: Array, group: Array, flow: Array | None = None) ->
             last
             and group[last[0]] == group[i]
             and rpm[i] <= rpm[last[0]] * (1.0 + SAME_SPEED)
-            and _same(flow, last[0], i)
+            and (flow is None or _same(flow[last[0]], flow[i]))
         ):
             last.append(int(i))
         else:
@@ -98,10 +103,9 @@ def repeats(load: Array, rpm: Array, group: Array, flow: Array | None = None) ->
     return Repeats(math.sqrt(squares / dof) if dof else math.nan, dof, tuple(outliers))
 
 
-def _same(flow: Array | None, i: int | np.intp, j: int | np.intp) -> bool:
-    if flow is None:
-        return True
-    return bool(abs(flow[i] - flow[j]) <= 0.01 * max(abs(flow[i]), abs(flow[j]), 1e-4))
+def _same(one: Any, two: Any) -> Any:
+    """Whether airspeeds or advance ratios are the same to 1 %."""
+    return np.abs(one - two) <= 0.01 * np.maximum(np.maximum(np.abs(one), np.abs(two)), 1e-4)
 
 
 def session(load: Array, rpm: Array, run: Array, flow: Array | None = None) -> Session:
@@ -116,10 +120,12 @@ def session(load: Array, rpm: Array, run: Array, flow: Array | None = None) -> S
         return Session(math.nan, 0, 0)
     k = k * np.sign(np.median(finite))
     labels = np.unique(run)
+    labels = labels[:: -(-len(labels) // MOST_RUNS)]
+    good = np.isfinite(k) & (k > 0.0)
+    own = [np.flatnonzero(good & (run == label)) for label in labels]
     rows: list[tuple[int, int, float]] = []
-    for a, first in enumerate(labels):
-        for b in range(a + 1, len(labels)):
-            rows += [(a, b, d) for d in _differences(k, rpm, run == first, run == labels[b], flow)]
+    for a, b in combinations(range(len(labels)), 2):
+        rows += [(a, b, d) for d in _differences(k, rpm, own[a], own[b], flow)]
     seen = sorted({i for row in rows for i in row[:2]})
     if len(rows) < 3 or len(seen) < 2:
         return Session(math.nan, len(seen), len(rows))
@@ -137,20 +143,24 @@ def session(load: Array, rpm: Array, run: Array, flow: Array | None = None) -> S
     return Session(math.sqrt(max(between, 0.0)), len(seen), len(rows))
 
 
-def _differences(k: Array, rpm: Array, one: Array, two: Array, flow: Array | None) -> list[float]:
+def _differences(k: Array, rpm: Array, one: Indices, two: Indices, flow: Array | None) -> list[float]:
     """Log ratios of the second run over the first, at speeds of the first."""
+    at = np.stack([rpm[two], np.zeros(len(two)) if flow is None else flow[two]])
+    two = two[np.unique(at, axis=1, return_index=True)[1]]  # by speed; of equal points the first
+    speeds, theirs = rpm[two], None if flow is None else flow[two]
     out = []
-    theirs = np.flatnonzero(two & np.isfinite(k) & (k > 0.0))
-    for i in np.flatnonzero(one & np.isfinite(k) & (k > 0.0)):
-        near = [j for j in theirs if abs(rpm[j] / rpm[i] - 1.0) < NEAR_SPEED and _same(flow, i, j)]
-        if not near:
+    for i in one:
+        low, middle = np.searchsorted(speeds, rpm[i] * np.array([1.0 - NEAR_SPEED, 1.0]), "right")
+        high = np.searchsorted(speeds, rpm[i] * (1.0 + NEAR_SPEED))
+        near = np.arange(low, high)
+        if theirs is not None:
+            near = near[_same(theirs[low:high], float(flow[i]))]  # type: ignore[index]
+        below, above = near[near < middle], near[near >= middle]
+        if not near.size:
             continue
-        below, above = [j for j in near if rpm[j] <= rpm[i]], [j for j in near if rpm[j] > rpm[i]]
-        if below and above:
-            lo, hi = max(below, key=lambda j: rpm[j]), min(above, key=lambda j: rpm[j])
-            value = float(np.interp(rpm[i], [rpm[lo], rpm[hi]], [k[lo], k[hi]]))
-        else:
-            value = float(k[min(near, key=lambda j: abs(rpm[j] - rpm[i]))])
+        nearest = ((side, speeds[side[end]]) for side, end in ((below, -1), (above, 0)) if side.size)
+        ends = [int(two[side[speeds[side] == speed]].min()) for side, speed in nearest]
+        value = float(np.interp(rpm[i], rpm[ends], k[ends]))
         out.append(math.log(value / k[i]))
     return out
 

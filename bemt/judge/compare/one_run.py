@@ -20,7 +20,7 @@ from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data.recordings.audit import combined
-from bemt.data.recordings.cfd_run import is_run
+from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
@@ -41,11 +41,15 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
     from bemt.data.recordings.load import as_dataset, import_file
 
     imported = import_file(path) if read is None else read
+    if imported.kind == "cfd" and not is_run(imported) and "clock" in imported.provenance:
+        try:
+            imported = run_at(path) or imported
+        except InputError as error:
+            hint = f"`bemt import {path}` with what is missing, and --out run.toml, keeps it"
+            first = Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint)
+            raise InputError([first, *error.faults]) from error
     if is_run(imported):
         return imported, imported
-    if imported.kind == "cfd" and imported.provenance.get("clock") in ("time", "iteration", "none"):
-        hint = f"`bemt import {path}` says what it needs to be one: --rpm, units, zones; --out run.toml keeps it"
-        raise InputError(Fault(path, "", "exports of CFD, not yet a run", "a run.toml", hint))
     points = named(as_dataset(imported))
     known = points.values.keys() & {"thrust_N", "torque_Nm", "CT", "CQ", "CP"}
     if not known or ("rpm" not in points and "thrust_N" in points):
@@ -191,8 +195,12 @@ def _sentence(points: list[dict[str, Any]]) -> str:
         tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
         size = f"{word} of BEMT is {_percent(load)}, {times:.1f} times both bands together"
         return f"CFD and BEMT differ{count}: {size}.{tail}"
-    words = "within twice both bands" if near else "within both bands"
-    return f"CFD and BEMT agree {words}.{tail}"
+    if near:
+        far = sorted(near, key=lambda item: abs(item[1]["difference"]) / item[1]["u_both"])
+        worst = dict(far)  # of each load the farthest
+        sizes = " and ".join(f"{_percent(load)} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
+        return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
+    return f"CFD and BEMT agree within both bands.{tail}"
 
 
 def _next(document: Mapping[str, Any], name: str, case: str) -> str:
@@ -242,7 +250,9 @@ def text(document: Mapping[str, Any], details: bool = False) -> str:
     if document["audit"]:
         lines += ["", "Audit of the CFD run"]
         for line in document["audit"] if details else document["audit"][:7]:
-            words = f"{line['topic']}: {line['finding']}" + (f": {line['consequence']}" if line["consequence"] else "")
+            rest = [line["finding"], line["consequence"]]
+            bare = rest[0].endswith("not stated") and rest[1] == "unknown"
+            words = f"{line['topic']}: {'not stated' if bare else ': '.join(filter(None, rest))}"
             lead = f"  {line['status']:11s}"
             lines.append(_filled(words, lead, " " * len(lead)))
     notes = [n for n in document["notes"]] if details else document["notes"][:4]

@@ -21,7 +21,6 @@ from bemt.judge.diagnose.record import CHANNELS, Record, concatenated, dense, me
 from bemt.physics import coefficients as co
 from bemt.physics.bem import model as bem
 from bemt.physics.effects.base import Effect
-from bemt.rotors.case.as_built import as_built_of
 from bemt.rotors.case.prepare import k1k2_case, prepare_case
 from bemt.rotors.case.propagate import validity_of
 from bemt.rotors.validity import counted
@@ -52,7 +51,7 @@ def _part(record: Record, case: Case, baseline: str) -> Part:
     flow = bem.flow_of(model.prepared(plain), record.rpm, record.V, record.air, record.extra, model.chord75_m)
     part = Part(record, model, model.effects, flow, case.content_hash(), tuple(case.get("model.effects_off")))
     if baseline == "bemt":
-        return replace(part, as_built=as_built_of(case.file, case.folder, model.rotor, counting_assumptions=False))
+        return replace(part, as_built=case.as_built(counting_assumptions=False))
     thrust = k1k2_case(case, None, record.rpm, record.V, record.air).thrust_N
     nothing = np.full_like(thrust, np.nan)
     return replace(part, instead=np.concatenate([thrust if c == "thrust_N" else nothing for c in part.channels]))

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.rotors.case.as_built import as_built_of, known_from
-from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.as_built import known_from
 from bemt.rotors.latents import NAMES, STEP, AsBuilt, Prior
 
 if TYPE_CHECKING:
@@ -89,8 +88,8 @@ def prior_of(case: Case) -> Prior:
     """What is known of the blade of a case before a run of it, wide enough for a label that was guessed."""
     blade, told = case.file.blade, case.file.blade.as_built
     source = known_from(blade)
-    if source == "reference" and told is not None and told.file is not None:
-        return as_built_of(case.file, case.folder, prepare_case(case, None, 10).rotor).prior
+    if source in ("reference", "measured"):
+        return case.as_built().prior
     sd, mean = dict(zip(NAMES, _SD[source], strict=True)), np.zeros(len(NAMES))
     for k, name in enumerate(NAMES):
         mean[k] = getattr(told, name, None) or 0.0

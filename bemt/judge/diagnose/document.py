@@ -109,7 +109,7 @@ def _where(w: Location) -> str:
     name, unit, digits = _VARIABLE.get(w.variable, (w.variable, "", 3))
     sign = "high" if w.size > 0 else "low"
     both = f"{w.low:.{digits}f} to {w.high:.{digits}f}{unit}" if w.high > w.low else f"{w.low:.{digits}f}{unit}"
-    error = abs(w.size / w.z) if w.z else float("nan")
+    error = float(np.hypot(w.size / w.z, w.shared * (1.0 + w.size))) if w.z else float("nan")
     spread = "" if not np.isfinite(error) else f" +- {max(error, 1e-3):.1%}"
     most = "of its largest value" if w.variable == "rpm" and w.high > w.low else "of its largest value at that speed"
     return f"{_CHANNEL[w.channel]} is {sign} by {abs(w.size):.1%}{spread} {most}, at {name} {both}."

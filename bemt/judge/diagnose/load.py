@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -263,14 +264,42 @@ def load_all(
     if references and len(found) > 1 and reference_case is None:
         hint = "--reference-case states that of the references"
         raise InputError(Fault("--reference", "", f"{len(found)} cases", "one case for all, or theirs", hint))
-    read = _together(*(partial(_read, p, c, n, v) for p, c, n, v in files))
-    known = [replace(r, reference=True) for r in read[len(recordings) :]]
-    return found, [*read[: len(recordings)], *known]
+    own, other = files[: len(recordings)], files[len(recordings) :]
+    steps = [*_on_grids(own), *(s := _on_grids(other))]
+    read = _together(*(partial(_read, p, c, d, n, v) for p, c, n, v, d in steps))
+    known = [replace(r, reference=True) for r in read[len(read) - len(s) :]]
+    return found, [*read[: len(read) - len(s)], *known]
 
 
-def _read(given: Any, case: Case, rpm: float | None, airspeed_m_s: float | None) -> Record:
+_File = tuple[Any, "Case", float | None, float | None]
+
+
+def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, float | None, Dataset | None]]:
+    """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
+    from bemt.data.recordings.cfd_run import run_at
+    from bemt.data.recordings.cfd_study import are_grids, together
+
+    runs: dict[int, Dataset] = {}
+    for i, (path, _, rpm, wind) in enumerate(files if len(files) > 1 else ()):
+        with suppress(InputError):  # said where it is loaded
+            if isinstance(path, str) and (run := run_at(path, rpm, wind)) is not None:
+                runs[i] = run
+    out, taken = [], set[int]()
+    for i, file in enumerate(files):
+        if i in taken:
+            continue
+        group = [i] if i in runs else []
+        for k in group and range(i + 1, len(files)):
+            if k in runs and files[k][1] is file[1] and are_grids([runs[j] for j in (*group, k)]):
+                group.append(k)
+        taken |= {*group}
+        out.append((*file, together([runs[j] for j in group]) if len(group) > 1 else runs.get(i)))
+    return out
+
+
+def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspeed_m_s: float | None) -> Record:
     if isinstance(given, str):
-        return load(given, case, None, rpm, airspeed_m_s)
+        return load(given, case, run, rpm, airspeed_m_s)
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +39,10 @@ class Location:
     size: float  # Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1]
     z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
     ties: tuple[str, ...]  # Other variables that explain it as well in this plan
-    mismatch: Array = field(repr=False, compare=False)  # (M,) Of every reading, in its unit; what `size` is the mean of
+    shared: float = field(default=0.0, compare=False)  # Standard uncertainty that all readings share, as stated [1]
+    mismatch: Array = field(
+        repr=False, compare=False, default_factory=lambda: np.empty(0)
+    )  # (M,) Of every reading, in its unit; what `size` is the mean of
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -59,7 +62,8 @@ def locate(found: Evidence, best: Fit) -> Location:
 
 def bare(found: Evidence) -> Location:
     """Find channel, variable and interval in which the recording itself is farthest from the case."""
-    return _largest(found, found.problem.y - found.problem.f0, ())
+    seen = _largest(found, found.problem.y - found.problem.f0, ())
+    return replace(seen, shared=max(p.record.gain.get(seen.channel, 0.0) for p in found.problem.parts))
 
 
 def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
@@ -88,7 +92,7 @@ def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
     low, high, z = _scan(x, e[here])
     inside = (x >= low) & (x <= high)
     size = float(np.mean((d / problem.largest)[here][inside]))
-    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, d)
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, 0.0, d)
 
 
 def _groups(x: Array) -> NDArray[np.intp]:

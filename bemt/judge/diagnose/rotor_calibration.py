@@ -1,4 +1,4 @@
-"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.judge.compare.as_measured`."""
+"""Reference recordings of a rotor become a case with a smaller uncertainty, by `bemt.rotors.as_measured`."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ from bemt.base.action import in_words_of_the_library
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.judge.compare.as_measured import AsMeasured, as_measured
 from bemt.judge.diagnose.improve import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.judge.diagnose.wrong_rotor_check import FACTOR
 from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
+from bemt.rotors.as_measured import AsMeasured, as_measured
 from bemt.rotors.case import Case
-from bemt.rotors.case.as_built import MOVED, posterior_document
+from bemt.rotors.case.as_built import posterior_document
 from bemt.rotors.case.prepare import prepare_case
+from bemt.rotors.case.reading import SETTLED
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.propeller import Propeller
@@ -37,8 +38,6 @@ from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
-# Assumptions that a run of the rotor settles, besides those that move a latent number.
-_SETTLED = {"model.drag_level", "model.n_crit", "blade.section.thickness", "blade.section.thickness_scale"}
 
 
 def calibrate(
@@ -158,7 +157,7 @@ def write(
     blade["known_from"] = "reference"
     blade.pop("as_built", None)
     blade["as_built"] = {"file": POSTERIOR}
-    settled = _SETTLED.union(*MOVED.values())
+    settled = SETTLED - {"rotor.hub_ratio"}
     kept = [item for item in case.written.get("assumptions", []) if item["key"] not in settled]
     source.pop("assumptions", None)
     if kept:
@@ -213,7 +212,7 @@ class CalibratedRotor:
     ----------
     source : Propeller
         The propeller as its case describes it.
-    found : bemt.judge.compare.as_measured.AsMeasured
+    found : bemt.rotors.as_measured.AsMeasured
         What the runs say.
     recordings : tuple of str
         The files.

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 # Rounded entrance, loss over 1/2 rho w^2 against lip radius / hydraulic diameter.  Nominal: Crane TP-410, p. A-29;
 # upper end: Idelchik (2007), Handbook of Hydraulic Resistance, 4th ed., diagram 3-4 (both from memory, not checked);
-# lower end: friction alone of a lip that does not separate, 0.03, from r/D 0.05 on.
+# lower end: none, from r/D 0.05 on; a lip that does not separate has friction only, which the walls' holds already.
 _LIP_R_D = np.array([0.0, 0.02, 0.04, 0.06, 0.10, 0.15])
 _LIP_K = np.array([0.50, 0.28, 0.24, 0.15, 0.09, 0.04])
 _LIP_R_D_HIGH = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12, 0.16, 0.20])
@@ -94,10 +94,10 @@ def lip_loss(radius_over_diameter: float) -> LipLoss:
     Crane TP-410; Idelchik (2007), diagram 3-4 (not checked against the books).
 
     >>> tuple(round(k, 2) for k in lip_loss(0.1))
-    (0.09, 0.03, 0.12)
+    (0.09, 0.0, 0.12)
     """
     x = max(radius_over_diameter, 0.0)
-    low = float(np.interp(x, [0.0, 0.05], [0.50, 0.03]))
+    low = float(np.interp(x, [0.0, 0.05], [0.50, 0.0]))
     nominal, high = (float(np.interp(x, *table)) for table in ((_LIP_R_D, _LIP_K), (_LIP_R_D_HIGH, _LIP_K_HIGH)))
     return LipLoss(nominal, min(low, nominal), max(high, nominal))
 
@@ -129,6 +129,26 @@ class DuctFlow:
         with np.errstate(divide="ignore", invalid="ignore"):
             bend = np.where(V > 0.0, self.bend * V / np.hypot(y, V), 0.0)
         return np.asarray(V + (y - self.capture / self.contraction * V) * (1.0 + bend))
+
+    def balance(self, w: Array, V: Array) -> tuple[Array, Array]:
+        """Thrust over density and swept area, and the duct's share of it, at a speed through the disk; no swirl."""
+        jet = self.jet_speed(w, V)
+        T = w * (jet - V) - 0.5 * V * np.abs(V) * self.drag_area / self.area
+        own = 0.5 * (jet**2 - V**2 + self.wall_loss * w**2 + self.lip_loss * (w - V) ** 2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(T), np.asarray(1.0 - own / T)
+
+    def share_at(self, thrust: Array, V: Array) -> Array:
+        """Share of the duct at a thrust over density [m4/s2] and an airspeed [m/s], (P,); NaN where none is left."""
+        wanted = np.asarray(thrust) / self.area
+        low = self.wake_ratio * self.capture * np.abs(V)  # the rotor adds nothing
+        high = low + 4.0 * np.sqrt(np.abs(wanted)) + 1e-9
+        lost = self.balance(low, V)[0] > wanted
+        for _ in range(60):
+            w = 0.5 * (low + high)
+            above = self.balance(w, V)[0] > wanted
+            low, high = np.where(above, low, w), np.where(above, w, high)
+        return np.where(lost, np.nan, self.balance(0.5 * (low + high), V)[1])
 
     def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together."""

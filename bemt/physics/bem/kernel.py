@@ -46,7 +46,7 @@ from bemt.physics.bem.residual import (
     mean_share,
     open_rotor,
 )
-from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, wide
+from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, intrinsic, njit, ready, wide
 
 # Point and station status, in the order of severity; bemt.physics.bem.solver turns them into words.
 OK, NOT_CONVERGED, JUMP, NOT_FINITE = range(4)
@@ -468,7 +468,7 @@ class KernelEntry:
             self._left -= points.shape[0] * st.shape[0]
             self._fast = self._left < 0 or bool(self.compiled.signatures) or _on_disk(self.compiled)
         if self._fast:
-            self.compiled(points, st, tab, par, out, radial)
+            ready(self.compiled)(points, st, tab, par, out, radial)
         else:
             interpret(*self.kind, points, st, tab, par, out, radial)
 

@@ -46,8 +46,9 @@ HUB_LOADS = ("H_force_N", "Y_force_N", "roll_moment_Nm", "pitch_moment_Nm")
 """Channels of the hub's loads in oblique flow, in the order of :attr:`bemt.physics.bem.solver.Solution.hub`."""
 
 
-PREPARED: Kept[solver.Prepared] = Kept(512e6, lambda made: made.st.nbytes + made.tab.nbytes)
-"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to half a gigabyte."""
+PREPARED: Kept[solver.Prepared] = Kept(160e6, lambda made: made.st.nbytes + made.tab.nbytes)
+"""Prepared rotors of this process, by geometry, section tables, duct, effects and range: up to 160 MB, the unknowns of
+three labels [B]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +126,11 @@ class Model:
         # effects read the tables at two Reynolds numbers besides
         low, high = min(_SLOWEST * float(Re.min()), RE_FIXED), max(_FASTEST * float(Re.max()), RE_FAST)
         mach = min(_FASTEST * float(np.max(np.hypot(omega * blade.R, onset) / air.a_sound)), self.mach_max)
-        nodes = arrays.mach_nodes(mach), arrays.re_nodes((low, high))
-        if nodes not in self._reaching:  # few: nodes of the tables
-            self._reaching[nodes] = replace(self, re_range=(low, high), mach_max=mach)
-        return self._reaching[nodes]
+        most, re_range = arrays.block(mach, (low, high))
+        key = (most, re_range)
+        if key not in self._reaching:  # few: blocks of the tables
+            self._reaching[key] = replace(self, re_range=re_range, mach_max=min(most, self.mach_max))
+        return self._reaching[key]
 
     def with_effects(self, effects: Sequence[Effect]) -> Model:
         """Model with other physics on."""

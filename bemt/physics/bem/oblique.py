@@ -70,7 +70,7 @@ from bemt.physics.bem.kernel import (
     S_TIP,
 )
 from bemt.physics.bem.residual import N_BRIDGE, N_FAR, N_NUM, N_SWIRL, Y_BRAKE, Y_RING, loss, mass_flow
-from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, njit, sincos, wide
+from bemt.physics.bem.vecmath import atan2, fingerprint, inlined, njit, ready, sincos, wide
 
 P_OMEGA, P_V, P_RHO, P_MU, P_SOUND, P_SIDE, P_CONE, P_BACK, P_TOWARD = range(9)
 N_POINT = 9
@@ -385,5 +385,5 @@ def run(
     hub = np.empty((points.shape[0], 4))
     maps = np.zeros((points.shape[0], st.shape[0] if disk else 0, n))
     rounds = np.cos(psi), np.sin(psi), np.cos(few), np.sin(few)
-    _ENTRIES[layout](np.ascontiguousarray(points), st, tab, par, *rounds, R, out, hub, maps)
+    ready(_ENTRIES[layout])(np.ascontiguousarray(points), st, tab, par, *rounds, R, out, hub, maps)
     return out, hub, maps

@@ -55,6 +55,18 @@ def re_nodes(re_range: tuple[float, float] | None, re: Array = DEFAULT_RE) -> tu
     return first, max(int(np.searchsorted(re, re_range[1])), first + 1)
 
 
+# Rotors are prepared for blocks of nodes, so that a new speed mostly finds one ready: Mach 0.74, 1.02 and all.
+_MACH_BLOCKS, _RE_BLOCK = (7, 12), 4
+
+
+def block(mach: float, re_range: tuple[float, float], re: Array = DEFAULT_RE) -> tuple[float, tuple[float, float]]:
+    """Largest Mach number and ends of the Reynolds numbers of the block of tables that holds what is asked for [1]."""
+    first, last = re_nodes(re_range, re)
+    first, last = first - first % _RE_BLOCK, min(-(-(last + 2) // _RE_BLOCK) * _RE_BLOCK - 2, re.size - 1)
+    nodes = next((n for n in _MACH_BLOCKS if n >= mach_nodes(mach)), None)
+    return math.inf if nodes is None else math.sqrt((nodes - 1.5) * M2_STEP), (float(re[first]), float(re[last]))
+
+
 def common_grid(
     polars: Sequence[Polar], M: Array, re_range: tuple[float, float] | None = None
 ) -> tuple[Array, Array, Array]:

@@ -9,14 +9,19 @@ and logarithm from fdlibm (Sun Microsystems 1993), arc tangent from Cephes (Mosh
 
 from __future__ import annotations
 
+import logging
 import math
 import zlib
+from contextlib import suppress
+from functools import cache
+from multiprocessing import parent_process
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numba import njit as _njit
 from numba import types
+from numba.core.caching import NullCache
 from numba.extending import intrinsic as _intrinsic
 
 # Keeps NaN and infinity as they are; lets sums over stations run in SIMD lanes.
@@ -24,8 +29,27 @@ _FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
 def njit(function: Any) -> Any:
-    """Compile an entry point: cached on disk, lazily, without the interpreter lock."""
-    return _njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)(function)
+    """Compile an entry point: lazily, without the interpreter lock, kept on disk where a folder can be written."""
+    made = _njit(nogil=True, error_model="numpy", fastmath=_FAST)(function)
+    with suppress(RuntimeError):  # "no locator available": a read-only installation without a home
+        made.enable_caching()
+    return made
+
+
+@cache
+def _say_unkept() -> None:
+    if parent_process() is None:
+        logging.getLogger("bemt").warning(
+            "No folder can be written for compiled code: each start compiles anew, some seconds. "
+            "Set NUMBA_CACHE_DIR to a folder that can be written."
+        )
+
+
+def ready(compiled: Any) -> Any:
+    """Entry point that is about to run; says once if what it compiles to cannot be kept."""
+    if isinstance(compiled._cache, NullCache) and not compiled.signatures:
+        _say_unkept()
+    return compiled
 
 
 def inlined(function: Any) -> Any:

@@ -5,6 +5,7 @@ Arrays are along the abscissa that stands first; NaN where nothing is known.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -61,12 +62,72 @@ class Refinement:
     grid_study: GridStudy | None
 
 
+class Told(Documented):
+    """Parameter of an effect: a number with its 90 % interval, or a form of the law; None is one of another form."""
+
+    value: Any = None
+    low: float = math.nan
+    high: float = math.nan
+    unit: str = ""
+
+
+class RankedEffect(Documented):
+    """An explanation and its probability."""
+
+    effect: str = ""
+    probability: float = math.nan
+    parameters: Mapping[str, Told] = field(default_factory=dict)
+
+
+class FitErrors(Documented):
+    """Errors of one channel."""
+
+    before: float = math.nan
+    after: float = math.nan
+    noise: float = math.nan
+    gp_only: float = math.nan
+    holdout_before: float = math.nan
+    holdout_after: float = math.nan
+
+
+class Place(Documented):
+    """Where the residual lies."""
+
+    channel: str = ""
+    variable: str = ""
+    low: float = math.nan
+    high: float = math.nan
+    size: float = math.nan
+    z: float = math.nan
+
+
+class NextStep(Documented):
+    """What to measure next."""
+
+    text: str = ""
+    commands: tuple[str, ...] = ()
+
+
+class Diagnosis(Documented):
+    """A diagnosis (schema ``bemt.diagnosis/1``) as far as a page shows it."""
+
+    verdict: str = ""
+    effects: tuple[str, ...] = ()
+    explanation: str = ""
+    location: Place = Place()
+    ranking: tuple[RankedEffect, ...] = ()
+    fit: Mapping[str, FitErrors] = field(default_factory=dict)
+    classes: tuple[tuple[str, ...], ...] = ()
+    next_measurement: NextStep = NextStep()
+    not_tried: Mapping[str, str] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Diagnosed:
     """A diagnosis in the folder of results with its figures (name, content)."""
 
     name: str
-    document: Mapping[str, Any]  # Of another program's hand: read by `diagnosis_block` alone
+    told: Diagnosis
     figures: Sequence[tuple[str, bytes]] = ()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.audit_block import audit_parts
+from bemt.results.report.audit_block import audit_parts, study_parts
 from bemt.results.report.book import CasePage, Reproduced
 from bemt.results.report.diagnosis_block import diagnosis_parts, first_pictures
 from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points
@@ -299,7 +299,7 @@ def case_sections(page: CasePage, reproduction: Sequence[Reproduced]) -> list[Se
     return sections(
         ("Your recording and the prediction", [("figures", first_pictures(told))] if told else []),
         _validation(result), _geometry(page), _performance(page), _radial(page), _fan(result.fan),
-        ("Audit of the CFD", audits), _verification(page),
+        ("Grids of the CFD", study_parts(result.grid_studies)), ("Audit of the CFD", audits), _verification(page),
         ("Diagnosis: what the model leaves out", diagnosis_parts(told, first=False) if told else []),
         _inputs(page), _limits(page),
         ("Reproduction of the thesis", [("more", ("Its numbers for this case", [("table", items)]))] if items else []),

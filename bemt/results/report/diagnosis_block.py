@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bemt.base.page import FIRST, num, table
-from bemt.results.report.book import CasePage, Diagnosed
+from bemt.results.report.book import CasePage, Diagnosed, Told
 from bemt.results.report.values import Part, picture
 from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 
@@ -18,40 +18,28 @@ BADGE = {"none": "no cause shows", "named": "cause", "class": "one of", "sensor"
 """Words of the badge; the verdict alone reads as if nothing agreed."""
 RANKED, LEAST = 8, 1e-3
 """Most effects of the ranking that are shown, and the probability below which none is."""
-FIT = ("before", "after", "noise", "gp_only", "holdout_before", "holdout_after")
 FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth fit without physics", "held out, before",
             "held out, after")  # fmt: skip
 
 
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
-def _list(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, list | tuple) else []
-
-
-def _parameters(value: Any) -> str:
+def _parameters(told: Mapping[str, Told]) -> str:
     words = []
-    for name, p in _mapping(value).items():
-        p = _mapping(p)
-        if p.get("value") is None:  # of another form of the law
+    for name, p in told.items():
+        if p.value is None:  # of another form of the law
             continue
-        if isinstance(p.get("value"), str):  # a form of the law, not a number
-            words.append(f"{name} {p['value'].replace('_', ' ')}")
+        if isinstance(p.value, str):  # a form of the law, not a number
+            words.append(f"{name} {p.value.replace('_', ' ')}")
             continue
-        shown, low, high = (num(p.get(k), 3).text for k in ("value", "low", "high"))
-        unit = str(p.get("unit") or "")
-        words.append(f"{name} {shown} ({low} to {high}){' ' + unit if unit not in ('', '-', '1') else ''}")
+        shown, low, high = (num(v, 3).text for v in (p.value, p.low, p.high))
+        words.append(f"{name} {shown} ({low} to {high}){' ' + p.unit if p.unit not in ('', '-', '1') else ''}")
     return "; ".join(words)
 
 
 def diagnosis_verdict(item: Diagnosed) -> tuple[str, str, str]:
     """Give kind and words of a badge, and sentences."""
-    d = item.document
-    said = str(d.get("verdict") or "unknown")
-    effects = ", ".join(str(e) for e in _list(d.get("effects")))
-    why = str(d.get("explanation") or "").partition(" Not tried: ")[0].partition(" Next: ")[0]
+    d = item.told
+    said, effects = d.verdict or "unknown", ", ".join(d.effects)
+    why = d.explanation.partition(" Not tried: ")[0].partition(" Next: ")[0]
     word = BADGE.get(said, said)
     return KIND.get(said, "unknown"), f"{word}: {effects}" if effects else word, why
 
@@ -77,36 +65,30 @@ def diagnosis_parts(item: Diagnosed, first: bool = True) -> list[Part]:
 
     ``first`` is False where the first picture stands elsewhere on the page.
     """
-    d = item.document
-    said = str(d.get("verdict") or "unknown")
+    d = item.told
     out: list[Part] = [("verdict", diagnosis_verdict(item)), ("figures", first_pictures(item) if first else [])]
-    place = _mapping(d.get("location"))
-    if place.get("channel") and said != "none":
-        low, high, size, z = (num(place.get(k), 3).text for k in ("low", "high", "size", "z"))
-        variable = place.get("variable") or "?"
-        out.append(
-            ("words", f"Located in {place['channel']} where {variable} is {low} to {high} (size {size}, z {z}).")
-        )
-    ranking = [_mapping(r) for r in _list(d.get("ranking"))[:RANKED]]
+    at = d.location
+    if at.channel and d.verdict != "none":
+        low, high, size, z = (num(v, 3).text for v in (at.low, at.high, at.size, at.z))
+        where = f"{at.channel} where {at.variable or '?'} is {low} to {high}"
+        out.append(("words", f"Located in {where} (size {size}, z {z})."))
     rows = [
-        [str(r.get("effect", "")), p, _parameters(r.get("parameters"))]
-        for r in ranking
-        if (p := num(r.get("probability"), 3)).value is None or p.value >= LEAST
+        [r.effect, p, _parameters(r.parameters)]
+        for r in d.ranking[:RANKED]
+        if (p := num(r.probability, 3)).value is None or p.value >= LEAST
     ]
     out.append(("table", table(["effect", "probability [-]", "parameters (90 % interval)"], rows)))
-    fits = [
-        [str(channel), *(num(_mapping(fit).get(k), 3) for k in FIT)] for channel, fit in _mapping(d.get("fit")).items()
-    ]
+    fits = [[channel, *(num(v, 3) for v in vars(fit).values())] for channel, fit in d.fit.items()]
     out.append(("table", table(FIT_HEAD, fits)))
-    classes = [c for c in _list(d.get("classes")) if isinstance(c, list) and len(c) > 1]
+    classes = [c for c in d.classes if len(c) > 1]
     if classes:
-        told = "; ".join(" = ".join(str(e) for e in c) for c in classes[:12])
+        told = "; ".join(map(" = ".join, classes[:12]))
         out.append(("words", f"Not distinguished by these data: {told}."))
-    step = _mapping(d.get("next_measurement"))
-    if step.get("text"):
-        out.append(("words", f"Next measurement: {step['text']}."))
-        out += [("command", str(command)) for command in _list(step.get("commands"))]
-    absent = [f"{effect}: {reason}" for effect, reason in _mapping(d.get("not_tried")).items()]
+    step = d.next_measurement
+    if step.text:
+        out.append(("words", f"Next measurement: {step.text}."))
+        out += [("command", command) for command in step.commands]
+    absent = [f"{effect}: {reason}" for effect, reason in d.not_tried.items()]
     out.append(("more", (f"{len(absent)} effects not tried, and why", [("list", absent)])) if absent else ("list", []))
     rest = [picture(name, data) for name, data in item.figures if not name.startswith(FIRST)]
     return [*out, ("figures", rest)]

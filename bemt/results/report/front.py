@@ -119,15 +119,16 @@ def front_parts(book: Book, ids: Sequence[str]) -> list[Part]:
 
 
 def plain_markdown(value: Any, limit: int = 500) -> str:
-    r"""Make a text that Markdown shows as it is, on one line.
+    r"""Make a text that Markdown shows as it is, on one line; addresses do not become links.
 
-    >>> plain_markdown("a|b <script> [x](y)")
-    'a\\|b &lt;script&gt; \\[x\\](y)'
+    >>> plain_markdown("a|b <script> [x](y)"), plain_markdown("see https://x.org, www.y.org, me@z.org")
+    ('a\\|b &lt;script&gt; \\[x\\](y)', 'see https:&#47;&#47;x.org, www&#46;y.org, me&#64;z.org')
     """
     text = " ".join("".join(c for c in str(value) if c.isprintable() or c.isspace()).split())
     text = text if len(text) <= limit else text[: limit - 1] + "…"
     text = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    return re.sub(r"([\\`*_{}\[\]#|!~])", r"\\\1", text)
+    text = re.sub(r"([\\`*_{}\[\]#|!~])", r"\\\1", text)
+    return re.sub(r"\bwww\.", "www&#46;", text.replace("://", ":&#47;&#47;").replace("@", "&#64;"), flags=re.IGNORECASE)
 
 
 def _n(value: Any, digits: int = 4) -> str:

@@ -16,7 +16,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, number_of, write_atomic
 from bemt.results.report import curves, trends
-from bemt.results.report.book import Book, CasePage, Diagnosed, Reproduced, Trends
+from bemt.results.report.book import Book, CasePage, Diagnosed, Diagnosis, Reproduced, Trends
 from bemt.results.report.found_files import read_json, safe_files
 from bemt.results.report.rotor_view import still
 from bemt.results.sweep.rows import Result
@@ -108,7 +108,7 @@ def attach_diagnoses(book: Book, out: Path) -> Book:
         for figure in safe_files(path.parent):
             room -= len(figure[1])
             figures += [figure] if room > 0 else []
-        item = Diagnosed(name, document, figures)
+        item = Diagnosed(name, Diagnosis.from_document(document, lenient=True), figures)
         if name in names and path.parent.name == "diagnosis":
             own[name] = item
         else:
@@ -146,7 +146,7 @@ def diagnose_into(
         if len(recordings) > 1 or any(f.where != "readings" for f in error.faults):
             raise
         told = compare_run(recordings[0], found[0], progress) | about
-        few = f"Too few readings for a diagnosis ({error.faults[0].got}). {told['sentence']} Next: {told['next']}."
+        few = f"One point cannot name a cause. {told['sentence']} Next: {told['next']}."
         told |= {"verdict": "insufficient", "effects": [], "explanation": few}
         write_atomic(Path(target) / "diagnosis.json", json_text(told))
         write_atomic(Path(target) / f"{FIRST}.png", first_picture(records, found)[0].png())

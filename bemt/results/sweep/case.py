@@ -53,7 +53,17 @@ def _points(case: Case, refs: Sequence[Reference]) -> list[tuple[float, float, f
     return list(dict.fromkeys([own, *((r.rpm, r.airspeed_m_s, r.density_kg_m3) for r in refs)]))
 
 
-def _references(case: Case) -> list[Reference]:
+def _runs(case: Case) -> list[tuple[str, Dataset]]:
+    """CFD runs of a case; those of one condition on several grids as one study."""
+    if not case.run_paths:
+        return []
+    from bemt.data.recordings.cfd_study import merged
+    from bemt.data.recordings.load import import_file
+
+    return [(str(d.provenance["file"]), d) for d in merged([import_file(path) for path in case.run_paths])]
+
+
+def _references(case: Case, runs: Sequence[tuple[str, Dataset]]) -> list[Reference]:
     """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
     read: list[Reference] = []
@@ -61,11 +71,10 @@ def _references(case: Case) -> list[Reference]:
         from bemt.data.readers import references
 
         read += references.read(case.references_path)
-    for path in case.run_paths:
+    for path, run in runs:
         from bemt.data.recordings.cfd_setup import references_of
-        from bemt.data.recordings.load import import_file
 
-        read += references_of(import_file(path), str(path))
+        read += references_of(run, path)
     return [replace(r, **{k: v for k, v in own.items() if math.isnan(getattr(r, k))}) for r in read]  # type: ignore[arg-type]
 
 
@@ -115,7 +124,8 @@ def _formula(case: Case, at: Points) -> tuple[Dataset, Dataset]:
 
 def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str], None] | None = None) -> Result:
     """Solve one case at its operating points and put everything recorded beside it."""
-    refs = _references(case)
+    computed = _runs(case)
+    refs = _references(case, computed)
     points = _points(case, refs)
     at = Points.of(case, *np.array(points).T)
     found = propagate(case, at.rpm, at.airspeed_m_s, at.density_kg_m3, threads=threads, progress=progress)
@@ -170,6 +180,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
         audit=tuple(_audit(r, ready, case.ducted) for r in beside if r.source == "cfd"),
+        grid_studies=tuple(s for _, d in computed for s in d.provenance.get("studies", ())),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
         references=tuple(Stated(r.quantity, r.kind, r.printed, r.value, r.u, r.channel, r.source, r.remark)
@@ -199,7 +210,7 @@ def _recorded_rows(
     from bemt.data.readers.references import to_series
 
     rows = []
-    printed = {r.where: r.printed for r in refs}
+    printed = {r.where: r.printed for r in reversed(refs)}  # thrust comes first
     for group in to_series(refs, case.name):
         full = group.derive(diameter)
         for i in range(len(full)):

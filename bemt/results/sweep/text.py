@@ -109,6 +109,8 @@ def _audit_lines(result: Result) -> list[str]:
         out += ["", _wrap(f"audit of {item.reference}: u of its thrust {whole}; {rest}", "  ")]
         for line in item.lines:
             words = f"{line.status}, u {_share(line.u_relative)}: {line.finding}; {line.consequence}"
+            if line.finding.endswith("not stated") and line.consequence == "unknown":
+                words = "not stated"
             out.append(_wrap(words, "    ", f"{line.topic}: "))
     return out
 

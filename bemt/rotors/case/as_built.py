@@ -14,7 +14,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
-from bemt.rotors.latents import NAMES, AsBuilt, Prior, as_built
+from bemt.rotors.latents import NAMES, Prior
+from bemt.rotors.measured import records
 from bemt.rotors.population import label_angle_deg, population
 from bemt.rotors.reference import ReferenceRun
 
@@ -42,15 +43,6 @@ class CaseAsBuilt:
     reference: ReferenceRun | None = None  # The run's rows
 
 
-def stated_effects(file: CaseFile, folder: Path) -> tuple[AsBuilt, ...]:
-    """Effect of the latent numbers with which a case is solved, none where it states none."""
-    stated = file.blade.as_built
-    if stated is None:
-        return ()
-    drawn = _posterior(folder / stated.file).drawn if stated.file is not None else _stated(stated)
-    return (as_built(drawn),) if drawn.any() else ()
-
-
 def _stated(table: AsBuiltTable) -> Array:
     """Expectations that a case states, zero elsewhere."""
     return np.array([getattr(table, name, None) or 0.0 for name in NAMES])
@@ -70,15 +62,18 @@ def _gap_deg(blade: BladeTable, rotor: Rotor) -> float:
     return math.degrees(float(rotor.blade.at(0.75 * rotor.R)[1])) - label_angle_deg(pitch, rotor.D)
 
 
-def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions: bool = True) -> CaseAsBuilt:
+def as_built_of(
+    file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions: bool = True, chord_known: bool | None = None
+) -> CaseAsBuilt:
     """Read what a case file says; faults as `InputError`."""
     blade, stated = file.blade, file.blade.as_built
-    if stated is not None and stated.file is not None:
-        return _posterior(folder / stated.file)
+    if stated is not None and (learned := _learned(stated, folder)) is not None:
+        return learned
     assumed = {item.key for item in file.assumptions}
     moved = assumed if counting_assumptions else set()
     declared = {what for what, keys in MOVED.items() if moved & set(keys)}
-    if not assumed & set(MOVED["chord"]):  # a chord that is no assumption was measured
+    # a chord that is no assumption was measured
+    if not assumed & set(MOVED["chord"]) if chord_known is None else chord_known:
         declared.add("chord")
     source = known_from(blade)
     drawn_section = blade.section is not None and blade.section.dat is not None
@@ -95,6 +90,16 @@ def as_built_of(file: CaseFile, folder: Path, rotor: Rotor, counting_assumptions
     prior = population().prior(source, rotor.D, gap, blade.family, section, declared, sds, kind)
     stated_mean = np.where(drawn != 0.0, drawn, prior.mean)
     return CaseAsBuilt(Prior(stated_mean, prior.cov, prior.sizes, prior.weights, source), drawn)
+
+
+def _learned(stated: AsBuiltTable, folder: Path) -> CaseAsBuilt | None:
+    """What readings told of the rotor, in a file of its own or among the measured propellers."""
+    if stated.file is not None:
+        return _posterior(folder / stated.file)
+    if stated.measured is None:
+        return None
+    prior, reference = records()[stated.measured].as_built()
+    return CaseAsBuilt(prior, prior.mean, reference)
 
 
 def _posterior(path: Path) -> CaseAsBuilt:

@@ -109,21 +109,35 @@ def _bent(case: CaseFile, blade: Blade) -> Blade:
 
 def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
-    blade = case.blade
-    if blade.stations is not None:
-        from bemt.data.readers.stations import read_stations
+    key = next(k for k in ("stations", "uiuc", "apc") if getattr(case.blade, k) is not None)  # a rule of the file
+    return stations_in(path.parent / getattr(case.blade, key), 0.5 * case.rotor.diameter_m, key)
 
-        return read_stations(path.parent / blade.stations, 0.5 * case.rotor.diameter_m)
-    if blade.uiuc is not None:
+
+def stations_in(file: Path, R: float, key: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Columns r/R, c/R and beta [rad] of a file of stations, by the key of [blade] that names it; tip radius in m."""
+    if key == "uiuc":
         from bemt.data.readers.uiuc_tables import read_geometry
 
-        table = read_geometry(path.parent / blade.uiuc)
+        table = read_geometry(file)
         return table.r_R, table.c_R, np.radians(table.beta_deg)
-    from bemt.data.readers.apc import read_pe0
+    if key == "apc":
+        from bemt.data.readers.apc import read_pe0
 
-    assert blade.apc is not None  # a rule of the file
-    apc = read_pe0(path.parent / blade.apc)
-    return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
+        apc = read_pe0(file)
+        return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
+    from bemt.data.readers.stations import read_stations
+
+    return read_stations(file, R)
+
+
+def key_of(file: Path) -> str:
+    """Key of [blade] for a file of stations, by its content: ``apc``, ``uiuc``, or our own table, ``stations``."""
+    from bemt.data.readers import HEAD_BYTES, load_text
+    from bemt.data.readers.apc import sniff
+    from bemt.data.readers.uiuc_tables import role_of
+
+    head = load_text(file).text[:HEAD_BYTES]
+    return "apc" if sniff(head) else "uiuc" if role_of(head) == "geometry" else "stations"
 
 
 def build_rotor(case: CaseFile, path: Path) -> Rotor:
@@ -143,7 +157,7 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
     duct = case.duct
     if duct is None:
         return None
-    inner, hub, x = duct.inner_diameter_m, 0.5e-3 * duct.exit_hub_diameter_mm, duct.rotor_position_mm
+    inner, hub, x = duct.inner_diameter_m, 0.5e-3 * (duct.exit_hub_diameter_mm or 0.0), duct.rotor_position_mm
     gap = 1e-3 * (duct.tip_gap_mm or 0.0) if math.isnan(inner) else 0.5 * inner - rotor.R
     ratio = duct.exit_area_ratio
     if duct.exit_diameter_mm is not None:
@@ -155,8 +169,8 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
         turned = 0.0 if vanes is None else math.radians(rotor.rotation * vanes.angle_deg)  # their tails with the swirl
         stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3, beta=0.5 * math.pi + turned)
         return around(
-            rotor, duct.length_mm * 1e-3, gap, duct.lip_radius_mm * 1e-3, exit_area_ratio=ratio, exit_hub_radius=hub,
-             rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+            rotor, duct.length_mm * 1e-3, gap, (duct.lip_radius_mm or 0.0) * 1e-3, exit_area_ratio=ratio,
+            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
         )  # fmt: skip
 
     return _as_input(path.as_posix(), "", make)

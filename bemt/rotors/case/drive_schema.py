@@ -14,6 +14,7 @@ which the source does not part. So a motor of known resistance also has the shar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Literal
 
@@ -89,6 +90,12 @@ class MotorTable(Table):
     winding_drop: float | None = entry(
         "instead: share of the voltage lost in the winding at full throttle", "", 0.0, 0.6
     )
+    size: float = entry(
+        "without either: ln of the resistance over that usual for K_v and cells, or K_v and mass", "", -3.0, 3.0,
+        default=0.0,
+    )  # fmt: skip
+    mass_g: float | None = entry("mass of the motor", "g", 0.5, 1e5)
+    stator: str | None = entry("instead of the mass: diameter and height of the stator in mm, such as 2212")
     no_load_A: float | None = entry("no-load current", "A", 0.0, 100.0)
     idle_share: float | None = entry(
         "instead: share of the current lost to friction and iron at full throttle", "", 0.0, 0.6
@@ -110,6 +117,8 @@ class MotorTable(Table):
         for stated, share in (("resistance_mohm", "winding_drop"), ("no_load_A", "idle_share")):
             if getattr(self, stated) is not None and getattr(self, share) is not None:
                 yield share, f"{getattr(self, share):g}", f"nothing, because {stated} is given"
+        if self.stator is not None and not re.fullmatch(r"[1-9]\d{3}", self.stator):
+            yield "stator", repr(self.stator), "four digits, such as 2212"
         if (self.heat_capacity_J_K is None) != (self.thermal_K_W is None):
             yield "thermal_K_W", "one of heat_capacity_J_K, thermal_K_W", "both or none"
         if self.pole_pairs is not None and self.inductance_uH is None:

@@ -20,7 +20,9 @@ from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.case.reading import parse_reading
 from bemt.rotors.case.schema import AIRSPEED, ANGLE, RPM
+from bemt.rotors.measured import records
 from bemt.rotors.validity import counted
 from geometry.designation import Designation
 
@@ -57,13 +59,16 @@ def case_of_label(
     measured_pitch_in: float | None = None,
     series: str | None = None,
     density: float | None = None,
+    reading: str | None = None,
 ) -> Case:
     """Case of a label with what else was measured of the propeller; a measured value is no unknown any more.
 
     A chord at 0.75 R scales the chord law; a pitch measured there replaces that of the label, which the population of
-    measured rotors then weighs against it.
+    measured rotors then weighs against it. Either is of this piece: it is then none that a database measured.
     """
-    case = case_of(fresh.label_text(label, blades, family=None if series is None else find_family(series)))
+    this_piece = chord_mm is not None or measured_pitch_in is not None
+    family = None if series is None else find_family(series)
+    case = case_of(fresh.label_text(label, blades, family=family, measured=not this_piece, reading=reading))
     changes: dict[str, Any] = {}
     known: set[str] = set()
     if chord_mm is not None:
@@ -72,7 +77,8 @@ def case_of_label(
         known.add("blade.max_chord_over_R")
     if measured_pitch_in is not None:
         changes |= {"blade.pitch_in": measured_pitch_in, "blade.label_pitch_in": case.get("blade.pitch_in"),
-                    "blade.beta_offset_deg": 0.0, "blade.known_from": "stations"}  # fmt: skip
+                    "blade.beta_offset_deg": 0.0,
+                    "blade.known_from": "stations" if reading is None else "reference"}  # fmt: skip
         known.add("blade.beta_offset_deg")
     if density is not None:
         changes["air.density_kg_m3"] = density
@@ -91,10 +97,12 @@ def document(
     series: str | None = None,
     density: float | None = None,
     angles: Sequence[float] = (),
+    reading: str | None = None,
 ) -> dict[str, Any]:
     """Estimate every speed [rev/min] with every airspeed [m/s] at every angle between wind and shaft [deg].
 
-    ``bemt.estimate/2``; unknown numbers are null.
+    ``bemt.estimate/2``; unknown numbers are null. ``u_...`` is the rotor's own, ``u_reading_...`` what a stand shows
+    (`bemt.rotors.case.propagate.Propagated.u_reading`). ``reading`` as `bemt.rotors.case.reading` takes it.
 
     An unreadable label, impossible numbers and an unknown series are refused, all at once.
     """
@@ -125,9 +133,14 @@ def document(
             find_family(series)
         except InputError as error:
             faults += error.faults
+    if reading is not None:
+        try:
+            parse_reading(reading)
+        except InputError as error:
+            faults += error.faults
     if faults or told is None:
         raise InputError(faults)
-    case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density)
+    case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density, reading)
     axes = (speeds, list(airspeeds) or [0.0], list(angles) or [0.0])
     rpm, V, angle = (v.ravel() for v in np.meshgrid(*axes, indexing="ij"))
     found = propagate(case, rpm, V, angle_deg=angle)
@@ -136,17 +149,25 @@ def document(
         "rpm": rpm, "airspeed_m_s": V, "angle_deg": angle,
         "thrust_N": points.thrust_N, "u_thrust_N": points.u["thrust_N"],
         "u95_thrust_N": found.half_width95("thrust_N"), "power_W": points.power_W, "u_power_W": points.u["power_W"],
-        "u95_power_W": found.half_width95("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
+        "u95_power_W": found.half_width95("power_W"), "u_reading_thrust_N": found.u_reading("thrust_N"),
+        "u_reading_power_W": found.u_reading("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
         "H_force_N": points["H_force_N"] if "H_force_N" in points else np.where(points.converged, 0.0, np.nan),
     }  # fmt: skip
     given = {"label": label, "diameter_in": told.diameter_in, "pitch_in": told.pitch_in, "blades": told.blades,
              "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,
-             "series": case.file.blade.family, "density_kg_m3": float(case.air().rho)}  # fmt: skip
+             "series": case.file.blade.family, "density_kg_m3": float(case.air().rho), "reading": reading,
+             "known_from": case.as_built().prior.known_from, "source": measured_source(case)}  # fmt: skip
     return {"schema": SCHEMA, "case": case.name, "given": given, "rows": [
         {name: float(column[i]) if math.isfinite(column[i]) else None for name, column in columns.items()}
         | {"flags": list(points.flags[i])} for i in range(rpm.size)
     ]}  # fmt: skip
+
+
+def measured_source(case: Case) -> str | None:
+    """Where a propeller was measured that bemt knows; None where it was not."""
+    stated = case.file.blade.as_built
+    return None if stated is None or stated.measured is None else records()[stated.measured].source
 
 
 def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fault]]:
@@ -162,18 +183,25 @@ def text(doc: dict[str, Any]) -> str:
     def shown(value: float | None, digits: int = 4) -> str:
         return number_text(math.nan if value is None else value, digits)
 
-    head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "P [W]", "± 68 %", "± 95 %", "K1/K2 [N]", "J", "M tip"]
-    keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "power_W", "u_power_W",
-                             "u95_power_W", "k1k2_thrust_N", "J", "M_tip")  # fmt: skip
+    head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "on a stand", "P [W]", "± 68 %", "± 95 %", "on a stand",
+            "K1/K2 [N]", "J", "M tip"]  # fmt: skip
+    keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "u_reading_thrust_N",
+                             "power_W", "u_power_W", "u95_power_W", "u_reading_power_W", "k1k2_thrust_N", "J",
+                             "M_tip")  # fmt: skip
     if any(row["angle_deg"] for row in doc["rows"]):
         head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
     table = [
         [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
     ]
     notes = [f"! {flag}" for flag in counted([row["flags"] for row in doc["rows"]])]
+    if doc["given"]["source"]:
+        notes.insert(0, f"as measured: {doc['given']['source']}")
+    notes.insert(0, "± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %")
     more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
-    if more:
-        notes.append(f"for narrower bands give {' and '.join(more)} (at 0.75 R)")
+    if doc["given"]["reading"] is None:
+        more.append("--reading rpm=...,thrust_g=...")
+    if more and doc["given"]["known_from"] == "label":
+        notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
     return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
 
 
@@ -210,12 +238,13 @@ def of_label(
     series: str | None = None,
     density: float | None = None,
     angle_deg: Any = 0.0,
+    reading: str | None = None,
 ) -> Estimate:
     """`document` as a Dataset, standard uncertainties in ``u``."""
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
     try:
-        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle)
+        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle, reading)
     except InputError as error:
         if not Path(label).exists():
             raise
@@ -223,8 +252,8 @@ def of_label(
         raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
     rows = found["rows"]
     columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
-    u = {k[2:]: v for k, v in columns.items() if k.startswith("u_")}
-    values = {k: v for k, v in columns.items() if not k.startswith(("u_", "u95_"))}
+    u = {k[2:]: v for k, v in columns.items() if k[2:] in columns and k.startswith("u_")}
+    values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
         values["sideslip_rad"] = sideslip
     flags = tuple(tuple(r["flags"]) for r in rows)

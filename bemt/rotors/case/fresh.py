@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,20 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, OFFSET, SURFACE, Unknown, label_chord, section_of
+from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.unknowns import (
+    AIR,
+    DRIVE,
+    FAN,
+    HUB,
+    SURFACE,
+    WINDING,
+    Unknown,
+    label_chord,
+    offset_of,
+    section_of,
+)
+from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
@@ -56,7 +70,8 @@ def _blocks(*unknowns: Unknown) -> str:
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
-        found = parse_designation(label)
+        one = records().get(label.strip())
+        found = parse_designation(label) if one is None else one.designation
     except GeometryError as error:
         raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
@@ -87,7 +102,7 @@ density_kg_m3 = 1.225  # or temperature_C and pressure_hPa
 
 def drive_text(kv: float, cells: int) -> str:
     """Table [drive] of a motor of which the label is known."""
-    sag, drop, idle = (item.value for item in DRIVE)
+    sag, size, idle = (item.value for item in DRIVE)
     return f"""
 [drive]
 kv = {kv:g}  # rev/min/V
@@ -98,8 +113,8 @@ soc = {SOC:g}  # charge at which full throttle and hover are stated
 sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
-[drive.motor]  # instead of each share what the motor's sheet says: resistance_mohm and no_load_A
-winding_drop = {drop:g}
+[drive.motor]  # instead of both what the motor's sheet says: resistance_mohm and no_load_A; or its mass_g or stator
+size = {size:g}  # usual for K_v and cells
 idle_share = {idle:g}
 
 # [drive.vehicle]  # for hover
@@ -109,8 +124,8 @@ idle_share = {idle:g}
 
 
 def full_rpm(kv: float, cells: int) -> float:
-    """Speed at full throttle of a motor of which the label is known, by its typical losses. [rev/min]"""
-    sag, drop, _ = (item.value for item in DRIVE)
+    """Speed at full throttle of a motor with a propeller that suits it, by its typical losses. [rev/min]"""
+    sag, drop = DRIVE[0].value, WINDING.value
     return float(f"{kv * cells * float(np.interp(SOC, LIPO_SOC, LIPO_V)) * (1.0 - sag) * (1.0 - drop):.5g}")
 
 
@@ -139,13 +154,30 @@ def label_text(
     airspeed_m_s: float = 0.0,
     family: str | None = None,
     motor: tuple[float, int] | None = None,
+    measured: bool = True,
+    reading: str | None = None,
 ) -> str:
-    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known."""
+    """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known.
+
+    A label that names a measured propeller is that propeller, unless ``measured`` is False. A ``reading``
+    (`bemt.rotors.case.reading`) makes it the rotor that gave it.
+    """
     told = read_label(label, blades)
+    if reading is not None:
+        parse_reading(reading)
     D, B = told.diameter_in, told.blades
-    chord, section = label_chord(D * INCH, told.blade_class), section_of(told.blade_class)
-    return f"""# A {told.size} propeller from its label. Each [[assumptions]] entry is an unknown with a range.
-# `bemt sweep --details` prints its effect on the thrust. When you measure a value, enter it and delete the assumption.
+    family = family or family_of(told.maker, told.blade_class, told.blades)
+    told = told if told.blade_class else replace(told, blade_class=class_of(family))
+    chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
+    offset = offset_of(family)
+    known = find(told, family) if measured else None
+    open_ = (HUB, offset, chord, *section, *SURFACE, AIR)
+    values = (chord.value, section[0].value, offset.value)
+    source = f"from its label. {_UNKNOWN}"
+    if known is not None:
+        open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
+        source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
+    return f"""# A {told.size} propeller {source}
 schema = "bemt.case/1"
 name = "{_label_name(told)}"
 title = "{_title(told)}"
@@ -159,14 +191,27 @@ hub_ratio = 0.15
 {_sense(told)}
 [blade]
 pitch_in = {told.pitch_in:g}
-beta_offset_deg = 0.7
+beta_offset_deg = {values[2]:.3g}
 chord_law = "apc_like"
-max_chord_over_R = {chord.value:.3g}
-{_series(told, family)}
+max_chord_over_R = {values[0]:.3g}
+{_series(told, family)}{_as_built(known, reading)}
 [blade.section]
-camber = {section[0].value:g}
+camber = {values[1]:g}
 thickness = 0.09
-{_tail(D * INCH, rpm, airspeed_m_s, motor, HUB, OFFSET, chord, *section, *SURFACE, AIR)}"""
+{_tail(D * INCH, rpm, airspeed_m_s, motor, *open_)}"""
+
+
+_UNKNOWN = (
+    "Each [[assumptions]] entry is an unknown with a range.\n# `bemt sweep --details` prints its effect on the thrust. "
+    "When you measure a value, enter it and delete the assumption."
+)
+
+
+def _as_built(known: MeasuredRotor | None, reading: str | None) -> str:
+    if known is None and reading is None:
+        return ""
+    rows = ([f'measured = "{known.name}"'] if known else []) + ([f'reading = "{reading}"'] if reading else [])
+    return f'known_from = "{"measured" if known else "reference"}"\n\n[blade.as_built]\n' + "\n".join(rows) + "\n"
 
 
 def _label_name(told: Designation) -> str:
@@ -186,7 +231,7 @@ def _sense(told: Designation) -> str:
 def _series(told: Designation | None, family: str | None) -> str:
     """Keys of [blade] that say of which kind a blade is."""
     kind = told.blade_class if told else None
-    family = family or (family_of(told.maker, kind) if told else None)
+    family = family or (family_of(told.maker, kind, told.blades) if told else None)
     return (f'class = "{kind}"\n' if kind else "") + (f'family = "{family}"\n' if family else "")
 
 
@@ -201,6 +246,7 @@ def stations_text(
     label: Designation | None = None,
     family: str | None = None,
     motor: tuple[float, int] | None = None,
+    name: str = "",
 ) -> str:
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
@@ -208,7 +254,7 @@ def stations_text(
     """
     section = section_of((label.blade_class if label else None) or class_of(family))
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
-    name = _label_name(label) if label else case_name(Path(file).stem)
+    name = _label_name(label) if label else name or case_name(Path(file).stem)
     title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"
     return f"""# A propeller with the stations of {file}. Each unknown is an assumption with a range.
 schema = "bemt.case/1"
@@ -287,19 +333,22 @@ recovery = 0.8
 
 
 def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
-    """Hub ratio and key of a file of stations: our own CSV, a geometry file of UIUC, or an APC PE0 file."""
-    from bemt.data.readers import load_text
+    """Hub ratio and key of [blade] of a file of stations: a table in any dialect, or one of UIUC or APC."""
+    from bemt.rotors.case.build import key_of, stations_in
 
-    head = load_text(file).text[:4000]
-    first = head.lstrip().partition("\n")[0]
-    if "," in first:
-        from bemt.data.readers.stations import read_stations
+    key = key_of(file)
+    return float(np.clip(stations_in(file, 0.5 * diameter_m, key)[0].min(), 0.05, 0.3)), key
 
-        return max(min(float(read_stations(file, 0.5 * diameter_m)[0].min()), 0.3), 0.05), "stations"
-    if re.match(r"\s*r/R\b", first):
-        rows = [float(row.split()[0]) for row in head.splitlines()[1:] if row.split()]
-        return max(min(min(rows, default=0.15), 0.3), 0.05), "uiuc"
-    if "STATION" in head and "CHORD" in head:
-        return 0.15, "apc"
-    got, expected = repr(first.strip()[:60]), "r_over_R,chord_over_R,beta_deg, a UIUC geometry file or an APC PE0 file"
-    raise InputError(Fault(file.as_posix(), "1", got, expected, "Read recordings with `bemt import`"))
+
+_LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")
+
+
+def label_or_name(text: str | None, blades: int | None, file: Path) -> tuple[Designation | None, str]:
+    """What the word beside a file of stations is: a label, such as ``10x5``, or the name of the case."""
+    if text is not None:
+        with suppress(GeometryError):
+            parse_designation(text)
+            return read_label(text, blades), ""
+        if _LABEL.search(text):
+            read_label(text)  # says what is wrong with it
+    return None, case_name(text or file.stem)

@@ -22,15 +22,15 @@ from numpy.typing import NDArray
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector, load_toml
-from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of, stated_effects
+from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of
 from bemt.rotors.case.build import build_air, build_duct, build_rotor
 from bemt.rotors.case.rules import check_case, check_shape, value_at
 from bemt.rotors.case.schema import AXES, GROUPS, CaseFile
 from bemt.rotors.case.unknowns import completed
+from bemt.rotors.latents import AsBuilt, as_built
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
-    from bemt.rotors.latents import AsBuilt
     from geometry.duct import Duct
     from geometry.rotor import Rotor
 
@@ -179,8 +179,15 @@ class Case:
 
     @property
     def run_paths(self) -> tuple[Path, ...]:
-        """CFD runs in the folder of the case (``run*.toml``): recorded values like those of the references."""
-        return tuple(sorted(self.folder.glob("run*.toml"))) if self.path.is_file() else ()
+        """CFD runs in the folder of the case: recorded values like those of the references.
+
+        ``run*.toml``, and ``study*.toml`` in place of the runs that they name.
+        """
+        if not self.path.is_file():
+            return ()
+        studies = sorted(self.folder.glob("study*.toml"))
+        named = {path.resolve() for study in studies for path in _exports(study)}
+        return (*(p for p in sorted(self.folder.glob("run*.toml")) if p.resolve() not in named), *studies)
 
     @property
     def diameter_m(self) -> float:
@@ -274,11 +281,19 @@ class Case:
 
     def stated_effects(self) -> tuple[AsBuilt, ...]:
         """Give the effect of what the case states of the rotor as built, if anything."""
-        return stated_effects(self.file, self.folder)
+        drawn = self.as_built().drawn
+        return (as_built(drawn),) if drawn.any() else ()
 
     def as_built(self, counting_assumptions: bool = True) -> CaseAsBuilt:
         """Give what is known of the rotor as built, less what the declared assumptions move already."""
-        return as_built_of(self.file, self.folder, self.rotor(), counting_assumptions)
+        told = self.file.blade.as_built
+        if told is None or told.reading is None:
+            return as_built_of(self.file, self.folder, self.rotor(), counting_assumptions)
+        from bemt.rotors.case.reading import conditioned
+
+        reading = told.reading
+        found: CaseAsBuilt = self._once("as built", ("rotor", "blade"), lambda case: conditioned(case, reading), None)
+        return found
 
     def air(self, overrides: Mapping[str, Any] | None = None) -> Air:
         """Give the state of the air; overrides as in :meth:`replaced`."""
@@ -304,7 +319,9 @@ class Case:
         names += [blade.as_built.file] if blade.as_built is not None else []
         if self.file.second_rotor is not None and self.file.second_rotor.case is not None:
             names += [os.path.relpath(path, self.folder) for path in self.second().files()]
-        runs = [p for run in self.run_paths for p in (run, *_exports(run)) if p.is_file()]
+        named = [p for run in self.run_paths for p in (run, *_exports(run))]
+        runs = [p for name in named for p in (name, *(_exports(name) if name not in self.run_paths else ()))]
+        runs = [p for p in dict.fromkeys(runs) if p.is_file()]
         return [self.path, *(self.folder / name for name in names if name), *runs]
 
     def content_hash(self) -> str:
@@ -331,14 +348,19 @@ def _exports(run: Path) -> list[Path]:
     from bemt.data.readers.cfd_run import read
 
     try:
-        return [run.parent / name for name in read(run).run.files]
+        return [run.parent / name for name in read(run).files] if run.suffix == ".toml" else []
     except InputError:
         return []
 
 
 def _assumptions(case: CaseFile) -> tuple[Assumption, ...]:
-    out = []
+    from bemt.rotors.case.reading import SETTLED
+
+    out, told = [], case.blade.as_built
+    settled = SETTLED if told is not None and told.reading is not None else frozenset()
     for item in case.assumptions:
+        if item.key in settled:
+            continue
         values = item.values if item.values is not None else (item.low, item.high)
         out.append(Assumption(item.key, value_at(case, item.key), tuple(values), item.values is not None, item.why))
     return tuple(out)

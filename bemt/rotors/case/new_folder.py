@@ -14,6 +14,7 @@ from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import find_family
 from bemt.rotors.case import Case, fresh, from_solid, load_case
+from bemt.rotors.case.motor import full_speed
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Wanted:
     kv: float | None = None
     cells: int | None = None
     campaign: bool = False
+    reading: str | None = None
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -71,6 +73,10 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         case = checked(files)
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
+    if wanted.motor is not None and wanted.rpm is None:  # a guess so far
+        text = re.sub(rb"^rpm = \S+", f"rpm = {full_speed(case):.6g}".encode(), files["case.toml"], count=1, flags=re.M)
+        files["case.toml"] = text
+        case = checked(files)
     if wanted.campaign:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
@@ -141,7 +147,7 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
     if w.unit is not None and w.scan is None:
         faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
-    if w.stations is not None and w.diameter_mm is None and w.label is None:
+    if w.stations is not None and w.diameter_mm is None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
         faults.append(
             Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
         )
@@ -151,6 +157,9 @@ def _faults(w: Wanted) -> list[Fault]:
         faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
         faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
+    if w.reading is not None and (w.fan or w.stations is not None or w.scan is not None):
+        hint = "Write blade.as_built.reading into the case"
+        faults.append(Fault("", "--reading", "without a label alone", "a label", hint))
     if w.kv is not None and w.scan is not None:
         faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
     if (w.kv is None) != (w.cells is None):
@@ -169,18 +178,18 @@ def _files(w: Wanted) -> dict[str, bytes]:
         return {name: text.encode() for name, text in texts.items()}
     if w.stations is not None:
         file = Path(w.stations)
-        told = None if w.label is None else fresh.read_label(w.label, w.blades)
+        told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
         hub, key = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
-        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor)
+        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name)
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 
 
 def _label_text(w: Wanted, label: str) -> str:
     if not w.fan:
-        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor)
+        return fresh.label_text(label, w.blades, w.rpm, w.airspeed_m_s, w.family, w.motor, reading=w.reading)
     if w.diameter_mm is not None:
         text = fresh.fan_text(w.diameter_mm * 1e-3, None, w.blades, w.rpm, w.motor)
         name = fresh.case_name(label) if label else ""

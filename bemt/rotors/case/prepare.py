@@ -15,7 +15,15 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.physics import effects, k1k2
 from bemt.physics.bem.coaxial import PairModel
-from bemt.physics.bem.duct import WALL_FRICTION, WALL_FRICTION_RANGE, DuctFlow, duct_flow, hydraulic_diameter, lip_loss
+from bemt.physics.bem.duct import (
+    STATOR_RECOVERY,
+    WALL_FRICTION,
+    WALL_FRICTION_RANGE,
+    DuctFlow,
+    duct_flow,
+    hydraulic_diameter,
+    lip_loss,
+)
 from bemt.physics.bem.model import Model, acts_on_points
 from bemt.physics.effects.tip_gap import GAP_LOSS, TipGap
 from bemt.physics.sections import polars
@@ -107,7 +115,12 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
 
 
 def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
-    """Losses of a duct that a case leaves open, each with its value here and the range of its sources."""
+    """What a case leaves open of its duct, losses and shape, each with its value here and its range.
+
+    Shape: the body may end at the exit or go through it as wide as the hub; a lip is sharp, or well rounded from 0.15
+    of the hydraulic diameter on (Crane TP-410, p. A-29, not checked); rotors sit 15 to 60 % behind the inlet
+    (declared); vanes give back 60 to 100 % of the swirl (declared).
+    """
     duct = None if "duct" in case.file.model.effects_off else case.duct()
     if duct is None:
         return ()
@@ -118,6 +131,20 @@ def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
         Assumption("duct.lip_loss", lip.nominal, (lip.low, lip.high), False, "not stated; range of its sources"),
         Assumption("duct.wall_friction", WALL_FRICTION, WALL_FRICTION_RANGE, False, "not stated; Re of 1e5 to 1e7"),
     ]
+    hydraulic, mm = hydraulic_diameter(duct, case.rotor()), 1e3
+    hub, exit_ = 2.0 * case.rotor().Rhub, 2.0 * float(duct.exit_radius or duct.inner_radius)
+    widest = min(hub, 0.9 * exit_) * mm
+    round_ = min(0.15 * hydraulic, duct.length) * mm
+    at = float(duct.rotor_x or 0.0) * mm
+    places = (min(at, 0.15 * duct.length * mm), max(at, 0.6 * duct.length * mm))
+    found += [
+        Assumption("duct.exit_hub_diameter_mm", 0.0, (0.0, widest), False, "not stated; it ends there, or is the hub"),
+        Assumption("duct.lip_radius_mm", 0.0, (0.0, round_), False, "not stated; sharp to well rounded"),
+        Assumption("duct.rotor_position_mm", at, places, False, "not stated; 15 to 60 % of the length"),
+    ]
+    if duct.stator is not None:
+        why = "not stated; share of the swirl's dynamic pressure"
+        found.append(Assumption("duct.stator.recovery", STATOR_RECOVERY, (0.6, 1.0), False, why))
     if gap is not None and not said and duct.gap > 0.0:
         found.append(Assumption("duct.gap_loss", gap, GAP_LOSS, False, "not stated; range measured on compressors"))
     known = {item.key for item in case.assumptions}
@@ -139,7 +166,8 @@ def prepare_case(
         case.axial_only()
     if not alone:
         case.one_rotor_only()
-    if case.file.polars or case.file.blade.as_built is not None or cache.watched():
+    told = case.file.blade.as_built
+    if case.file.polars or (told is not None and told.file is not None) or cache.watched():
         return _model(case, n_stations)  # of files that may have changed
     return case.once(("model", n_stations), lambda: _model(case, n_stations))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,10 +28,12 @@ from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import zero_thrust
+from bemt.rotors.reference import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
+    from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case.load import Assumption, Case
@@ -46,6 +48,7 @@ SWEPT_DEG = 15.0
 """Sweep or rake of the outer half of the blade from which its loads are doubted, declared [deg]."""
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
+_CAMPAIGNS = {"measured": 1.0, "reference": 2.0}  # differences between campaigns that a band holds, as variances
 _UNMEASURED = "oblique flow: the band adds to that of axial flow a share of what the side wind changes, by analogy"
 
 
@@ -141,12 +144,27 @@ class Propagated:
     refined: Answers | None  # With twice the blade elements
     model: Model | PairModel  # The rotor of the case, prepared, or both of a pair
     model95: Answers  # 95 % half widths from the model's own error
+    # Variance of a reading on a stand beyond that of the rotor itself; negative where the stand is the one that
+    # calibrated it
+    stand: Answers = field(default_factory=dict)
 
     def half_width95(self, channel: str) -> Array:
         """Half width of the 95 % interval, (P,): twice the u of inputs and numerics, the model's with its tail."""
         parts = self.points.u_by
         rest = sum((parts[origin][channel] ** 2 for origin in ("input", "numerics") if origin in parts), 0.0)
         return np.asarray(np.sqrt(4.0 * rest + self.model95[channel] ** 2))
+
+    def u_reading(self, channel: str) -> Array:
+        """Standard uncertainty of what a stand shows, (P,); the bands of the points are those of the rotor itself.
+
+        A stand that nobody calibrated has `bemt.rotors.reference.STAND` besides, a rotor that others measured their
+        campaign; a rotor that its own run calibrated is met again on that stand.
+        """
+        return np.asarray(np.sqrt(self.points.u[channel] ** 2 + self.stand.get(channel, 0.0)))
+
+    def reading95(self, channel: str) -> Array:
+        """Half width of the 95 % interval of what a stand shows, (P,)."""
+        return np.asarray(np.sqrt(self.half_width95(channel) ** 2 + 4.0 * self.stand.get(channel, 0.0)))
 
     def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
         """Carry the bands through any function of the channels at all points: its values, and their u by origin.
@@ -159,7 +177,7 @@ class Propagated:
         for one in self.moved:
             runs = [values if run is self.nominal else answer(run) for run in one.runs]
             for key, v in values.items():
-                squares["input"][key] += spread(one.unknown.discrete, v, [np.asarray(run[key]) for run in runs]) ** 2
+                squares["input"][key] += spread(one.unknown, v, [np.asarray(run[key]) for run in runs]) ** 2
         if "numerics" in squares and self.refined is not None:
             other = answer(self.refined)
             for key, v in values.items():
@@ -173,15 +191,22 @@ class Propagated:
         return values, {origin: {k: np.sqrt(v) for k, v in part.items()} for origin, part in squares.items()}
 
 
-def spread(discrete: bool, nominal: Array, at: Sequence[Array]) -> Array:
+def spread(unknown: Assumption, nominal: Array, at: Sequence[Array]) -> Array:
     """Standard uncertainty from one unknown, (P,), of the results at its values.
 
-    >>> spread(False, np.array([1.0]), [np.array([0.0]), np.array([2.0])]).round(3)
-    array([0.577])
+    What is taken may be one end of the range: then the whole of the range lies on one side of the result, and the root
+    mean square about it counts.
+
+    >>> from bemt.rotors.case.load import Assumption
+    >>> ends = [np.array([0.0]), np.array([2.0])]
+    >>> [spread(Assumption("x", x, (0.0, 2.0), False, ""), np.array([x]), ends).round(3).item() for x in (1.0, 0.0)]
+    [0.577, 1.155]
     """
-    if discrete:
+    if unknown.discrete:
         return np.asarray(np.std(np.subtract(at, nominal), axis=0))  # equal values have no spread, to the last bit
     low, high = at
+    if unknown.nominal in unknown.values:
+        return np.asarray(np.abs(high - low) / np.sqrt(3.0))
     slope, sag = 0.5 * (high - low), 0.5 * (high + low) - nominal
     return np.asarray(np.sqrt(slope**2 / 3.0 + 4.0 * sag**2 / 45.0))
 
@@ -196,7 +221,7 @@ def vary(
             nominal if v == unknown.nominal else answer(case.replaced({unknown.key: v}), unknown.key)
             for v in unknown.values
         )
-        u = {key: spread(unknown.discrete, v, [run[key] for run in runs]) for key, v in nominal.items()}
+        u = {key: spread(unknown, v, [run[key] for run in runs]) for key, v in nominal.items()}
         out.append(Moved(unknown, runs, u))
     return tuple(out)
 
@@ -288,29 +313,49 @@ def propagate(
             loads_of(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
             for u, times in zip(widths, (1.0, 2.0), strict=True)
         )
+        if model.duct is not None:
+            narrow, wide = (
+                one | {"duct_share": share_error(model.duct, found, one["thrust_N"], k)}
+                for k, one in ((1.0, narrow), (2.0, wide))
+            )
     parts = {
         "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
         "model": narrow,
         "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
     }
     answer = replace(found, u={}, u_by=parts)
+    stand = _of_stand(case, found, model.upper.diameter_m if isinstance(model, PairModel) else model.diameter_m)
     lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
-    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide)
+    return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide, stand)
 
 
 def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
     """Half widths of the 68 and 95 % intervals of CT and CP about the nominal result, (2, P) each.
 
-    What the population expects beside the nominal result counts too, as a root sum of squares.
+    What the population expects beside the nominal result counts too, as a root sum of squares. The band is that of the
+    rotor as another careful campaign finds it: of a rotor that its own run calibrated, both campaigns count; a
+    measured one has the first in its law already, others are spread over campaigns.
     """
     known = case.as_built()
     rotor = RealRotor.of(model, air, known.prior, known.drawn, known.reference)
     mean = rotor.solve(known.prior.mean, points.rpm, points.J, np.arange(points.rpm.size))
     found = rotor.predict(rotor.at(points.rpm, points.J, points.Re75), mean)
     off = found.mean - np.array([points.CT, points.CP])
-    return np.hypot(found.half_width(), off), np.hypot(found.half_width(LEVELS[1]), 2.0 * off)
+    elsewhere = _CAMPAIGNS.get(known.prior.known_from, 0.0)
+    narrow, wide = (found.half_width(level, campaigns=elsewhere) for level in LEVELS)
+    return np.hypot(narrow, off), np.hypot(wide, 2.0 * off)
+
+
+def _of_stand(case: Case, points: Dataset, D: float) -> dict[str, Array]:
+    """Variance of all channels that a reading on a stand has beyond the rotor's own, (P,) each."""
+    loads = np.abs(np.array([points.CT, points.CP]))
+    if case.as_built().prior.known_from != "reference":
+        return {key: v**2 for key, v in loads_of(points, D, loads * STAND[:, None]).items()}
+    session = loads_of(points, D, loads * SESSION)  # met again on its own stand
+    campaigns = loads_of(points, D, loads * gains_at(math.sqrt(_CAMPAIGNS["reference"]) * CAMPAIGN, points.J))
+    return {key: session[key] ** 2 - campaigns[key] ** 2 for key in session}
 
 
 def _aside(case: Case, model: Model, found: Dataset, axial: Dataset) -> Array:
@@ -343,11 +388,11 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
     words: tuple[tuple[str, ...], ...] = ((),) * J.size
     if known is not None:
         size = (case.diameter_m, int(case.file.rotor.blades), case.rotor().blade.pitch_m() / case.diameter_m)
-        ducted, run = case.ducted, case.as_built().reference
-        if run is not None:  # a rotor that was measured itself, in its duct
+        run = case.as_built().reference
+        if run is not None:  # a rotor that was measured itself
             own = Validity.of_rotor(*size, run.at.J / _zero_thrust_J(case), run.at.Re, known.M_tip)
-            known, ducted = Validity.of_rotors((known, own)), False
-        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip, ducted)
+            known = Validity.of_rotors((known, own))
+        factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
     swept = swept_words(case)
     return factor, tuple((*a, *b, *swept) for a, b in zip(words, tip, strict=True))
@@ -370,11 +415,23 @@ def swept_words(case: Case) -> tuple[str, ...]:
     return (f"swept blade: by up to {angle:.0f} deg, loads are those of the straight one",)
 
 
+SHARE = 0.02
+"""Standard deviation of the duct's share at one thrust: nozzle 19A at rest, five pitches, by 3.6 to -1.6 points [1]."""
+
+
+def share_error(duct: DuctFlow, points: Dataset, u_thrust: Array, times: float = 1.0) -> Array:
+    """Uncertainty of the duct's share, (P,): so many deviations of the balance, and what that of the thrust moves."""
+    T, more = points.thrust_N / points.density_kg_m3, np.log1p(u_thrust / np.abs(points.thrust_N))
+    at = np.array([duct.share_at(T * np.exp(k * more), points.airspeed_m_s) for k in (-1.0, 0.0, 1.0)])
+    moved = np.fmax(np.abs(at[0] - at[1]), np.abs(at[2] - at[1]))
+    return np.where(np.isnan(moved), np.abs(points.duct_share), np.hypot(times * SHARE, moved))
+
+
 def loads_of(points: Dataset, D: float, u: Array, J_axial: Array | None = None) -> dict[str, Array]:
     """Standard uncertainties of all channels from those of CT and CP, (2, P).
 
     Exhaust speed follows thrust by momentum, T = m V_e - m V, so that dV_e/V_e = (V_e - V)/(2 V_e - V) dT/T. The duct's
-    share has none: no population tells of it. Efficiency takes CT and CP as independent.
+    share: `share_error`. Efficiency takes CT and CP as independent.
     """
     rho, n, V, exit_speed = points.density_kg_m3, points.rpm / 60.0, points.airspeed_m_s, points.exhaust_speed_m_s
     thrust = np.asarray(co.thrust(u[0], rho, n, D))

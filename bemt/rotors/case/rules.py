@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bemt.base.errors import InputError
 from bemt.base.folders import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
-from bemt.rotors.case.schema import GROUPS, INCH, CaseFile, SectionTable
+from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.schema import GROUPS, INCH, AsBuiltTable, CaseFile, SectionTable
+from bemt.rotors.measured import records
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
 MAX_TIP_MACH = 2.0
@@ -146,11 +150,27 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         for key in (*pitches, *_given(blade, "max_chord_over_R", "taper", "pitch_law", "tip_relief")):
             hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
             out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing, because {source} gives it", hint)
-    posterior = blade.as_built is not None and blade.as_built.file is not None
+    told = AsBuiltTable() if blade.as_built is None else blade.as_built
+    measured, posterior = told.measured, told.file is not None or (told.reading is not None and told.measured is None)
     if (blade.known_from == "reference") != posterior:
-        got = 'known_from = "reference" without as_built.file' if not posterior else "as_built.file"
-        expected = 'known_from = "reference" and blade.as_built.file together'
+        got = 'known_from = "reference" without as_built.file or reading' if not posterior else "as_built"
+        expected = 'known_from = "reference" and blade.as_built.file or reading together'
         out.add("blade.known_from", got, expected, "bemt calibrate-rotor writes both")
+    if told.file is not None and (told.reading is not None or measured is not None):
+        out.add("blade.as_built.file", repr(told.file), "nothing else that tells of the rotor beside it")
+    if told.reading is not None:
+        try:
+            parse_reading(told.reading)
+        except InputError as error:
+            for fault in error.faults:
+                out.add("blade.as_built.reading", fault.got, fault.expected, fault.hint)
+    if (blade.known_from == "measured") != (measured is not None):
+        expected = 'known_from = "measured" and blade.as_built.measured together'
+        out.add("blade.known_from", f"{blade.known_from!r}, as_built.measured {measured!r}", expected)
+    if measured is not None and measured not in records():
+        close = difflib.get_close_matches(measured, records(), n=1)
+        out.add("blade.as_built.measured", repr(measured), "a measured propeller that bemt knows",
+                f"Did you mean {close[0]}?" if close else "")  # fmt: skip
     if blade.section is not None:
         _check_section(out, blade.section)
 

@@ -73,8 +73,8 @@ _GAP = FieldLimits("mm", 0, 50, _metres("tip_gap_mm", 0.005))
 _FRACTION_OF_HUMIDITY = _looks((1e-9, 0.999, "a fraction", lambda v: v * 100, "humidity_pct"))
 FILE = "the name of a file in the folder of the case"
 
-BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv"]
-KnownFrom = Literal["cad", "scan", "stations", "label", "reference"]
+BladeClass = Literal["electric", "slow_flyer", "multirotor", "folding", "sport", "fpv", "reversible", "pattern"]
+KnownFrom = Literal["cad", "scan", "stations", "label", "measured", "reference"]
 Rotations = Literal["right", "left"]
 Numbers = float | tuple[float, ...] | None
 Texts = str | tuple[str, ...] | None
@@ -144,6 +144,8 @@ class AsBuiltTable(Table):
     drag: float | None = entry("expected change of ln(cd)", "", -2, 2)
     drag_sd: float | None = entry("its standard deviation", "", 0, 2, _percent("drag_sd", 2.0))
     file: str | None = entry("posterior that calibrate-rotor wrote", words=FILE)
+    measured: str | None = entry("measured propeller that bemt knows, such as gwsdd_9x5")
+    reading: str | None = entry("reading of this rotor, such as rpm=5400, thrust_g=410; more behind semicolons")
 
 
 class BladeTable(Table):
@@ -210,16 +212,20 @@ class DuctTable(Table):
     inner_diameter_in: float | None = entry("bore", "in", 0.5, 240)
     tip_gap_mm: float | None = entry("gap between blade tip and wall", _GAP)
     length_mm: float = entry("length from inlet to exit", "mm", 1, 10_000, _metres("length_mm", 0.999), required=True)
-    lip_radius_mm: float = entry("radius of the inlet lip", "mm", 0, 1000, default=0.0)
+    lip_radius_mm: float | None = entry("radius of the inlet lip; sharp if omitted", "mm", 0, 1000)
     lip_loss: float | None = entry("loss coefficient of the inlet lip", "", 0, 1, _percent("lip_loss", 1.5))
     wall_friction: float | None = entry("skin friction coefficient of the walls", "", 0, 0.05)
     gap_loss: float | None = entry("pressure rise lost over itself, per tip gap over blade height", "", 0, 5)
-    rotor_position_mm: float | None = entry("distance of the rotor behind the inlet", "mm", -1000, 10_000)
+    rotor_position_mm: float | None = entry(
+        "distance of the rotor behind the inlet; a third of the length if omitted", "mm", -1000, 10_000
+    )
     exit_area_ratio: float | None = entry(
         "exit area over swept annulus area", "", 0.3, 3, _percent("exit_area_ratio", 20.0)
     )
     exit_diameter_mm: float | None = entry("diameter of the exit", "mm", 5, 6000, _metres("exit_diameter_mm", 4.9))
-    exit_hub_diameter_mm: float = entry("diameter of the centre body at the exit", "mm", 0, 6000, default=0.0)
+    exit_hub_diameter_mm: float | None = entry(
+        "diameter of the centre body at the exit; it ends there if omitted", "mm", 0, 6000
+    )
     stator: StatorTable | None = None
 
     @property

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import textwrap
+import unicodedata
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from bemt.data.readers import references as reference_file
 from bemt.physics.effects import source_of
 from bemt.rotors.case import Case
+from bemt.rotors.measured import records
 
 SCHEMA = "bemt.sources/1"
 BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, compared with recordings, version {}; "
@@ -105,7 +108,10 @@ def _bands(case: Case) -> list[Source]:
     about = population.population().provenance
     words = f"{about['propellers']} measured propellers ({about['points']} points) of {len(about['families'])} families"
     found = [Source("band", "population", f"{about['source']}: {words}")]
-    if case.file.blade.as_built is not None:
+    stated = case.file.blade.as_built
+    if stated is not None and stated.measured is not None:
+        found.insert(0, Source("band", "measured", f"{records()[stated.measured].source}; numbers of bemt's own fit"))
+    elif stated is not None:
         origin = "runs of this rotor, taken in by `bemt calibrate-rotor`"
         found.insert(0, Source("band", "as built", origin))
     return found
@@ -118,6 +124,60 @@ def _data(case: Case) -> list[Source]:
     rows = [] if path is None else reference_file.read(path)
     told = dict.fromkeys((row.kind, row.source) for row in rows if row.source)
     return found + [Source("data", kind, source) for kind, source in told]
+
+
+_WORK = re.compile(
+    r"(?P<who>[A-Z]\w+(?:,? (?:and |van |von )*[A-Z][\w.'-]*)*(?: et al\.)?)(?:,)? \(?(?P<year>1[89]\d\d|20[0-4]\d)\)?"
+    r"(?P<what>(?:(?!(?<=[a-z]{4})\. [A-Z`])[^;()])*)"
+)
+"""Authors, year and what follows in a source, up to the next semicolon, bracket or sentence."""
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/"}
+
+
+def bibtex(found: Sources) -> str:
+    """Works that an answer stands on, as BibTeX.
+
+    Each work with an author and a year that a source names is an entry ``@misc``, whose note is what the source says of
+    it ("not checked" included) and where it is used; a source without both is a comment. The program is ``@software``.
+
+    Parameters
+    ----------
+    found : Sources
+        Sources of the answer.
+
+    Returns
+    -------
+    str
+        Entries, each key once, in their order.
+    """
+    from bemt import __version__
+
+    entries: dict[str, tuple[str, str, str, list[str]]] = {}
+    bare = []
+    for source in found[1:]:
+        works = list(_WORK.finditer(source.source))
+        for work in works:
+            plain = unicodedata.normalize("NFKD", work["who"]).encode("ascii", "ignore").decode()
+            key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + work["year"]
+            what = " ".join(work["what"].split()).strip(" ,.:")
+            if re.match(r"[ (,;]*(?:\w+ ){0,2}not checked", source.source[work.end() :]):
+                what = f"{what} (not checked)".strip()
+            entry = entries.setdefault(key, (work["who"], work["year"], what, []))
+            entry[3].append(source.name)
+        if not works:
+            bare.append(f"% {source.name}: {' '.join(source.source.split())}")
+    lines = [f"@software{{bemt, title = {{bemt}}, version = {{{__version__}}}, note = {{see CITATION.cff}}}}"]
+    for key, (who, year, what, used) in entries.items():
+        author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
+        doi = re.search(r"doi:\s*(10\.\d+/[^\s,)]+)", what)
+        note = f"{what}; in {', '.join(dict.fromkeys(used))}" if what else f"in {', '.join(dict.fromkeys(used))}"
+        fields = [f"author = {{{_latex(author)}}}", f"year = {{{year}}}", f"note = {{{_latex(note)}}}"]
+        lines.append(f"@misc{{{key}, {', '.join([*fields, *([f'doi = {{{doi[1]}}}'] if doi else [])])}}}")
+    return "\n".join([*lines, *bare]) + "\n"
+
+
+def _latex(text: str) -> str:
+    return "".join(_LATEX.get(c, c) for c in text)
 
 
 def text(found: Sources, width: int = 100) -> str:

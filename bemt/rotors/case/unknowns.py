@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bemt.base.units import INCH
@@ -18,9 +18,23 @@ CHORD, CHORD_EXPONENT = 0.2, -0.2
 pairs the one that predicts 87 propellers of UIUC from their labels best in the median, at rest and in flight.  Their
 chords alone give 0.218 and -0.4 with families alike in weight, which is 13 to 31 % too much thrust and power below 9 in
 [1]."""
-SLOW_FLYER_CHORD = 1.4
-"""Chord of slow flyers over that of others: eleven of two makers have 1.5 times the law's, others of their size 1.1;
-the factor moves the mean log score of 175 propellers known from their labels from 0.042 to 0.086 [1]."""
+CLASS_CHORD: dict[str | None, tuple[float, float | None]] = {
+    "electric": (1.0, 0.09), "sport": (1.0, 0.09), "folding": (0.95, 0.12), "slow_flyer": (1.4, None),
+    "multirotor": (1.25, 0.10), "reversible": (0.75, 0.15), "fpv": (0.9, 0.15),
+}  # fmt: skip
+"""Chord of a class of blades over the usual, and the scatter of its logarithm where that is known.
+
+Fitted to readings at rest and in flight through the solver's slopes, beside blade angle and camber
+(`reports/studies/label_classes.py`): electric, sport and folding to UIUC volumes 1 to 3 (19, 27 and 21 propellers;
+their own scatter is 0.05, 0.04 and 0.10, between makers 0.07), fpv to 16 of Drive Calculator and two stands.
+Multirotor and reversible are APC's computed tables (20 and 8), with the spread of a computation; eight multirotor
+propellers that Drive Calculator measured have 1.10 +- 0.09. Slow flyers: eleven of two makers have 1.5 times the law's
+chord; 1.4 moves the mean log score of 175 propellers known from their labels from 0.042 to 0.086 [1]."""
+WIDTH_CHORD = {1: 1.08, 0: 1.0, -1: 0.86, -2: 0.79}
+"""Chord of wide (W) and narrow blades (N, NN) over others', from APC's computed tables of 21, 18 and 7 [1]."""
+BLADES_EXPONENT = 0.2
+"""Chord of B blades is (2/B) to this power that of two: three- and four-bladed DA4052 and NR640 against their own two
+blades (0.18), 57 and 19 of Drive Calculator's against its two-bladed ones (0.1 to 0.2), FPV (0.4 +- 0.2) [1]."""
 DEG_PER_CAMBER = 104.0
 """Zero-lift angle over camber of a NACA four-digit mean line, camber at 40 % chord: thin-airfoil theory [deg]."""
 _CHORD_LAW = (0.05, 1.0)  # chords over the radius that a propeller may have
@@ -72,16 +86,22 @@ DRIVE = (
         "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
     ),
     Unknown(
-        "drive.motor.winding_drop",
-        0.20,
-        0.05,
-        0.39,
-        "motor not known; winding, controller and leads take 11 to 31 % of the voltage in two of three of 859 motors",
+        "drive.motor.size",
+        0.0,
+        -1.3,
+        1.3,
+        "motor not known; resistance with controller and leads is half to twice the usual for K_v and cells in two of "
+        "three of 611 motors. Its mass_g narrows that to 0.7 to 1.4",
     ),
     Unknown(
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
     ),
 )
+WINDING = Unknown(
+    "drive.motor.winding_drop", 0.20, 0.05, 0.39,
+    "a motor as large as its rotor needs: winding, controller and leads take 11 to 31 % of the voltage in two of three "
+    "of 859 motors",
+)  # fmt: skip
 PAIR = (
     Unknown(
         "second_rotor.wake_radius",
@@ -116,14 +136,16 @@ ESC_DROP = Unknown(
     "drive.esc.drop", 0.07, 0.0, 0.18,
     "controller not known; it, leads and a warm winding take 2 to 13 % of the voltage in two of three of 859 motors",
 )  # fmt: skip
-_STATED = {"drive.battery.sag": "resistance_mohm", "drive.motor.winding_drop": "resistance_mohm",
-           "drive.motor.idle_share": "no_load_A"}  # fmt: skip
+_STATED = {"drive.battery.sag": ("resistance_mohm",), "drive.motor.size": ("resistance_mohm", "winding_drop"),
+           "drive.motor.idle_share": ("no_load_A",)}  # fmt: skip
 HUBS = ("hub_ratio", "hub_diameter_mm", "hub_diameter_in")
 CHORDS = ("chord_law", "stations", "uiuc", "apc")
 
 
 def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
-    """Section of a class of blades: slow flyers are cambered as the measured ones are."""
+    """Section of a class of blades: slow flyers are cambered as the measured ones are, reversible ones not at all."""
+    if blade_class == "reversible":
+        return Unknown("blade.section.camber", 0.0, 0.0, 0.01, "turns both ways: symmetric, or nearly so"), THICKNESS
     if blade_class != "slow_flyer":
         return SECTION
     camber = round(SECTION[0].value + population().slow_flyer_deg / DEG_PER_CAMBER, 3)
@@ -131,20 +153,35 @@ def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
     return Unknown("blade.section.camber", camber, camber - 0.015, camber + 0.015, why), THICKNESS
 
 
-def label_chord(diameter_m: float, blade_class: str | None = None) -> Unknown:
+def offset_of(family: str | None) -> Unknown:
+    """Blade angle over the label's: that of a maker's measured series, else of any."""
+    kin = population().families.get(family or "")
+    if kin is None:
+        return OFFSET
+    far = math.sqrt(3.0) * math.hypot(kin.offset_sd_deg, population().label_deg)
+    value = round(kin.offset_deg, 2)
+    why = f"blade angle over the label's, as stations of the series {family} have it, and what labels err by"
+    return Unknown(OFFSET.key, value, round(value - far, 2), round(value + far, 2), why)
+
+
+def label_chord(
+    diameter_m: float, blade_class: str | None = None, blades: int | None = None, width: int = 0
+) -> Unknown:
     """Largest chord of a propeller that is known by its label."""
     low, high = _CHORD_LAW
-    far = math.exp(math.sqrt(3.0) * chord_sd(diameter_m))
-    wider = SLOW_FLYER_CHORD if blade_class == "slow_flyer" else 1.0
+    wider, scatter = CLASS_CHORD.get(blade_class, (1.0, None))
+    wider *= WIDTH_CHORD[min(max(width, -2), 1)] * (2.0 / max(blades or 2, 2)) ** BLADES_EXPONENT
+    far = math.exp(math.sqrt(3.0) * (scatter or chord_sd(diameter_m)))
     chord = min(max(wider * CHORD * (diameter_m / INCH / 10.0) ** CHORD_EXPONENT, low), high)
     least, most = (float(f"{value:.2g}") for value in (max(chord / far, low), min(chord * far, high)))
-    why = "chord not known; range of 87 measured propellers, 2.2 to 19 in. Measuring it narrows the band most"
+    of = f"{blade_class} propellers" if scatter else "87 measured propellers, 2.2 to 19 in"
+    why = f"chord not known; range of {of}. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
 
 
 def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
     """Whether a table [drive] has the value itself, of which the key is a typical share."""
-    return _states(drive, key.split(".")[1], (_STATED[key],))
+    return _states(drive, key.split(".")[1], _STATED[key])
 
 
 ESC = ("resistance_mohm", "drop", "name")
@@ -166,6 +203,19 @@ def _diameter_m(rotor: Any) -> float:
     return 10.0 * INCH
 
 
+def _sized(item: Unknown, drive: Mapping[str, Any]) -> Unknown:
+    """Range of a motor's size, narrower where its mass or stator is stated."""
+    if item.key != "drive.motor.size" or not _states(drive, "motor", ("mass_g", "stator")):
+        return item
+    why = "winding not known; resistance is 0.7 to 1.4 times the usual for K_v and mass in two of three of 584 motors"
+    return replace(item, low=-0.55, high=0.55, why=why)
+
+
+def _blades(rotor: Any) -> int | None:
+    blades = rotor.get("blades") if isinstance(rotor, dict) else None
+    return blades if isinstance(blades, int) else None
+
+
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Document with what a short case leaves out: kind, hub, chord law, section and air, each with its assumption.
 
@@ -185,7 +235,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(blade, dict):
         if not any(key in blade for key in CHORDS):
             blade["chord_law"] = "fan" if fan else "apc_like"
-            unknowns += FAN[1:2] if fan else [OFFSET, label_chord(_diameter_m(rotor), blade.get("class"))]
+            chord = label_chord(_diameter_m(rotor), blade.get("class"), _blades(rotor))
+            unknowns += FAN[1:2] if fan else [OFFSET, chord]
         if "section" not in blade:
             unknowns += [*(FAN[2:] if fan else section_of(blade.get("class"))), *SURFACE]
     if "air" not in made:
@@ -193,8 +244,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(made.get("second_rotor"), dict):
         unknowns += PAIR
     if isinstance(made.get("drive"), dict):
-        unknowns += [item for item in DRIVE if not _drive_states(made["drive"], item.key)]
-        if _drive_states(made["drive"], "drive.motor.winding_drop") and not _states(made["drive"], "esc", ESC):
+        unknowns += [_sized(item, made["drive"]) for item in DRIVE if not _drive_states(made["drive"], item.key)]
+        if _states(made["drive"], "motor", ("resistance_mohm",)) and not _states(made["drive"], "esc", ESC):
             unknowns.append(ESC_DROP)
     if not isinstance(declared, list):
         return made

@@ -117,7 +117,7 @@ def design(
     blades: Count | None = None, section: str | None = None, hub_ratio: float | None = None,
     static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float | None = None,
     min_thickness_mm: float = 0.0, max_tip_mach: float = 0.8, stall_margin: float = 0.15,
-    material: Literal["pla", "petg", "pc", "pa12", "pla_soft", "pa6_gf", "al6061"] = "pla", safety: float = 3.0,
+    material: str = "pla", safety: float = 3.0,
     density_kg_m3: float | None = None, duct: Path | None = None, robust: bool = False, out: Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Design:  # fmt: skip

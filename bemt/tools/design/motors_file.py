@@ -54,7 +54,10 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     if not rows:
         raise InputError(Fault(name, "", "an empty file", "a CSV of motors", hint))
     mark = max(",;\t", key=rows[0][1].count)
-    head, *cells = csv.reader((line for _, line in rows), delimiter=mark)
+    try:
+        head, *cells = csv.reader((line for _, line in rows), delimiter=mark)
+    except csv.Error as error:
+        raise InputError(Fault(name, "", str(error), "cells of some words")) from error
     place = {key.strip().casefold(): i for i, key in enumerate(head)}
     missing = [key for key in COLUMNS if key.casefold() not in place]
     if missing:

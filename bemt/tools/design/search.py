@@ -35,7 +35,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
+from bemt.rotors.case.unknowns import DRIVE, ESC_DROP, WINDING
 from bemt.tools.design import masses, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
@@ -53,7 +53,7 @@ FLYING = (0.85, 1.0, 1.2)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
-SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
+SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, WINDING, ESC_DROP)}
 LOADING = {"air": (15.0, 1200.0), "water": (300.0, 60_000.0), "fan": (500.0, 12_000.0)}
 """Disk loading of the sizes that are tried, in air, in water, of ducted fans [N/m2]."""
 WATER_DIAMETERS = (2, 2.5, *DIAMETERS[:21])

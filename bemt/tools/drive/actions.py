@@ -21,12 +21,12 @@ __all__ = ["drive", "map", "motor", "thrusters"]
 
 @action(
     "Drive", "drive 10x4.5 --kv 900 --cells 3", words=("case",), shown=True,
-    common=("kv", "cells", "mass_kg", "rotors", "capacity_Ah", "airspeed_m_s", "out"),
+    common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "reading", "out"),
 )  # fmt: skip
 def drive(
-    case: Propeller | Path = ".", *, kv: float | None = None, cells: Count | None = None,
+    case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Count | None = None,
     mass_kg: float | None = None, rotors: Count | None = None, capacity_Ah: float | None = None,
-    airspeed_m_s: float = 0.0, off: Sequence[str] = (), out: Path | None = None,
+    airspeed_m_s: float = 0.0, reading: str | None = None, off: Sequence[str] = (), out: Path | None = None,
 ) -> DriveResult:  # fmt: skip
     """Solve a rotor with its motor and battery: thrust, current and hover.
 
@@ -34,6 +34,8 @@ def drive(
     ----------
     case : Propeller, str or path
         Propeller, case or label such as 10x5; this folder by default.
+    motor : str, optional
+        Name of the motor, such as "T-Motor MN2212 920" (needs the extra ``motors``).
     kv : float, optional
         Speed constant of the motor; from the case's table [drive] by default, like all that follows. [rev/min/V]
     cells : int, optional
@@ -46,6 +48,8 @@ def drive(
         Capacity of the battery, for the flight time. [A h]
     airspeed_m_s : float
         Flight speed. [m/s]
+    reading : str, optional
+        One reading of this propeller: ``rpm=5400,thrust_g=410``.
     off : sequence of str
         Switch off battery_sag, motor_heating, rotor_inertia or inflow_lag.
     out : path, optional
@@ -70,13 +74,15 @@ def drive(
     True
     """
     from bemt.base.given import number, path_text
+    from bemt.rotors.case.reading import with_reading
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.drive import drive_result
 
     given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
     told = {name: value if value is None else number(name, value, finite=False) for name, value in given.items()}
     told |= {name: given[name] for name in ("cells", "rotors")}
-    found = drive_result.with_drive(rotor_of(case).case, **told)
+    own = rotor_of(case).case
+    found = drive_result.with_drive(own if reading is None else with_reading(own, reading), motor, **told)
     result = drive_result.solve(found, number("airspeed_m_s", airspeed_m_s, finite=False), list(off))
     if out is not None:
         drive_result.write(result, path_text("out", out))

@@ -1,8 +1,9 @@
 """The drive of a case: its battery, ESC and motor around its rotor, with whatever a label leaves open filled in.
 
-A case that states no resistance or no-load current states the share of voltage or current that they take at full
-throttle; here the shares become ohms and amperes of a motor that is as large as this rotor needs. The motor does not
-change with an unknown of the rotor: it is the same motor, whatever the blade turns out to be.
+A case that states no winding has that of its class (`bemt.rotors.case.motor`), whatever the rotor; one that states the
+share of voltage or current that is lost at full throttle has the ohms and amperes of a motor that is as large as this
+rotor needs. The motor does not change with an unknown of the rotor: it is the same motor, whatever the blade turns out
+to be.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 
 from bemt.rotors.case import Case
 from bemt.rotors.case.drive_schema import DriveTable
+from bemt.rotors.case.motor import class_resistance
 from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
 from bemt.tools.drive.rotor_table import RotorMap
 
@@ -73,6 +75,8 @@ def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float, float]
     volts, k = float(battery_of(t).voc(t.soc)), 30.0 / (math.pi * t.kv)
     stated = None if t.battery.resistance_mohm is None else t.vehicle.rotors * t.battery.resistance_mohm * 1e-3
     ohm = None if t.motor.resistance_mohm is None else t.motor.resistance_mohm * 1e-3
+    if ohm is None and t.motor.winding_drop is None:
+        ohm = class_resistance(t)
     sag, drop, share = t.battery.sag or 0.0, t.motor.winding_drop or 0.0, t.motor.idle_share or 0.0
     more, lost = t.esc.resistance_mohm * 1e-3, t.esc.drop or 0.0
     amps = 1e-3

@@ -21,6 +21,7 @@ from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
+from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
 from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
@@ -37,11 +38,11 @@ HOVER_SHARE = 0.5
 """Hover point as a share of full thrust where no mass is given: a thrust-to-weight ratio of 2."""
 TIPS = (126.0, 190.0, 218.0, 310.0)
 """Tip speed of K_v times the loaded voltage, without load: 68 % of 1088 motors; 95 % and 99 % below. [m/s]"""
-SHEET = ("drive.motor.winding_drop", "drive.motor.idle_share")
+SHEET = ("drive.motor.size", "drive.motor.winding_drop", "drive.motor.idle_share")
 """What a motor sheet tells."""
 OPTIONS = {
     "kv": "drive.kv", "cells": "drive.cells", "mass_kg": "drive.vehicle.mass_kg", "rotors": "drive.vehicle.rotors",
-    "capacity_Ah": "drive.battery.capacity_Ah",
+    "capacity_Ah": "drive.battery.capacity_Ah", "motor_mass_g": "drive.motor.mass_g",
 }  # fmt: skip
 """Arguments that set values of the table [drive]."""
 
@@ -142,9 +143,13 @@ class DriveResult:
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def with_drive(case: Case, **given: float | None) -> Case:
-    """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent."""
-    changes = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:
+    """The case with the numbers of `OPTIONS` that are given in its table [drive], typical losses where it is silent.
+
+    ``motor`` is a name as `bemt.rotors.case.motor.named_motor` takes it.
+    """
+    changes: dict[str, float | str] = {OPTIONS[name]: v for name, v in given.items() if v is not None}
+    changes = changes if motor is None else {**named_motor(motor).keys, **changes}
     if case.file.drive is None and not {"drive.kv", "drive.cells"} <= set(changes):
         missing = [f"--{name}" for name in ("kv", "cells") if OPTIONS[name] not in changes]
         hint = "As in --kv 900 --cells 3; or a table [drive] in the case"

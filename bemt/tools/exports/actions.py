@@ -113,24 +113,20 @@ def export(
     >>> export("10x5", tempfile.mkdtemp(), "qpropp")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: format: got 'qpropp'; expected one of ...
+    bemt.base.errors.InputError: format: got qpropp; expected one of ...
     """
     from pathlib import Path as File
 
     from bemt.base.errors import Fault, InputError, system_fault
     from bemt.base.given import number, path_text
     from bemt.rotors.propeller import rotor_of
-    from bemt.tools.exports import target_ids
     from bemt.tools.exports.answer import Exported
     from bemt.tools.exports.folder import export_cases
     from bemt.tools.exports.printing import Print, asked
 
-    wanted, known = [format] if isinstance(format, str) else list(format), target_ids()
-    faults = [Fault("", "format", repr(word), f"one of {', '.join(known)}") for word in wanted if word not in known]
+    wanted, faults = [format] if isinstance(format, str) else list(format), []
     numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level}
-    given: dict[str, Any] = {
-        key: None if value is None else number(key, value, finite=False) for key, value in numbers.items()
-    }
+    given: dict[str, Any] = {k: None if v is None else number(k, v, finite=False) for k, v in numbers.items()}
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}
     request = Print(
         None, nozzle_mm, trailing_edge_mm, tip_round, None, hub_diameter_mm, hub_height_mm, adapter, bore_mm,

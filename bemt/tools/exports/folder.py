@@ -192,7 +192,7 @@ def export_cases(
     try:
         solid = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
-        faults += [Fault("", *fault) for fault in error.faults]
+        faults += [Fault("", f"{_option(name)}-mm", *rest) for name, *rest in error.faults]
     if faults:
         raise InputError(faults)
     paths = [] if isinstance(path, Case) else find_cases([path])

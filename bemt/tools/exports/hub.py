@@ -21,7 +21,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.prepare import prepare_case
-from bemt.tools.exports.performance import Performance
+from bemt.tools.exports.performance import LOWEST, Performance
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case

@@ -183,7 +183,8 @@ def fly(
     answers = []
     stated = len({day for _, day in calm}) > 1 or any(day != _LOOSE for _, day in calm)
     for path in (p for p in mine if p in found):
-        others = [(p, day) for p, day in calm if p != path]
+        here = Path(path).resolve()
+        others = [(p, day) for p, day in calm if Path(p).resolve() != here]
         inside = str(Path(path).parent)
         day = healthy_day or (inside if any(d == inside for _, d in others) else "")
         days = [d for _, d in others] if stated else []

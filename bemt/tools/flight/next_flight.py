@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.diagnose.verdict import Decision
 from bemt.tools.flight.balance import BLADE, WEIGHT, WIND
+from bemt.tools.flight.rules import DAYS
 
 _HOVER = "hover 30 s in still air and judge that flight"
 
@@ -23,6 +24,9 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) 
         text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
     elif said.effects[:1] == (WIND,):
         text, kind = _HOVER, "run"
+    elif said.rule == DAYS:
+        text, kind = "three flights of this day that are known to be healthy, with --healthy and --healthy-day same; " \
+                     "else check propellers and arms by hand", "reference"  # fmt: skip
     elif given < 3 and said.verdict != "named":
         text, kind = "three or more healthy flights of this vehicle, in still air, with --healthy", "reference"
         if motors:

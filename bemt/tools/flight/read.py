@@ -36,10 +36,9 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
             return _read(Path(path), head)
         with tempfile.TemporaryDirectory() as folder:
             inside = Path(folder) / "log"
-            data, damage = _gunzip(Path(path).read_bytes(), name)
-            inside.write_bytes(data)
-            head = data[:4096]
-            del data
+            damage = _gunzip(Path(path), inside)
+            with inside.open("rb") as file:
+                head = file.read(4096)
             try:
                 found = _read(inside, head)
             except InputError as error:
@@ -79,22 +78,26 @@ def _read(path: Path, head: bytes) -> FlightLog:
     return found
 
 
-def _gunzip(raw: bytes, name: str) -> tuple[bytes, str]:
-    """What can be unpacked, and what is damaged; InputError beyond the limit."""
-    out, at, view = bytearray(), 0, memoryview(raw)
-    try:
-        while at < len(raw) and (at == 0 or bytes(view[at : at + 2]) == b"\x1f\x8b"):
-            stream = zlib.decompressobj(31)
-            while not stream.eof:
-                block = view[at : at + _BLOCK]
-                some = stream.decompress(block, _BLOCK)
-                out += some
-                at += len(block) - len(stream.unconsumed_tail) - len(stream.unused_data)
-                if len(out) > MAX_BYTES:
-                    got, expected = f"more than {MAX_BYTES >> 20} MB, unpacked", f"at most {MAX_BYTES >> 20} MB"
-                    raise InputError(Fault(name, "", got, expected, "Unpack it, and give the log itself"))
-                if not block and not some:
-                    return bytes(out), "it ends early"
-    except zlib.error as error:
-        return bytes(out), str(error)
-    return bytes(out), ""
+def _gunzip(path: Path, target: Path) -> str:
+    """Unpack to a file, block by block; gives what is damaged. InputError beyond the limit."""
+    size, stream = 0, zlib.decompressobj(31)
+    with path.open("rb") as file, target.open("wb") as out:
+        left = file.read(_BLOCK)
+        while left:
+            if stream.eof:
+                if left[:2] != b"\x1f\x8b":
+                    break  # zeros of a tape behind the last member
+                stream = zlib.decompressobj(31)
+            try:
+                some = stream.decompress(left, _BLOCK)
+            except zlib.error as error:
+                return str(error)
+            size += len(some)
+            out.write(some)
+            if size > MAX_BYTES:
+                got, expected = f"more than {MAX_BYTES >> 20} MB, unpacked", f"at most {MAX_BYTES >> 20} MB"
+                raise InputError(Fault(str(path), "", got, expected, "Unpack it, and give the log itself"))
+            left = stream.unused_data if stream.eof else stream.unconsumed_tail
+            if not left:
+                left = file.read(_BLOCK)
+    return "" if stream.eof else "it ends early"

@@ -13,7 +13,7 @@ from bemt.rotors.model import air_fields, air_of_points
 from bemt.tools.flight.repeat import flight_scatter
 
 if TYPE_CHECKING:
-    from bemt.judge.compare.as_measured import AsMeasured
+    from bemt.rotors.as_measured import AsMeasured
     from bemt.rotors.case import Case
     from bemt.tools.flight.identify import Identified
 

@@ -15,12 +15,14 @@ from bemt.judge.diagnose.verdict import BESIDE_IT, Decision, credible_sets
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, blade
 from bemt.tools.flight.change import FlightChange
 
-__all__ = ["BUILD", "IN_FLIGHT", "RULES", "BesideBalance", "FlightEvidence", "FlightQuery"]
+__all__ = ["BUILD", "DAYS", "IN_FLIGHT", "RULES", "WIDE", "BesideBalance", "FlightEvidence", "FlightQuery"]
 
 BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 IN_FLIGHT = "a change within the flight"
 """Rule whose size is that of the change, not of the whole flight."""
 _EVEN = 0.5  # probability from which another day is the reason [1]
+DAYS = "days differ"
+"""Rule of a flight that another day explains."""
 _LEAST = 3  # healthy flights from which a cause is named
 _POSITIVE = 1.0  # log odds from which evidence is positive (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995) [1]
 
@@ -283,7 +285,7 @@ RULES: list[Rule] = [
     Rule("healthy flights look like it", _within, "GATE"),
     Rule("too few healthy flights", _few_and_within, "GATE"),
     Rule("beyond other healthy vehicles", _few, "GATE, NEAR, RARE"),
-    Rule("days differ", _day),
+    Rule(DAYS, _day),
     Rule("a rest is left", _rest, "LEFT_OVER, SMALL"),
     Rule(BESIDE_IT, _another, "NAMED, LIKE, MOST"),
     Rule("one is sure", _one, "NAMED"),

@@ -144,7 +144,8 @@ def _balance(thrust: Array, rows: Array) -> Array:
     One rotor may be damaged: then its thrust is less than its speed says.
     """
     B = thrust.shape[1]
-    lost = np.concatenate([np.ones((1, B)), *(1.0 - np.eye(B)[[j]] * (1.0 - np.exp(-_LOSSES[:, None])) for j in range(B))])
+    gone = 1.0 - np.exp(-_LOSSES[:, None])
+    lost = np.concatenate([np.ones((1, B)), *(1.0 - np.eye(B)[[j]] * gone for j in range(B))])
     weight = np.log([1.0 - _SICK_SHARE, *np.full(len(lost) - 1, _SICK_SHARE / (len(lost) - 1))])
     every = thrust[:, None, :] * lost
     y = (every / every.mean(axis=2, keepdims=True) - 1.0) @ rows.T

@@ -12,10 +12,11 @@ from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
-from bemt.tools.flight.rules import IN_FLIGHT
+from bemt.tools.flight.rules import IN_FLIGHT, WIDE
 from bemt.tools.flight.vibration import Vibration
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
+_WORDS = {WIDE: "another spread between flights than usual"}
 _HIGH = 30.0  # vibration up to which an autopilot does well (ArduPilot, Measuring Vibration; not checked) [m/s2]
 
 
@@ -90,6 +91,10 @@ def pilot(a: FlightAnswer) -> list[str]:
         second = ["Of the same day as the healthy flights? Say so (--healthy-day): days move the drives by 1 to 3 %."]
     if not second and (level := _level(shake)):
         second = [level]
+    if not second and j.given and j.readings.size:
+        order = sorted(range(j.readings.size), key=lambda k: -abs(float(j.readings[k])))[:2]
+        most = ", ".join(f"motor {k + 1} {100 * float(j.readings[k]):+.0f} %" for k in order)
+        second = [f"Largest changes of the drive against the healthy flights: {most}."]
     if not second:
         second = [f"{headline(j)}: {j.said.why}."]
     return [_look(a), " ".join(second), f"Next: {j.next.text or 'nothing'}."]
@@ -139,7 +144,7 @@ def _look(a: FlightAnswer) -> str:
 def _alternatives(names: Sequence[str]) -> str:
     """Causes in a row, each motor once said."""
     words = [i if i.startswith(("a ", "an ", "flights", "another", "wind", "imbalance", "weak")) else f"a {i}"
-             for i in (n.replace(", motor ", " at motor ") for n in names)]  # fmt: skip
+             for i in (_WORDS.get(n, n.replace(", motor ", " at motor ")) for n in names)]  # fmt: skip
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
 
 

@@ -47,13 +47,20 @@ def _groups(rpm: Array, J: Array) -> list[NDArray[np.intp]]:
 def as_measured(
     case: Case, rpm: Array, airspeed_m_s: Array, air: Air, CT: Array, CP: Array,
     u_CT: Array | float = 0.0, u_CP: Array | float = 0.0, gain: tuple[float, float] = (SESSION, SESSION),
+    others: Array | None = None, theirs: NDArray[np.bool_] | None = None,
+    prior: Prior | None = None,
 ) -> AsMeasured:  # fmt: skip
-    """Posterior of a rotor's latent numbers from a reference run."""
+    """Posterior of a rotor's latent numbers from a reference run.
+
+    ``others`` as in `noise_of_run`, for the points ``theirs`` that another piece or campaign gave, (P,); all of them
+    where that is not said.  ``prior``: what is known before, as the case says by default.
+    """
     from bemt.rotors.case.prepare import prepare_case
 
-    people, prior = population(), case.as_built().prior
-    if prior.known_from != "reference":
-        prior = case.as_built(counting_assumptions=False).prior
+    people = population()
+    if prior is None:
+        prior = case.as_built().prior
+        prior = prior if prior.known_from == "reference" else case.as_built(counting_assumptions=False).prior
     ready = prepare_case(case)
     J = airspeed_m_s / (rpm / 60.0 * ready.diameter_m)
     usable = np.isfinite(CT) | np.isfinite(CP)
@@ -66,6 +73,7 @@ def as_measured(
         full = np.broadcast_to(np.asarray(values, float), rpm.shape)
         return np.array([full[g].mean() for g in groups])
 
+    foreign = None if theirs is None else mean(theirs.astype(np.float64)) > 0.5
     share = np.array([1.0 / np.sqrt(g.size) for g in groups])
     state = air_of_points({k: v if v.size == 1 else mean(v) for k, v in air_fields(air).items()})
     rpm_, J_ = mean(rpm), mean(J)
@@ -78,7 +86,7 @@ def as_measured(
     still = np.abs(J_) < _STILL
     rough = np.array([[scatter(a, Re[still])] for a in (y - at.f)[:, still]]) * still
     single = np.maximum(np.hypot(np.array([mean(u_CT), mean(u_CP)]), people.noise_sd(at)) * share, rough)
-    noise = noise_of_run(people, at, y, single, gain)
+    noise = noise_of_run(people, at, y, single, gain, others, foreign)
     target = y.reshape(-1)
     bias = people.bias(at).reshape(-1)
     found = condition(

@@ -1,0 +1,262 @@
+"""Files that hold their text packed: gzip, a zip of one file, the sheets of a workbook. One limit for every door."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+from bemt.base.errors import Fault, InputError
+
+MAX_BYTES = 1 << 29
+"""Largest text that is held at once, unpacked. [bytes]"""
+MAX_CELLS = 1 << 24
+"""Largest sheet: rows times columns between its outermost cells; all rows of a sheet with 16 columns."""
+GZIP, ZIP, OLE = b"\x1f\x8b", b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_BLOCK = 1 << 16
+_FEWEST_ROWS = 2
+_DEEPEST = 2  # a packed file in a zip
+_ODS = "application/vnd.oasis.opendocument.spreadsheet"
+_REFERENCE = re.compile(r"([A-Z]{1,3})(\d{1,7})")
+
+
+def packed(head: bytes) -> bool:
+    """Tell whether the first bytes of a file are those of a packed one.
+
+    >>> packed(b"PK" + bytes([3, 4])), packed(b"rpm,T (N)")
+    (True, False)
+    """
+    return head[:2] == GZIP or head[:4] in (ZIP, OLE)
+
+
+def gunzip(raw: bytes, name: str, most: int | None = None) -> tuple[bytes, str]:
+    """Unpack gzip piece by piece.
+
+    Parameters
+    ----------
+    raw : bytes
+        The file, of one member or more.
+    name : str
+        Path, for faults.
+    most : int or None
+        Bytes after which to stop; None: all, and more than :data:`MAX_BYTES` are refused.
+
+    Returns
+    -------
+    bytes
+        What could be unpacked.
+    str
+        What is damaged; empty for a whole file.
+
+    Raises
+    ------
+    InputError
+        If there is more than :data:`MAX_BYTES` in it.
+    """
+    out, limit, at, view = bytearray(), MAX_BYTES if most is None else most, 0, memoryview(raw)
+    try:
+        while at < len(raw):
+            stream = zlib.decompressobj(31)
+            while not stream.eof and len(out) <= limit:
+                block = view[at : at + _BLOCK]
+                some = stream.decompress(block, _BLOCK)
+                out += some
+                at += len(block) - len(stream.unconsumed_tail) - len(stream.unused_data)
+                if not block and not some:
+                    return bytes(out), "it ends early"
+            if len(out) > limit and most is None:
+                raise InputError(_too_large(name, f"more than {MAX_BYTES} bytes of gzip data, unpacked"))
+            if len(out) > limit or view[at : at + 2] != GZIP:  # zeros of a tape behind the last member
+                break
+    except zlib.error as error:
+        return bytes(out), str(error)
+    return bytes(out[:limit]), ""
+
+
+def unpacked(raw: bytes, name: str, most: int | None = None, depth: int = 0) -> bytes:
+    """Text of a packed file; other files as they are.
+
+    Parameters
+    ----------
+    raw : bytes
+        The file. Of a workbook the one sheet that holds a table of numbers counts, as comma-separated values.
+    name : str
+        Path, for faults.
+    most : int or None
+        Bytes that are enough, for a look at the head; None: all.
+    depth : int
+        How many times it was unpacked so far.
+
+    Raises
+    ------
+    InputError
+        For damaged files, for more than :data:`MAX_BYTES` or :data:`MAX_CELLS`, for a zip of several files, and for
+        workbooks in which no sheet, or more than one, holds a table.
+    """
+    if most is None and len(raw) > MAX_BYTES:
+        raise InputError(_too_large(name, f"{len(raw)} bytes"))
+    if depth > _DEEPEST or not packed(raw[:4]):
+        return raw
+    if raw[:2] == GZIP:
+        text, damage = gunzip(raw, name, None if packed(gunzip(raw, name, 4)[0]) else most)
+        if damage:
+            fault = Fault(name, "", f"damaged gzip data ({damage})", "a whole gzip file", "Copy it again")
+            raise InputError(fault)
+        return unpacked(text, name, most, depth + 1)
+    if raw[:4] == OLE:
+        return _workbook(raw, name, most)
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            return _of_zip(archive, raw, name, most, depth)
+    except zipfile.BadZipFile as error:
+        if not any(mark in raw[:16384] for mark in (b"xl/", b"[Content_Types].xml", _ODS.encode())):
+            return raw
+        raise InputError(_damaged(name, error)) from error
+    except (zlib.error, EOFError, RuntimeError, NotImplementedError, UnicodeDecodeError) as error:
+        # RuntimeError: encrypted; NotImplementedError: compressed in a way that zipfile does not know
+        raise InputError(Fault(name, "", f"a zip that cannot be read ({error})", "a plain zip file")) from error
+
+
+def _too_large(name: str, got: str) -> Fault:
+    return Fault(name, "", got, f"at most {MAX_BYTES} bytes, unpacked", "Export less, or part it")
+
+
+def _damaged(name: str, error: object) -> Fault:
+    return Fault(name, "", f"a damaged workbook ({error})", "a whole .xlsx, .xls or .ods file", "Save it as CSV")
+
+
+def _of_zip(archive: zipfile.ZipFile, raw: bytes, name: str, most: int | None, depth: int) -> bytes:
+    """Text of what a zip holds, by its directory, which stands at its end."""
+    files = {item.filename: item for item in archive.infolist() if not item.is_dir()}
+    if (size := sum(item.file_size for item in files.values())) > MAX_BYTES:
+        raise InputError(_too_large(name, f"{size} bytes, unpacked"))
+    if "xl/workbook.bin" in files:
+        raise InputError(Fault(name, "", "a binary workbook (.xlsb)", "a text file or .xlsx", "Save it as CSV"))
+    is_ods = "content.xml" in files and _ODS.encode() in archive.read("mimetype") if "mimetype" in files else False
+    if is_ods or "xl/workbook.xml" in files:
+        for item in files.values():  # sizes and checksums as the directory says, or an error
+            sheet = item.filename == "content.xml" if is_ods else item.filename.startswith("xl/worksheets/")
+            with archive.open(item) as stream:
+                blocks = iter(lambda stream=stream: stream.read(_BLOCK), b"")
+                _Extent(name, item.filename, is_ods).check(blocks) if sheet else sum(map(len, blocks))
+        return _workbook(raw, name, most)
+    shown = [f for f in files if not f.startswith("__MACOSX/") and not f.rpartition("/")[2].startswith(".")]
+    if len(shown) != 1:
+        got = f"a zip of {len(shown)} files ({', '.join(shown[:4])}{', ...' if len(shown) > 4 else ''})"
+        raise InputError(Fault(name, "", got, "a zip of one file of measurements", "Unpack it and name the file"))
+    return unpacked(archive.read(shown[0]), name, most, depth + 1)
+
+
+@dataclass
+class _Extent:
+    """Outermost cells of a sheet, before anything makes room for them."""
+
+    name: str
+    part: str
+    is_ods: bool
+    row: int = 0
+    column: int = 0
+    span: int = 1
+    at: str = ""
+    first: tuple[int, int] | None = None
+    last: tuple[int, int] = field(default=(0, 0))
+
+    def check(self, blocks: Iterator[bytes]) -> None:
+        """Refuse a sheet with more cells than are read."""
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self._ods if self.is_ods else self._xlsx
+        parser.StartDoctypeDeclHandler = self._doctype
+        try:
+            for block in blocks:
+                parser.Parse(block, False)
+            parser.Parse(b"", True)
+        except (expat.ExpatError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(_damaged(self.name, error)) from error
+
+    def _doctype(self, *_: object) -> None:
+        raise ValueError("XML with a document type")
+
+    def _xlsx(self, tag: str, given: dict[str, str]) -> None:
+        tag = tag.rpartition(":")[2]
+        if tag == "row":
+            self.row, self.column = int(given.get("r", self.row + 1)), 0
+        elif tag == "c":
+            self.column += 1
+            if found := _REFERENCE.fullmatch(given.get("r", "")):
+                self.row, self.column = int(found[2]), 0
+                for letter in found[1]:
+                    self.column = 26 * self.column + ord(letter) - 64
+            self._filled(self.row, self.column)
+
+    def _ods(self, tag: str, given: dict[str, str]) -> None:
+        if tag == "table:table":
+            self.row, self.span, self.first, self.last = 0, 1, None, (0, 0)
+        elif tag == "table:table-row":
+            self.row, self.column = self.row + self.span, 1
+            self.span = int(given.get("table:number-rows-repeated", 1))
+        elif tag in ("table:table-cell", "table:covered-table-cell"):
+            wide = int(given.get("table:number-columns-repeated", 1))
+            if "office:value-type" in given:
+                self._filled(self.row, self.column)
+                self._filled(self.row + self.span - 1, self.column + wide - 1)
+            self.column += wide
+
+    def _filled(self, row: int, column: int) -> None:
+        top, left = self.first or (row, column)
+        self.first = min(top, row), min(left, column)
+        self.last = max(self.last[0], row), max(self.last[1], column)
+        cells = (self.last[0] - self.first[0] + 1) * (self.last[1] - self.first[1] + 1)
+        if cells > MAX_CELLS:
+            got = f"{cells} cells up to row {self.last[0]}, column {self.last[1]}"
+            raise InputError(Fault(self.name, self.part, got, f"at most {MAX_CELLS}", "Delete cells far away"))
+
+
+def _workbook(raw: bytes, name: str, most: int | None) -> bytes:
+    """The one sheet that is a table, as comma-separated values; lines keep their number in the sheet."""
+    from python_calamine import CalamineError, CalamineWorkbook
+
+    try:
+        book = CalamineWorkbook.from_filelike(io.BytesIO(raw))
+        sheets = {title: _csv(book.get_sheet_by_name(title).iter_rows(), name, most) for title in book.sheet_names}
+    except (CalamineError, zipfile.BadZipFile, OSError) as error:
+        raise InputError(_damaged(name, error)) from error
+    tables = {title: text for title, (text, is_table) in sheets.items() if is_table}
+    if len(tables) != 1:
+        among = ", ".join(tables or sheets)
+        got = f"{len(tables)} sheets with a table of numbers ({among})" if tables else f"no table of numbers ({among})"
+        hint = "Keep one of them in the file, or save it as CSV"
+        raise InputError(Fault(name, "", got, "a workbook with one sheet of measurements", hint))
+    return next(iter(tables.values())).encode()[:most]
+
+
+def _csv(rows: Iterator[list[Any]], name: str, most: int | None) -> tuple[str, bool]:
+    """Rows as text, and whether two of them or more have two numbers: a table."""
+    out, numbers = io.StringIO(), 0
+    writer = csv.writer(out, lineterminator="\n")
+    for row in rows:
+        numbers += sum(isinstance(cell, float) for cell in row) > 1
+        writer.writerow(map(_cell, row))
+        if out.tell() > (MAX_BYTES if most is None else most):
+            if most is None:
+                raise InputError(_too_large(name, f"more than {MAX_BYTES} bytes of cells"))
+            if numbers >= _FEWEST_ROWS:
+                break
+    return out.getvalue(), numbers >= _FEWEST_ROWS
+
+
+def _cell(value: Any) -> str:
+    """One cell as text; a clock stays a clock."""
+    if isinstance(value, float):
+        return repr(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    if isinstance(value, datetime.timedelta):
+        return repr(value.total_seconds())
+    return str(value)

@@ -1,0 +1,53 @@
+"""Write docs/promises.md: ``.venv/bin/python docs/promises.py``. From a promise to the test that holds it."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs"))
+import figures  # noqa: E402
+
+HEAD = """# Promises and their tests
+
+*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise leads to the file that
+fails when it breaks.
+
+## Figures
+
+Every figure of the README and of [what to believe](believe.md), with the committed report that holds it.
+[`tests/test_figures.py`](../tests/test_figures.py) compares them, and fails where a figure has no report.
+
+| figure | report |
+|---|---|
+"""
+SLOW = re.compile(r"pytest\.mark\.slow|pytestmark = .*slow")
+
+
+def promise(file: Path) -> str:
+    """First sentence of a module's docstring, without the words that all of them have."""
+    text = " ".join((ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").split("\n\n")[0].split())
+    said = re.sub(r"^(?:The )?[Pp]romises?(?:: | that | behind | of [^:]*: | to [^:]*: )", "", text)
+    return (said[:1].upper() + said[1:]).replace("|", r"\|")
+
+
+def made() -> str:
+    """The page."""
+    rows = []
+    for figure in figures.FIGURES:
+        text = figure.sentence
+        for number in figure.stated():
+            text = text.replace("#", number, 1)
+        rows.append(f"| {text} | [{Path(figure.report).name}](../{figure.report}) |\n")
+    tests = []
+    for file in sorted((ROOT / "tests").glob("test_*.py")):
+        slow = ", part of it slow" if SLOW.search(file.read_text(encoding="utf-8")) else ""
+        tests.append(f"| {promise(file)} | [{file.name}](../tests/{file.name}){slow} |\n")
+    return HEAD + "".join(rows) + "\n## Behaviour\n\n| promise | test |\n|---|---|\n" + "".join(tests)
+
+
+if __name__ == "__main__":
+    (ROOT / "docs" / "promises.md").write_text(made(), encoding="utf-8")

@@ -1,0 +1,150 @@
+"""The measured propellers that the package ships, and how well one measurement tells another.
+
+``python reports/studies/measured_rotors.py uiuc uiuc_2 --out bemt/rotors/measured.npz`` writes the file; ``--pairs``
+instead predicts every propeller that was measured more than once, as two pieces or in two volumes, from its label
+alone and from its label with each other measurement.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from left_out import conditioned_law, watch
+
+from bemt.base.units import INCH
+from bemt.physics.air import Air
+from bemt.rotors import measured
+from bemt.rotors.as_measured import as_measured
+from bemt.rotors.case import case_of, fresh
+from bemt.rotors.case.propagate import propagate
+from bemt.rotors.measured import MeasuredRotor
+from bemt.rotors.population import Population, population
+from bemt.rotors.predict import predict
+from bemt.rotors.reference import apart
+from bemt.rotors.validate.built import Observed, counted
+from bemt.rotors.validate.points import read_folders
+from bemt.rotors.validate.propellers import effects_without, where
+
+STILL, FLIGHT = 3, 9
+"""Smooth readings at rest and in flight; all of one kind where the other was not measured [1]."""
+
+
+def smooth(seen: Observed, p: Population) -> tuple[np.ndarray, ...]:
+    """Latent numbers of the stations, their sds, and a dozen readings of the fit: rpm, J, y and sd, (2, P) each."""
+    m = seen.record
+    posterior, reference = conditioned_law(seen, p, "all")
+    rows = [np.flatnonzero(m.static), np.flatnonzero(~m.static)]
+    rows = [rows[0][np.argsort(m.Re[rows[0]])], rows[1][np.argsort(m.J[rows[1]])]]
+    many = [STILL, FLIGHT] if all(r.size for r in rows) else [STILL + FLIGHT] * 2
+    chosen = np.concatenate([
+        r[np.linspace(0, r.size - 1, n).round().astype(int)] for r, n in zip(rows, many, strict=True) if r.size
+    ])  # fmt: skip
+    good = np.logical_or.reduce(list(counted(seen.drawn).values())) & np.isfinite(seen.drawn.CT_bemt)
+    rpm, J = seen.drawn.rpm[good][chosen], seen.drawn.J[good][chosen]
+    at = m.part(chosen)
+    mean = seen.solve(posterior.mean, rpm, J)
+    found = predict(p, posterior, at, mean, reference)
+    sd = np.hypot(found.latent_sd, found.rest_sd)
+    return posterior.mean, posterior.sd, rpm, J, found.mean, sd
+
+
+def case_text(seen: Observed) -> str:
+    """The rotor that the propeller's label draws."""
+    one = seen.propeller
+    blades = f"x{one.blades}" if one.blades != 2 else ""
+    return fresh.label_text(f"{one.family} {one.diameter_in:.4g}x{one.pitch_in:.4g}{blades}", measured=False)
+
+
+def record(seen: Observed, p: Population) -> MeasuredRotor:
+    """One propeller as it is shipped."""
+    one = seen.propeller
+    mean, sd, rpm, J, y, single = smooth(seen, p)
+    case = case_of(case_text(seen), ends=False)
+    D = case.diameter_m
+    scale = (np.array([one.diameter_m / D]) ** np.array([[4.0], [5.0]]))  # labels are rounded
+    V = J * rpm / 60.0 * D
+    found = as_measured(case, rpm, V, Air.from_density(), *(y * scale), *(single * scale), others=apart(D))
+    at, kept = found.reference.at, case.file.blade
+    assert kept.section is not None and at.J.size == rpm.size
+    order = np.lexsort((rpm, np.round(J, 2)))
+    return MeasuredRotor(
+        one.name, one.family, Path(one.folder).name, case.diameter_m / INCH, round(float(one.pitch_in), 4), one.blades,
+        float(kept.max_chord_over_R), float(case.get("blade.section.camber")), kept.beta_offset_deg,
+        found.posterior.mean, found.posterior.cov, mean, sd, rpm[order], (y * scale)[:, order],
+        (single * scale)[:, order], at, found.reference.left, found.found.excess, found.reference.size,
+    )  # fmt: skip
+
+
+def predicted(text: str, seen: Observed) -> dict[str, np.ndarray]:
+    """Errors of CT and CP over the reading at the points that count, and whether u and the 95 % interval hold them."""
+    case, m = case_of(text, ends=False), seen.record
+    good = np.logical_or.reduce(list(counted(seen.drawn).values())) & np.isfinite(seen.drawn.CT_bemt)
+    rpm, J = seen.drawn.rpm[good], seen.drawn.J[good]
+    found = propagate(case, rpm, J * rpm / 60.0 * case.diameter_m, float(Air.from_density().rho))
+    off = np.array([found.points.CT, found.points.CP]) - m.y
+    u, u95 = (np.array([of(q) for q in ("CT", "CP")]) for of in (found.points.u.__getitem__, found.half_width95))
+    return {"error": off / m.y, "held68": np.abs(off) <= u, "held95": np.abs(off) <= u95}
+
+
+def pairs(seen: Sequence[Observed]) -> str:
+    """Each propeller that was measured more than once, with and without another measurement of it."""
+    groups: dict[tuple[object, ...], list[Observed]] = {}
+    for one in seen:
+        p = one.propeller
+        if p.pitch_in:
+            groups.setdefault((p.family, round(p.diameter_in, 2), round(p.pitch_in, 2), p.blades), []).append(one)
+    found: dict[str, list[tuple[Observed, dict[str, np.ndarray]]]] = {"with": [], "without": []}
+    for twins in (group for group in groups.values() if len(group) > 1):
+        for target in twins:
+            text = case_text(target)
+            found["without"].append((target, predicted(text, target)))
+            for other in (one for one in twins if one is not target):
+                known = record(other, population())
+                known = replace(known, name=f"{known.name}@{known.volume}")
+                measured.records()[known.name] = known
+                told = f'known_from = "measured"\n\n[blade.as_built]\nmeasured = "{known.name}"\n\n[blade.section]'
+                short = text[: text.index("\n[[assumptions]]")].replace("[blade.section]", told)
+                found["with"].append((target, predicted(short, target)))
+    lines = [f"{'':10}{'':8}{'':>4} {'pairs':>6} {'median':>7} {'p90':>6} {'68 %':>6} {'95 %':>6}"]
+    for how, rows in found.items():
+        for kind, still in (("static", True), ("forward", False)):
+            for i, q in enumerate(("CT", "CP")):
+                own = [{k: v[i][seen.record.static == still] for k, v in one.items()} for seen, one in rows]
+                own = [one for one in own if one["error"].size]
+                if own:
+                    error = np.abs([np.median(one["error"]) for one in own])
+                    held = [100.0 * np.mean([one[k].mean() for one in own]) for k in ("held68", "held95")]
+                    shown = [100.0 * np.median(error), 100.0 * np.quantile(error, 0.9), *held]
+                    lines.append(f"{how:10}{kind:8}{q:>4} {len(own):6d} " + " ".join(f"{v:6.1f}" for v in shown))
+    return "\n".join(lines)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Write the file."""
+    parser = argparse.ArgumentParser(description="Measured propellers as reference runs.")
+    parser.add_argument("folders", metavar="DIR", nargs="+", help="folders in the UIUC layout, or uiuc")
+    parser.add_argument("--out", metavar="FILE", help="write the records to this file")
+    parser.add_argument("--pairs", action="store_true", help="predict what was measured more than once")
+    args = parser.parse_args(words)
+    every = watch(read_folders([where(f) for f in args.folders]), effects_without([]))
+    if args.pairs:
+        print(pairs(every))
+    made = []
+    for seen in every if args.out else []:
+        if not seen.propeller.pitch_in or not math.isfinite(seen.propeller.pitch_in):
+            print(f"{seen.propeller.name}: no pitch, so no label", file=sys.stderr)
+            continue
+        made.append(record(seen, population()))
+    if made:
+        np.savez_compressed(args.out, **measured.packed(made))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,236 @@
+"""A heading means the same in every reader, and one condition on several grids is one point with the u of its grids."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bemt.base.errors import InputError
+from bemt.data.recordings.cfd_options import run_from, write_run
+from bemt.data.recordings.cfd_run import assemble, run_at
+from bemt.data.recordings.cfd_setup import grid_floor
+from bemt.data.recordings.cfd_study import are_grids, by_grid, together
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.load import as_dataset, document, import_file
+from bemt.judge.diagnose.load import load_all
+from bemt.physics.dataset import Dataset
+from bemt.rotors.case import load_case
+
+SPEEDS, LOADS = (0.0, 5.0, 10.0, 15.0), (7.6, 6.0, 4.0, 1.5)
+"""Airspeeds [m/s] and thrusts [N] of every table made here."""
+
+
+def workbench(heads: list[tuple[str, str]]) -> str:
+    told = ",".join(f"P{k} - {name} [{unit}]" if unit else f"P{k} - {name}" for k, (name, unit) in enumerate(heads, 1))
+    names = ",".join(f"P{k}" for k in range(1, len(heads) + 1))
+    return f"# The parameters defined in the project are:\n# ,{told}\nName,{names}\n" + rows("DP {k},")
+
+
+def cfd_post(heads: list[tuple[str, str]]) -> str:
+    return "[Name]\nruns\n\n[Data]\n" + ", ".join(f"{n} [ {u} ]" if u else n for n, u in heads) + "\n" + rows()
+
+
+def table(heads: list[tuple[str, str]]) -> str:
+    return ",".join(f"{n} [{u}]" if u else n for n, u in heads) + "\n" + rows()
+
+
+def rows(first: str = "") -> str:
+    pairs = enumerate(zip(SPEEDS, LOADS, strict=True))
+    return "".join(first.format(k=k) + f"6000,{V},{T},{0.02 * T:.4g}\n" for k, (V, T) in pairs)
+
+
+def points(path: Path) -> Dataset:
+    """Points of a file, by the door that every command uses."""
+    return run_at(str(path)) or named(as_dataset(import_file(path)))
+
+
+@pytest.mark.parametrize("program", [workbench, cfd_post, table])
+@pytest.mark.parametrize("unit", ["m s^-1", "m/s"])
+@pytest.mark.parametrize("name", ["V", "U", "v", "Velocity", "velocity", "Vinf", "U_inf", "V0", "Airspeed", "Wind",
+                                  "freestream velocity", "Geschwindigkeit"])  # fmt: skip
+def test_an_airspeed_is_an_airspeed_in_every_reader(
+    tmp_path: Path, program: Callable[..., str], name: str, unit: str
+) -> None:
+    (tmp_path / "a.csv").write_text(program([("rpm", "rev min^-1" if program is not table else "rpm"), (name, unit),
+                                             ("thrust", "N"), ("torque", "N m")]))  # fmt: skip
+    assert points(tmp_path / "a.csv")["airspeed_m_s"] == pytest.approx(SPEEDS)
+
+
+@pytest.mark.parametrize("program", [workbench, cfd_post, table])
+@pytest.mark.parametrize("thrust", ["T", "F", "Thrust", "thrust force"])
+@pytest.mark.parametrize("torque", ["Q", "M", "Torque"])
+def test_letters_with_their_units_are_the_loads(
+    tmp_path: Path, program: Callable[..., str], thrust: str, torque: str
+) -> None:
+    heads = [("n", "rev min^-1" if program is not table else "rpm"), ("J", ""), (thrust, "N"), (torque, "N m")]
+    (tmp_path / "a.csv").write_text(program(heads))
+    found = points(tmp_path / "a.csv")
+    assert found["thrust_N"] == pytest.approx(LOADS)
+    assert found["torque_Nm"] == pytest.approx(0.02 * np.array(LOADS))
+    assert found["J"] == pytest.approx(SPEEDS)
+    assert found["rpm"] == pytest.approx([6000] * 4)
+
+
+@pytest.mark.parametrize("name", ["tip speed", "v_tip", "exit velocity", "axial velocity", "wall shear velocity"])
+def test_another_speed_is_no_airspeed_and_is_named(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.csv").write_text(
+        workbench([("rpm", "rev min^-1"), (name, "m s^-1"), ("thrust", "N"), ("torque", "N m")])
+    )
+    found = run_at(str(tmp_path / "a.csv"))
+    assert found is not None and "airspeed_m_s" not in found
+    assert any(name in note and "no repeats" in note for note in found.notes)
+
+
+def test_an_airspeed_without_a_unit_is_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(workbench([("rpm", "rev min^-1"), ("V", ""), ("thrust", "N"), ("torque", "N m")]))
+    with pytest.raises(InputError, match="unit of the airspeed"):
+        run_at(str(tmp_path / "a.csv"))
+    run = run_from([str(tmp_path / "a.csv")], unit=["airspeed=m/s"])
+    assert assemble(run)["airspeed_m_s"] == pytest.approx(SPEEDS)
+
+
+def test_an_unknown_zone_is_one_line_with_those_there_are(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(
+        workbench([("rpm", "rev min^-1"), ("V", "m/s"), ("thrust (blade)", "N"), ("thrust (duct)", "N")])
+    )
+    with pytest.raises(InputError) as caught:
+        assemble(run_from([str(tmp_path / "a.csv")], zones=["fan"]))
+    (fault,) = caught.value.faults
+    assert "fan" in fault.got and "blade" in fault.hint and "duct" in fault.hint
+
+
+def test_disks_of_flow360_are_newtons_by_what_it_divides_by(tmp_path: Path) -> None:
+    """XV-15 of the program's own documentation: 91.5224 N and 2.324669 N m for one, in inches at 340.3 m/s."""
+    head = "physical_step, pseudo_step, " + ", ".join(
+        f"Disk0_{what}_{a}" for what in ("Force", "Moment") for a in "xyz"
+    )
+    body = "".join(f"0,{10 * k},0.001,0.002,1,0.001,0.002,1\n" for k in range(20))
+    (tmp_path / "bet_forces_v2.csv").write_text(f"{head}, Disk0_Blade0_R0_ThrustCoeff\n" + body.replace("\n", ",0.3\n"))
+    files = [str(tmp_path / "bet_forces_v2.csv")]
+    with pytest.raises(InputError, match="speed of sound"):
+        assemble(run_from(files, rpm=588.0))
+    run = assemble(run_from(files, rpm=588.0, reference=["density=1.225,sound=340.3,length=0.0254"]))
+    assert run["thrust_N"][0] == pytest.approx(91.5224, rel=1e-5)
+    assert run["torque_Nm"][0] == pytest.approx(2.324669, rel=1e-5)
+
+
+GRIDS = {0.5e6: 7.05, 1.7e6: 7.42, 5.8e6: 7.57}
+"""Cells and thrust [N]: order 2.22, 7.671 N, u 1.5 %."""
+
+
+def histories(folder: Path, grids: dict[float, float] = GRIDS) -> list[str]:
+    out = []
+    for cells, thrust in grids.items():
+        k = np.arange(1, 301)
+        T = thrust * (1.0 - np.exp(-k / 10.0))
+        body = "".join(f"{i} {a:.9g} {b:.9g}\n" for i, a, b in zip(k, T, 0.015 * T, strict=True))
+        path = folder / f"t_{cells:.0f}.out"
+        path.write_text('"t"\n"Iteration" "thrust etc.."\n("Iteration" "thrust" "torque")\n' + body)
+        out.append(str(path))
+    return out
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> list[str]:
+    """A run.toml for each grid."""
+    made = []
+    for file, cells in zip(histories(tmp_path), GRIDS, strict=True):
+        run = run_from([file], rpm=6000.0, unit=["thrust=N", "torque=N m"], setup=[f"cells={cells:g}"])
+        made.append(str(write_run(run, str(tmp_path / f"run_{cells:.0f}.toml"))))
+    return made
+
+
+def is_the_study(found: Dataset) -> None:
+    assert len(found) == 1
+    thrust = next(s for s in found.provenance["studies"] if s.channel == "thrust_N")
+    assert thrust.order == pytest.approx(2.22, abs=0.005)
+    assert thrust.extrapolated == pytest.approx(7.671, abs=0.001)
+    assert found["thrust_N"][0] == pytest.approx(7.57, rel=1e-4)
+    assert found.u["thrust_N"][0] / 7.57 == pytest.approx(0.0146, abs=0.0003)
+    assert not any("no grid study" in note for note in found.notes)
+
+
+def test_three_runs_are_one_study_by_every_way_to_say_so(tmp_path: Path, runs: list[str]) -> None:
+    options = {"rpm": 6000.0, "unit": ["thrust=N", "torque=N m"]}
+    by_list = run_from(histories(tmp_path), **options, setup=["cells=0.5e6,1.7e6,5.8e6"])
+    for k, run in enumerate((run_from(runs), by_list)):
+        is_the_study(assemble(run))
+        path = write_run(run, str(tmp_path / f"study_{k}.toml"))
+        is_the_study(import_file(path))
+        assert document([str(path)])["runs"][0]["studies"]
+    is_the_study(together([import_file(r) for r in runs]))
+    lines = [f"6000,{T},{0.015 * T},{n:.0f}" for n, T in GRIDS.items()]
+    (tmp_path / "t.csv").write_text("rpm,thrust [N],torque [Nm],cells\n" + "\n".join(lines) + "\n")
+    is_the_study(import_file(tmp_path / "t.csv"))
+    told = "# ,P1 - rpm [rev min^-1],P2 - T [N],P3 - Q [N m],P4 - number of cells\nName,P1,P2,P3,P4\n"
+    (tmp_path / "d.csv").write_text(told + "\n".join(f"DP {k},{line}" for k, line in enumerate(lines)) + "\n")
+    found = run_at(str(tmp_path / "d.csv"))
+    assert found is not None
+    is_the_study(found)
+
+
+def test_three_grids_are_no_repeats_where_a_diagnosis_reads_them(project: Path, runs: list[str]) -> None:
+    case = str(project / "cases" / "prop_8x5")
+    (record,) = load_all(runs, [case])[1]
+    assert len(record) == 1
+    assert record.gain["thrust_N"] == pytest.approx(0.0146, abs=0.0003)
+    assert len(load_all(runs[:1], [case])[1]) == 1
+    assert load_case(Path(case) / "case.toml").name == "prop_8x5"
+
+
+def test_a_condition_on_one_grid_owes_what_the_grid_costs_elsewhere() -> None:
+    d = Dataset("cfd", "a", {"rpm": [6e3] * 4, "airspeed_m_s": [0, 0, 0, 9.0], "thrust_N": [7.05, 7.42, 7.57, 4.0]})
+    found = by_grid(d, np.array([0.5e6, 1.7e6, 5.8e6, 5.8e6]))
+    assert found["thrust_N"] == pytest.approx([7.57, 4.0])
+    assert found.u["thrust_N"] / found["thrust_N"] == pytest.approx([0.0146, 0.0146], abs=3e-4)
+
+
+@pytest.mark.parametrize(
+    ("values", "word"),
+    [((7.05, 7.6, 7.4), "oscillatory"), ((7.0, 7.1, 7.4), "divergent"), ((5.0, 7.56, 7.57), "implausible")],
+)
+def test_grids_that_do_not_converge_are_worth_three_times_their_spread(values: tuple[float, ...], word: str) -> None:
+    d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": list(values)})
+    found = by_grid(d, np.array([1e6, 8e6, 64e6]))
+    assert any(word in note for note in found.notes)
+    spread = (max(values) - min(values)) / values[2]
+    assert found.u["thrust_N"][0] / found["thrust_N"][0] == pytest.approx(3.0 * spread / 1.15, rel=1e-6)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.7, 2.0])
+def test_the_order_and_the_limit_of_a_power_law_come_back(order: float) -> None:
+    cells = np.array([0.4e6, 1.5e6, 7e6])
+    d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": 7.0 * (1.0 - 30.0 * cells ** (-order / 3.0))})
+    (study,) = by_grid(d, cells).provenance["studies"]
+    assert study.order == pytest.approx(order, rel=1e-6)
+    assert study.extrapolated == pytest.approx(7.0, rel=1e-6)
+
+
+def test_one_grid_keeps_the_floor_and_runs_of_unlike_conditions_are_no_study(tmp_path: Path, runs: list[str]) -> None:
+    one, two, _ = (import_file(r) for r in runs)
+    assert one.u["thrust_N"][0] / one["thrust_N"][0] == pytest.approx(grid_floor("thrust_N", False), rel=1e-3)
+    fast = Dataset("cfd", "b", {**two.values, "rpm": two["rpm"] * 1.1}, provenance=dict(two.provenance))
+    assert are_grids([one, two]) and not are_grids([one, fast]) and not are_grids([one, one])
+    with pytest.raises(InputError, match="not stated"):
+        together([one, Dataset("cfd", "c", two.values)])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["[run]\nrpm = 6000\n", '[[grids]]\nfiles = ["a"]\n', '[run]\nfiles = ["a"]\n' + 2 * '[[grids]]\nfiles = ["a"]\n'],
+)
+def test_what_is_neither_a_run_nor_grids_is_refused(tmp_path: Path, wrong: str) -> None:
+    (tmp_path / "run.toml").write_text(wrong)
+    with pytest.raises(InputError, match="exports of one run|two or more"):
+        import_file(tmp_path / "run.toml")
+
+
+def test_numbers_that_no_grid_gives_are_no_study() -> None:
+    d = Dataset("cfd", "a", {"rpm": [6e3] * 2, "thrust_N": [0.0, 7.5], "torque_Nm": [0.1, math.nan]})
+    found = by_grid(d, np.array([1e6, 8e6]))
+    assert found.provenance["studies"] == ()
+    assert found.u["thrust_N"][0] == pytest.approx(7.5 * grid_floor("thrust_N", False))
