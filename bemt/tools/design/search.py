@@ -53,7 +53,7 @@ FLYING = (0.85, 1.0, 1.2)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
-SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, WINDING, ESC_DROP)}
+SHARES = {item.key.rpartition(".")[2]: item for item in (DRIVE[0], WINDING, DRIVE[2], ESC_DROP)}
 LOADING = {"air": (15.0, 1200.0), "water": (300.0, 60_000.0), "fan": (500.0, 12_000.0)}
 """Disk loading of the sizes that are tried, in air, in water, of ducted fans [N/m2]."""
 WATER_DIAMETERS = (2, 2.5, *DIAMETERS[:21])

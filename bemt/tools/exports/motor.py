@@ -17,7 +17,7 @@ import numpy as np
 
 from bemt.base import plugins
 from bemt.base.arrays import Array
-from bemt.rotors.case.unknowns import DRIVE
+from bemt.rotors.case.unknowns import DRIVE, WINDING
 from bemt.tools.exports.parts import inertia_estimate
 
 if TYPE_CHECKING:
@@ -87,8 +87,7 @@ def motor_of(job: Job) -> Motor:
         rotor = blades if c["rotor_inertia_kg_m2"] is None else c["rotor_inertia_kg_m2"]
         return Motor(c["kv_rpm_V"], c["volts"], c["ohm"], c["battery_ohm"], c["no_load_A"], c["exponent"],
                      c["limit_A"], rotor + c["motor_inertia_kg_m2"], True)  # fmt: skip
-    share = {item.key.rpartition(".")[2]: item.value for item in DRIVE}
-    drop, idle = share["winding_drop"], share["idle_share"]
+    drop, idle = WINDING.value, next(item.value for item in DRIVE if item.key.endswith("idle_share"))
     kv = float(t.rpm[-1]) / (STAND_IN_V * (1.0 - drop))
     amps = float(t.torque_Nm[-1, t.at_rest]) * math.pi * kv / 30.0 / (1.0 - idle)
     return Motor(kv, STAND_IN_V, drop * STAND_IN_V / amps, 0.0, idle * amps, 1.0, None,
