@@ -69,8 +69,8 @@ def recording(
     return Dataset("bench", "generated", values, u)
 
 
-def diagnose(series: Dataset, baseline: Case, nulls: int = 200) -> chain.Diagnosis:
-    return chain.diagnose([record.from_series(series, baseline)], [baseline], nulls=nulls)
+def diagnose(series: Dataset, baseline: Case) -> chain.Diagnosis:
+    return chain.diagnose([record.from_series(series, baseline)], [baseline])
 
 
 def left_out(name: str, base: Case) -> Case:

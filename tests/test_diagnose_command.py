@@ -320,7 +320,7 @@ def test_the_first_line_says_how_far_the_case_is_off(far: float) -> None:
     share = 1.3 if far == 1.0 else np.where(series["rpm"] > 17000.0, 1.3, 1.0)
     values = {**series.values, "thrust_N": series["thrust_N"] * share}
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
-    line = document.headline(replace(chain.diagnose([made], [case()], nulls=20, only=["hub_loss"])))
+    line = document.headline(replace(chain.diagnose([made], [case()], only=["hub_loss"])))
     told = re.search(r"thrust (up to )?\+(\d+\.\d) %", line)
     assert told is not None and (told[1] is None) == (far == 1.0) and float(told[2]) == pytest.approx(30.0, abs=3.0), (
         line
@@ -332,9 +332,9 @@ def test_a_reference_that_the_run_agrees_with_is_the_first_word() -> None:
     series = recording(case(), points("grid"))
     values = {**series.values, "torque_Nm": 1.3 * series["torque_Nm"]}
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
-    answer = chain.diagnose([made, replace(made, reference=True)], [case()], nulls=20)
+    answer = chain.diagnose([made, replace(made, reference=True)], [case()])
     first = document.headline(answer)
-    assert first.startswith("No cause: the recording differs from the reference") and "no more than runs do" in first
+    assert first.startswith("No cause above 1 %: the recording differs from the reference") and "no more than runs do" in first
     assert "thrust by" in first and "torque by" in first, "the figure stands beside it"
 
 
@@ -380,7 +380,7 @@ def test_without_an_explanation_the_first_sentence_is_what_the_recording_shows(c
     series = recording(case(), points("grid"))
     values = {**series.values, channel: series[channel] * np.where(series["rpm"] > 13000.0, 1.15, 1.0)}
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
-    answer = chain.diagnose([made], [case()], nulls=20)
+    answer = chain.diagnose([made], [case()])
     assert answer.decision.verdict in ("unknown", "insufficient")
     first, second = [line for line in document.explanation(answer) if not line.startswith("Model: ")][1:3]
     word = {"thrust_N": "Thrust", "torque_Nm": "Torque"}[channel]

@@ -30,11 +30,11 @@ def reference() -> Record:
 
 @pytest.mark.parametrize("factor", [0.86, 1.14, 1.3])
 def test_another_supply_is_named_beside_a_reference(reference: Record, factor: float) -> None:
-    said = chain.diagnose([run(2, factor), reference], [case()], nulls=100)
+    said = chain.diagnose([run(2, factor), reference], [case()])
     assert said.said.verdict in ("named", "class") and "supply_voltage" in said.said.effects
     assert said.systems["air"]["verdict"] == "none"
 
 
 def test_the_same_drive_is_no_cause(reference: Record) -> None:
-    said = chain.diagnose([run(3), reference], [case()], nulls=100)
+    said = chain.diagnose([run(3), reference], [case()])
     assert not said.said.effects and said.systems["drive"]["verdict"] == "none"

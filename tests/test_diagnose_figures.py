@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from bemt.base import canvas
 from bemt.judge.diagnose import chain, confusion, figures, figures_effects, fit, record
-from bemt.judge.diagnose.explanation import NONE, Explanation
+from bemt.judge.explanation import NONE, Explanation
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
@@ -37,7 +37,7 @@ def named(project: Path) -> chain.Diagnosis:
               "torque_Nm": points.torque_Nm + noise[1] * u["torque_Nm"]}  # fmt: skip
     without = case.replaced({"model.effects_off": [LEFT_OUT]})
     only = [LEFT_OUT, "hub_loss", "pitch_offset", "thrust_gain"]
-    return chain.diagnose([record.from_series(Dataset("bench", "own", values, u), without)], [without], only, nulls=120)
+    return chain.diagnose([record.from_series(Dataset("bench", "own", values, u), without)], [without], only)
 
 
 def seen_as(answer: chain.Diagnosis, verdict: str, effects: tuple[str, ...]) -> chain.Diagnosis:

@@ -85,7 +85,7 @@ def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
     assert problem.u_known and sum("repeats scatter" in note for note in problem.notes) == 2
     share = problem.u / problem.scale
     assert 0.001 < np.median(share) < 0.006
-    answer = chain.diagnose(records, [base], nulls=200)
+    answer = chain.diagnose(records, [base])
     assert answer.decision.effects == ("thrust_gain",)
     found = answer.parameters["thrust_gain"]["gain"]
     assert found["low"] <= 0.07 <= found["high"]
@@ -107,7 +107,7 @@ def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) ->
     exact = recording(guess, given, real, noise=0.0).values["thrust_N"]
     mine = refer & (problem.channel == 0)
     np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
-    answer = chain.diagnose(records, [guess], nulls=200)
+    answer = chain.diagnose(records, [guess])
     assert answer.decision.effects == ("ground_effect",), answer.decision
 
 
@@ -125,11 +125,11 @@ def test_a_motor_that_does_not_do_as_told_keeps_its_misfit_to_itself() -> None:
     series = recording(base, given | {"pwm_s": 1e-3 + given["rpm"] * wobble / 26e6}, noise=0.004)
     record = from_series(series, left_out("compressibility", base))
     assert "rpm" in record.measured
-    answer = chain.diagnose([record], [left_out("compressibility", base)], nulls=200)
+    answer = chain.diagnose([record], [left_out("compressibility", base)])
     assert (answer.decision.verdict, answer.decision.effects) == ("named", ("compressibility",))
     assert answer.systems["air"]["effects"] == ["compressibility"]
     assert answer.systems["drive"]["verdict"] in ("unknown", "insufficient")
-    loads = chain.diagnose([record], [left_out("compressibility", base)], nulls=200, channels=["torque_Nm"])
+    loads = chain.diagnose([record], [left_out("compressibility", base)], channels=["torque_Nm"])
     assert set(loads.scores) == {"torque_Nm"} and loads.systems["drive"]["verdict"] == "not recorded"
 
 

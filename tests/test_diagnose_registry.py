@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
-from bemt.judge.diagnose import assemble, document, evidence, gate, plan, record, rules, signatures, verdict
+from bemt.judge import loss
+from bemt.judge.diagnose import assemble, document, plan, posterior, record, signatures
 from bemt.judge.diagnose.signatures import effect_of
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
@@ -88,7 +89,6 @@ def test_correlated_noise_and_a_stand_within_its_calibration_name_nothing() -> N
         for i in range(1, n.size):
             e[:, i] = 0.8 * e[:, i - 1] + 0.6 * e[:, i]
         y = plain.f0 + plain.u * e[plain.channel, plain.point] + stand @ rng.standard_normal(stand.shape[1])
-        found = evidence.weigh(replace(plain, y=y), candidates)
-        said = rules.decide(verdict.VerdictQuery(found, gate.p_value(found, 200)))
+        said = loss.decide(posterior.weigh(replace(plain, y=y), candidates).probability)
         named += [said.effects] if said.effects else []
     assert len(named) <= SHARE * NULLS, named

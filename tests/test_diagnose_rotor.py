@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from diagnosing import CASES, case, points, recording
 
-from bemt.judge.diagnose import chain, wrong_rotor_check
+from bemt.judge.diagnose import chain, other_rotor
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.load import load
 from bemt.judge.diagnose.record import from_series
@@ -34,17 +34,17 @@ def slipped(what: str) -> Dataset:
 )
 def test_a_rotor_off_by_a_factor_is_a_question_with_the_likely_slip(what: str, words: str) -> None:
     problem = build([from_series(slipped(what), case())], [case()])
-    ranked = wrong_rotor_check.suspects(problem)
+    ranked = other_rotor.suspects(problem)
     assert any(words in s.words for s in ranked[:3]), ranked[:5]
     assert np.all(np.diff([s.distance for s in ranked]) >= 0.0)
-    answer = chain.diagnose([from_series(slipped(what), case())], [case()], nulls=200)
-    assert answer.problem.findings[0] == wrong_rotor_check.finding(problem)
+    answer = chain.diagnose([from_series(slipped(what), case())], [case()])
+    assert answer.problem.findings[0] == other_rotor.finding(problem)
     if what != "poles":  # a ratio of pole pairs is a cause of its own, and may be named
         assert (answer.decision.verdict, answer.decision.effects) == ("insufficient", ())
 
 
 def test_one_channel_in_another_unit_stays_a_finding_of_its_own() -> None:
-    answer = chain.diagnose([from_series(slipped("unit"), case())], [case()], nulls=200)
+    answer = chain.diagnose([from_series(slipped("unit"), case())], [case()])
     assert answer.decision.effects == ("unit_slip",)
     # a tenth of the load is low by nine tenths of the largest value, not by 900 %
     assert all(abs(share) <= 1.0 for share, _ in answer.off.values()) and abs(answer.where.size) <= 1.0
@@ -67,12 +67,12 @@ def test_density_moves_thrust_and_torque_by_the_same_share(thrust: float, torque
     plain, other = recording(base, given, noise=0.005), recording(base, given, noise=0.005, seed=1)
     moved = {"thrust_N": other.values["thrust_N"] * thrust, "torque_Nm": other.values["torque_Nm"] * torque}
     test = from_series(Dataset("bench", "other", {**other.values, **moved}, dict(other.u)), base)
-    answer = chain.diagnose([test, replace(from_series(plain, base), reference=True)], [base], nulls=200)
+    answer = chain.diagnose([test, replace(from_series(plain, base), reference=True)], [base])
     assert answer.decision.effects == said
 
 
 def test_a_rotor_that_is_the_case_is_not_asked_for() -> None:
-    assert wrong_rotor_check.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
+    assert other_rotor.finding(build([from_series(recording(case(), points("grid")), case())], [case()])) == ""
 
 
 def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
@@ -83,7 +83,7 @@ def test_repeats_that_differ_as_no_stand_does_name_nothing() -> None:
     values["thrust_N"] = values["thrust_N"] * rng.uniform(0.3, 1.0, values["rpm"].size)
     test = from_series(Dataset("bench", "map", values), base)
     reference = replace(from_series(plain, base), reference=True)
-    answer = chain.diagnose([test, reference], [base], nulls=200)
+    answer = chain.diagnose([test, reference], [base])
     assert answer.decision.effects == () and any("not recorded" in f for f in answer.problem.findings)
 
 
@@ -96,5 +96,5 @@ def test_an_exact_relation_names_the_fault_that_the_loads_leave_open(tmp_path: P
     text = "".join(",".join(f"{x:.7g}" for x in row) + "\n" for row in rows)
     (tmp_path / "log.csv").write_text("electrical_rpm,optical_rpm,thrust_N,torque_Nm\n" + text, encoding="utf-8")
     known = load_case(CASES / "prop_10x5")
-    said = chain.diagnose([load(str(tmp_path / "log.csv"), known)], [known], nulls=100).said
+    said = chain.diagnose([load(str(tmp_path / "log.csv"), known)], [known]).said
     assert (said.verdict, said.effects) == ("sensor", ("rpm_scale",)) and "must be 1" in said.why

@@ -16,12 +16,12 @@ from flight_files import broken_copies
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.judge.diagnose.rule import decide
 from bemt.rotors.case import load_case
 from bemt.rotors.propeller import rotor_of
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import axes_of, blade, features
 from bemt.tools.flight.change import change_in
+from bemt.tools.flight.decision import decide
 from bemt.tools.flight.identify import identify
 from bemt.tools.flight.inflow import inflow
 from bemt.tools.flight.judge import judge, weighed

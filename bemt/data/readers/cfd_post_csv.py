@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -119,8 +120,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         block, record = records[0]
         return replace(record, provenance={**record.provenance, "name": block}, notes=(*notes, *record.notes))
     channels: dict[str, Channel] = {}
+    often = Counter(block for block, _ in records)
     for k, (block, record) in enumerate(records):
-        label = block if [b for b, _ in records].count(block) == 1 else f"{block} {k + 1}"
+        label = block if often[block] == 1 else f"{block} {k + 1}"
         channels |= {f"{key}({label})": channel for key, channel in channels_of(record).items()}
         notes += [f"{label}: {text}" for text in record.notes]
     return dataset(KIND, "cfd", channels, notes, {**source.about, "clock": "none"})

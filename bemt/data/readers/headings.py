@@ -10,6 +10,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from bemt.base import units
 from bemt.data.readers._words import english, plain, quantities
@@ -276,6 +277,7 @@ def heading(text: str) -> Heading:
     return found
 
 
+@lru_cache(maxsize=4096)
 def channel_of(text: str, unit: str = "") -> str:
     """Usual name of the channel that a heading means, whatever wrote it: a bench, a CFD program.
 

@@ -10,6 +10,7 @@ import difflib
 import os
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -79,7 +80,7 @@ class Builder:
         """Begin with the table of a stand, whose headings are known and stand once each."""
         build = cls(split_table(load_text(path), header=True), format)
         names = build.table.headings
-        for name in sorted({h for h in names if h and names.count(h) > 1}):
+        for name in sorted(h for h, times in Counter(names).items() if h and times > 1):
             build.fault("1", f"a second column {name!r}", "each column once")
         return build
 

@@ -300,9 +300,8 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
         for c in found
         if re.fullmatch(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", c.stem, re.IGNORECASE) and not c.zone
     ]
-    labels = [
-        c.zone or (c.stem if len({(f.stem, f.zone) for f in found}) > 1 and c not in total[:1] else "") for c in found
-    ]
+    several = len({(f.stem, f.zone) for f in found}) > 1
+    labels = [c.zone or (c.stem if several and c is not next(iter(total), None) else "") for c in found]
     out: dict[str, LoadColumn] = {}
     run.used |= {c.name for c in found}
     twice = 0

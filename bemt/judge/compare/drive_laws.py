@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,12 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
 from bemt.base.gaussian.whitening import log_density, whitener
+from bemt.judge import explanation
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
+from bemt.judge.explanation import Explanation
+from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
 NONE, UNKNOWN = "none", "unknown"
@@ -29,13 +32,6 @@ _PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
 # makes it.
 _UNKNOWN_KINDS = ((0.1, 1.0, 0.1, 0.06), (0.35, 1.0, 0.1, 0.06), (1.0, 1.0, 0.1, 0.06))
 _SIZES = (0.02, 0.07, 0.25)
-SURE = 0.85
-"""Probability from which one cause in the drive is named."""
-NEAR = 20.0
-"""A cause this many times less likely than the leading one is in its class: a law is rougher than its evidence."""
-RIVAL, DOUBT = 0.1, 0.3
-"""A cause beside which the unknown keeps more than the first is not named; a class beside the second is not given."""
-
 FAMILY = {
     **dict.fromkeys(("diameter", "pitch_offset", "section", "propeller", "untwist", "tip_cut"), "blade"),
     **dict.fromkeys(("duct", "ground_effect", "coaxial_neighbour", "recirculation"), "surroundings"),
@@ -56,16 +52,19 @@ class Judgement:
     probability: Mapping[str, float]  # Of every explanation, the likeliest first
     # Effect to parameter to value, low and high (90 %) and unit, as far as it was worked out
     parameters: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
-    why: str = ""  # The rule that decided
-    chance: float = math.nan  # Of the verdict
+    why: str = ""  # Reason, in words
+    mass: float | None = None  # Probability of the verdict
     sets: tuple[tuple[str, ...], ...] = ()  # Of a class, one set of effects per cause; () or one: one cause
+    ranked: Mapping[Explanation, float] = field(default_factory=dict)  # As ``probability``, by explanation
 
-    @property
-    def mass(self) -> float | None:
-        """Probability of the verdict."""
-        if math.isfinite(self.chance):
-            return self.chance
-        return sum(self.probability.get(k, 0.0) for k in self.effects) or self.probability.get(self.verdict)
+    @classmethod
+    def of(
+        cls, said: Decision, P: Mapping[Explanation, float], parameters: Mapping[str, Any] | None = None
+    ) -> Judgement:  # fmt: skip
+        """What a decision says, with the posterior that it was made on."""
+        ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))
+        words = {str(k): p for k, p in ranked.items()}
+        return cls(said.verdict, said.effects, words, parameters or {}, said.why, said.probability, said.sets, ranked)
 
 
 @dataclass(frozen=True)
@@ -237,25 +236,9 @@ def _any_change(channels: Mapping[str, MatchedChannel], base: Mapping[str, Array
 
 
 def judge_drive(probability: Mapping[str, float]) -> Judgement:
-    """Say what the evidence allows: the order of the questions is the order of caution."""
-
-    def answer(verdict: str, effects: Sequence[str], why: str) -> Judgement:
-        return Judgement(verdict, tuple(effects), probability, {}, why)
-
-    if probability[NONE] >= 0.5:
-        return answer("none", (), f"no change beyond scatter and set-up (probability {probability[NONE]:.2f})")
-    listed = {k: p for k, p in probability.items() if k not in _PRIOR}
-    mass, unknown = sum(listed.values()), probability[UNKNOWN]
-    if unknown > 0.5:
-        return answer("unknown", (), f"no listed cause changes these channels like that (probability {unknown:.2f})")
-    if mass <= 0.5:
-        return answer("insufficient", (), "the change is too small to be distinguished from none")
-    best = max(listed.values())
-    credible = [k for k, p in sorted(listed.items(), key=lambda kv: -kv[1]) if p >= best / NEAR]
-    first = credible[0]
-    row = law(first)
-    if len(credible) == 1 and listed[first] >= SURE and unknown <= RIVAL and row is not None:
-        return answer("named", (first,), row.says)
-    if len(credible) > 1 and unknown <= DOUBT and probability[NONE] <= RIVAL:
-        return answer("class", credible, f"the data cannot tell these apart (probability {mass:.2f})")
-    return answer("insufficient", (), f"{first} fits best (probability {listed[first]:.2f}), but is not sure")
+    """Answer of least expected loss on motor, controller and battery."""
+    special = {NONE: explanation.NONE, UNKNOWN: explanation.UNKNOWN}
+    P = {special[k] if k in special else Explanation.of(k): p for k, p in probability.items()}
+    said = decide(P)
+    row = law(said.effects[0]) if said.verdict == "named" and len(said.effects) == 1 else None
+    return Judgement.of(replace(said, why=row.says) if row else said, P)

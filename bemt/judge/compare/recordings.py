@@ -195,18 +195,23 @@ def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> J
         next((math.log(r["ratio"]) for r in ratios.values() if r["kind"] == k), 0.0) for k in ("voltage", "speed")
     )
     follows = volts * speed > 0.0 and abs(speed) > _FOLLOWS * abs(volts)
-    if not volts:
+    if not volts or "battery_sag" not in said.probability:
         return said
-    if abs(volts) < _TOLD_VOLTAGE and said.effects == ("battery_sag",):
-        why = f"speeds go with the recorded voltages, which are {math.expm1(volts):+.1%} apart"
-        return replace(said, verdict="none", effects=(), why=why)
-    if said.verdict not in ("none", "insufficient") or abs(volts) < _TOLD_VOLTAGE or not follows:
+    P = dict(said.probability)
+    if abs(volts) < _TOLD_VOLTAGE:  # the voltage is known, and is no change
+        P["none"] += P.pop("battery_sag")
+        return judge_drive(P)
+    if not follows:
         return said
+    # known from the file: what is left is whether something else changed as well
+    P["battery_sag"] += P["none"]
+    P["none"] = 0.0
+    found = judge_drive(P)
+    if found.effects != ("battery_sag",):
+        return found
     why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
-    probability = {"battery_sag": 1.0 - said.probability.get("unknown", 0.0)}
-    left = {k: p for k, p in said.probability.items() if k not in ("none", "battery_sag")}
     size = {"value": math.exp(volts), "low": math.exp(volts), "high": math.exp(volts), "unit": "1"}
-    return Judgement("named", ("battery_sag",), probability | left, {"battery_sag": {"ratio": size}}, why)
+    return replace(found, parameters={"battery_sag": {"ratio": size}}, why=why)
 
 
 def _told(run: StandRun) -> str:

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose import prior, verdict
-from bemt.judge.diagnose.explanation import UNKNOWN, Explanation
+from bemt.judge.diagnose import prior
 from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.explanation import UNKNOWN, Explanation
+from bemt.judge.loss import Decision
 from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.compare.recordings import RunChange
-    from bemt.judge.diagnose import confusion, evidence
+    from bemt.judge.diagnose import confusion, posterior
     from bemt.judge.diagnose import fit as fitting
     from bemt.judge.diagnose import locate as location
     from bemt.judge.diagnose import suggest as suggestion
@@ -59,16 +60,16 @@ class Posterior:
     log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
     inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
     parameters: dict[str, dict[str, dict[str, Any]]]  # Of the leading explanation: value, low, high (90 %), unit
-    p_value: float  # Of the gate [1]
+    p_value: float  # Of as large a misfit without a cause [1]
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What is wrong, in named groups; text, JSON, figures and report are views of it."""
 
-    found: evidence.Evidence  # Outcome of the weighing, with the problem in it
-    decision: verdict.Decision  # Verdict of the evidence in the case
-    said: verdict.Decision  # What is said in the end: the same, unless the ratios to the reference answer
+    found: posterior.Evidence  # Outcome of the weighing, with the problem in it
+    decision: Decision  # Verdict of the evidence in the case
+    said: Decision  # What is said in the end: with what the drive says
     best: fitting.Fit  # Leading explanation at its best setting
     # Effect to parameter to value and 90 % interval, of the leading explanation
     parameters: dict[str, dict[str, dict[str, Any]]]
@@ -116,12 +117,7 @@ class Diagnosis:
     def posterior(self) -> Posterior:
         """What the readings say of them."""
         odds = {e: self.found.log_bayes(e) for e in (*map(Explanation.of, self.found.spans), UNKNOWN)}
-        return Posterior(self.found.probability, odds, verdict.inclusion(self.found), self.parameters, self.p_value)
-
-    @property
-    def by_ratios(self) -> bool:
-        """Whether the ratios to the reference answer."""
-        return self.said.by == "ratios"
+        return Posterior(self.found.probability, odds, self.found.inclusion, self.parameters, self.p_value)
 
     @property
     def systems(self) -> dict[str, dict[str, Any]]:

@@ -14,9 +14,9 @@ from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.fit import fit, form_covariance
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.evidence import Evidence
-    from bemt.judge.diagnose.explanation import Explanation
+    from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.explanation import Explanation
 
 REFERENCE = -1
 """Block of points that are always given: readings without the cause."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
 from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
-from bemt.judge.diagnose import evidence, gate, rules, signatures, verdict
+from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
 from bemt.judge.diagnose.record import Record, thinned
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem.model import acts_on_rotor
@@ -67,22 +70,50 @@ def changed(a: StandRun, b: StandRun, diameter_m: float = math.nan) -> RunChange
     return recordings.changed(a, b, diameter_m, judged)
 
 
-def judged(pair: RunChange) -> Judgement:
-    """What changed the loads from A to B."""
-    with evidence.one_thread():
-        query = weighed(pair)
-        if query is None:
+def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()) -> Judgement:
+    """What changed the loads from A to B; ``only`` these effects, without what is ``gone``."""
+    with posterior.one_thread():
+        found = weighed(pair, only, gone)
+        if found is None:
             return recordings.NO_VERDICT
-        said = rules.decide(query)
-    P = sorted(query.P.items(), key=lambda kv: -kv[1])
-    solved = bool(said.effects) and bool(said.leading) and all(i in query.found.spans for i in said.leading)
-    parameters = query.refined(said.leading)[1] if solved else {}
-    return Judgement(
-        said.verdict, said.effects, {str(k): p for k, p in P}, parameters, said.why, said.probability, said.sets
-    )  # fmt: skip
+        P = _factored(found, pair)
+        said = loss.decide(P)
+        leading = said.leading
+        solved = said.effects and leading and all(i in found.spans for i in leading)
+        parameters = fitting.refined(found, fitting.fit(found, leading))[1] if solved else {}
+    if said.verdict == "none" and (why := pair.by_density):
+        said = replace(said, verdict="named", effects=("air_density",), why=why, sets=(("air_density",),))
+    elif pair.turned and said.effects == ("unit_slip",):
+        said = replace(said, why=recordings.REVERSED)
+    elif said.verdict == "insufficient" and (why := _not_comparable(pair)):
+        said = replace(said, why=why)
+    return Judgement.of(said, P, parameters)
 
 
-def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | None:
+def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, float]:
+    """Posterior with what makes two recordings no pair: no common range, another stand, a wind that nobody states.
+
+    A ratio of pole pairs moves the speeds apart itself, a unit the loads.
+    """
+    propeller = Explanation.of("propeller")
+    P = knowledge.another_rotor(found.probability, propeller if propeller in found.probability else UNKNOWN)
+    if pair.by_proxy:  # the losses of a motor are something smooth that is no cause
+        P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
+    if not (pair.wind or pair.apart or pair.far_off):
+        return P
+    slips = set() if pair.wind else {"rpm_scale", "unit_slip"}
+    kept = {k: p for k, p in P.items() if k.ids & slips or (pair.wind and k == NONE)}
+    return {**kept, DOUBT: 1.0 - sum(kept.values())}
+
+
+def _not_comparable(pair: RunChange) -> str:
+    """Why two recordings are no pair."""
+    return pair.wind or (recordings.NOTHING_SHARED if pair.apart else recordings.OTHER_STAND if pair.far_off else "")
+
+
+def weighed(
+    pair: RunChange, only: Collection[str] | None = None, gone: Collection[str] = ()
+) -> posterior.Evidence | None:  # fmt: skip
     """Explanations of what changed from A to B, weighed; None where nothing can be."""
     both = records_of(pair.a, pair.b, pair.diameter_m, pair.rotor.likelier)
     if both is None:
@@ -94,13 +125,10 @@ def weighed(pair: RunChange, nulls: int = gate.NULLS) -> verdict.VerdictQuery | 
         return law_part(test, rotor), law_part(known, rotor)
 
     problem = replace(assemble(parts(LAWS)), variants=tuple(map(parts, VARIANTS)))
-    candidates, _ = signatures.candidates(problem, law_effects())
+    names = [i for i in law_effects() if (only is None or i in only) and i not in gone]
+    candidates, _ = signatures.candidates(problem, names)
     candidates = tuple(c for c in (_as_counted(c, pair) for c in candidates) if c is not None)
-    found = evidence.weigh(problem, candidates)
-    p = gate.p_value(found, nulls)
-    for state in found.states:
-        state.rivals.clear()
-    return verdict.VerdictQuery(found, p, pair=pair)
+    return posterior.weigh(problem, knowledge.possible(problem, candidates))
 
 
 def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:

@@ -10,36 +10,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.judge import loss
 from bemt.judge.diagnose import (
     blocks,
     by_laws,
     confusion,
-    evidence,
-    gate,
     interval_scales,
-    ratio_check,
-    rules,
+    knowledge,
+    other_rotor,
+    posterior,
     signatures,
-    verdict,
-    wrong_rotor_check,
 )
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import locate as location
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.assemble import build
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.diagnose.shared_physics import ask_reference
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
+    from bemt.judge.compare.drive_laws import Judgement
     from bemt.judge.compare.recordings import RunChange
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
-__all__ = ["Diagnosis", "diagnose"]
+__all__ = ["MOTOR", "Diagnosis", "diagnose"]
 
+MOTOR = "motor"
+"""Another motor, controller or setting: what nothing in the catalogue describes, and all that is left of an unknown
+change of the speed at a pulse width."""
 # Explanations that the next run is to tell apart.
 _MOST_RIVALS = 5
 
@@ -49,7 +51,6 @@ def diagnose(
     cases: Sequence[Case],
     only: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
-    nulls: int = gate.NULLS,
     baseline: str = "bemt",
     given: suggestion.Given | None = None,
     channels: Sequence[str] | None = None,
@@ -58,41 +59,42 @@ def diagnose(
     """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
+    given = given or suggestion.Given()
     each = list(cases) * len(records) if len(cases) == 1 else list(cases)
     told = [(r.only(channels) if channels else r, c) for r, c in zip(records, each, strict=True)]
     loads = [(r.only(CHANNELS[:2]), c) for r, c in told if set(r.measured) - {speed}]
     turns = [(r.only((speed,)), c) for r, c in told if speed in r.measured]
+    files = (*given.references[:1], *given.recordings[:1])
 
-    files = None if given is None else (*given.references[:1], *given.recordings[:1])
-    free = only is None and channels is None and baseline == "bemt"
+    def judged(pair: RunChange) -> Judgement:
+        return by_laws.judged(pair, only, given.ruled_out)
+
+    def compared(absent: Collection[str]) -> RunChange | None:
+        if channels is not None or baseline != "bemt":
+            return None
+        return change or knowledge.change_of(records, each[0].diameter_m, absent, judged, files)
 
     def chain(
-        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None, motor: Diagnosis | None = None,
-        compared: bool = False,
+        some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None,
+        ratios: Callable[[Collection[str]], RunChange | None] = lambda _: None, motor: Diagnosis | None = None,
     ) -> Diagnosis:  # fmt: skip
-        def ratios(absent: Collection[str]) -> RunChange | None:
-            if not (compared and free):
-                return None
-            return change or ratio_check.change_of(records, each[0].diameter_m, absent, by_laws.judged, files)
-
-        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, nulls, baseline,
-                         given or suggestion.Given(), motor, ratios)  # fmt: skip
+        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, baseline, given, ratios, motor)
 
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)
 
-    with evidence.one_thread():
+    with posterior.one_thread():
         if not turns:
-            return chain(told, only, compared=True)
+            return chain(told, only, compared)
         ids = [i for i in effects.catalogue() if only is None or i in only]
         # what drives the rotor cannot be seen in the loads at the measured speed, nor loads in the speed of a motor
         drives = [i for i in ids if effects.catalogue()[i].kind == "drive"]
         motor = chain(turns, drives) if drives and tested(turns) else None
         if not tested(loads):
             return motor or chain(told, only)
-        rotor = chain(loads, [i for i in ids if i not in drives], motor, compared=True)
+        rotor = chain(loads, [i for i in ids if i not in drives], compared, motor)
         if motor is not None and rotor.said.by == "drive":
-            return replace(motor, drive=motor, loads=rotor, absent=rotor.absent)
+            return replace(motor, said=rotor.said, drive=motor, loads=rotor, absent=rotor.absent)
         return rotor
 
 
@@ -101,54 +103,76 @@ def _diagnose(
     cases: Sequence[Case],
     only: Sequence[str] | None,
     say: Callable[[str], None],
-    nulls: int,
     baseline: str,
     given: suggestion.Given,
+    ratios: Callable[[Collection[str]], RunChange | None],
     motor: Diagnosis | None,
-    change: Callable[[Collection[str]], RunChange | None],
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
-    if question := wrong_rotor_check.finding(problem):
+    if question := other_rotor.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
-    problem = replace(problem, shared=problem.missing)  # until the reference is asked
+    # until the reference is asked
+    problem = replace(problem, shared=problem.missing, told=frozenset(given.changed))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
-    candidates = tuple(c for c in candidates if c.id not in given.ruled_out)
+    candidates = tuple(c for c in knowledge.possible(problem, candidates) if c.id not in given.ruled_out)
     absent |= dict.fromkeys(given.ruled_out, "ruled out by a check")
     problem, candidates = ask_reference(problem, candidates)
     say("weighing explanations")
-    found = evidence.weigh(problem, candidates)
-    say("bootstrapped nulls")
-    p = gate.p_value(found, nulls)
-    for state in found.states:  # factors that only nulls ask for are the largest arrays there are
-        state.rivals.clear()
-    query = verdict.VerdictQuery(found, p, None if motor is None else motor.decision, lambda: change(absent.keys()))
-    said, decision = rules.decide(query), query.of_loads
-    best, parameters = query.refined(decision.leading)
+    found = posterior.weigh(problem, candidates)
+    change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
+    found = replace(found, probability=knowledge.combined(found, change))
+    P = found.probability
+    if not problem.free.all() and np.all(problem.channel == CHANNELS.index("rpm")):
+        # beside a reference only supply, heat, motor and controller change the speed at a pulse width
+        P = {Explanation.of(MOTOR) if k == UNKNOWN else k: p for k, p in P.items()}
+    decision = knowledge.reason(problem, loss.decide(P))
+    said = decision if motor is None else _with_drive(decision, motor.decision)
+    shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
+    best, parameters = fitting.refined(found, fitting.fit(found, shown))
     parameters = interval_scales.widened(parameters)
     say("held-out blocks")
-    words, held, gp_only = blocks.held_out(found, decision.leading if decision.verdict != "unknown" else NONE)
+    words, held, gp_only = blocks.held_out(found, shown if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
     after = problem.centre + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
-    listed = max((k for k in found.probability if k), key=lambda k: found.probability[k], default=None)
-    where = location.locate(found, best if best.ids or listed is None else fitting.fit(found, listed))
+    where = location.locate(found, best if best.ids or not found.spans else fitting.fit(found, _solved(found)))
     say("next measurement")
     step = _next(found, decision, best, given)
-    if said.by == "ratios" and query.change is not None:
-        files = (*given.references[:1], *given.recordings[:1])
-        step = ratio_check.next_of(query.change, files) or step
     if said.by == "both" and motor is not None:
         decision, parameters = said, parameters | motor.parameters
     return Diagnosis(
-        found, decision, said, best, parameters, p, where, _scores(found, after, held, gp_only), words, after, held,
-        step, confusion.confusion(found), absent, motor, None, query.change,
+        found, decision, said, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
+        after, held, step, confusion.confusion(found), absent, motor, None, change,
     )  # fmt: skip
 
 
-def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:
+def _solved(found: posterior.Evidence) -> Explanation:
+    """Likeliest explanation of which the solver has signatures; that of nothing where it has none."""
+    listed = (k for k in found.probability if k.ids and all(i in found.spans for i in k))
+    return max(listed, key=lambda k: found.probability[k], default=NONE)
+
+
+def _with_drive(loads: loss.Decision, drive: loss.Decision) -> loss.Decision:
+    """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width.
+
+    What changes the load with time loads the motor, too.
+    """
+    moves = any("time_s" in effects.catalogue()[i].along for i in loads.leading if i in effects.catalogue()
+                and effects.catalogue()[i].kind == "air")  # fmt: skip
+    if drive.verdict not in loss.CLAIMS or (moves and loads.verdict != "none"):
+        return loads
+    if loads.verdict not in loss.CLAIMS:
+        return replace(drive, by="drive")
+    exact = {loads.verdict, drive.verdict} <= {"named", "sensor"}
+    sets = (*(loads.sets or (loads.effects,)), *(drive.sets or (drive.effects,)))
+    return replace(loads, verdict="named" if exact else "class", effects=(*loads.effects, *drive.effects), sets=sets,
+                   probability=min(loads.probability, drive.probability), by="both", beside=False)  # fmt: skip
+
+
+def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:
     problem, scale = found.problem, found.states[0].hyper.scale
     out = {}
     for c, name in enumerate(CHANNELS):
@@ -170,7 +194,7 @@ def _scores(found: evidence.Evidence, after: Array, held: Array, gp_only: Array)
 
 
 def _next(
-    found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit, given: suggestion.Given
+    found: posterior.Evidence, decision: loss.Decision, best: fitting.Fit, given: suggestion.Given
 ) -> suggestion.Suggestion:
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
@@ -198,9 +222,9 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
     return ()
 
 
-def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fitting.Fit) -> suggestion.Suggestion:
+def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.Fit) -> suggestion.Suggestion:
     """Run against the strongest rival of the leading explanation, "nothing" included where no name is given."""
-    single = {i: found.probability[Explanation.of(i)] for i in found.spans}
+    single = {i: found.probability.get(Explanation.of(i), 0.0) for i in found.spans}
     singles = sorted(single, key=lambda i: -single[i])
 
     def rivals_of(ids: Sequence[str]) -> list[suggestion.Rival]:
@@ -211,31 +235,21 @@ def _settling(found: evidence.Evidence, decision: verdict.Decision, best: fittin
     if decision.verdict == "none":
         faint = rivals_of(["", *singles][:_MOST_RIVALS])
         return suggestion.nothing_called_for(found, faint, found.probability[UNKNOWN])
-    if mend := wrong_rotor_check.to_mend(found.problem, decision):
+    if decision.verdict == "insufficient" and (mend := other_rotor.to_mend(found.problem)):
         return suggestion.mended(found, mend)
-    if decision.verdict in ("insufficient", "unknown") and wrong_rotor_check.another_label(found.problem):
-        return suggestion.Suggestion(suggestion.ROTOR, (), (), 0.0, 0.0, "rotor")
     if not singles:
         return suggestion.Suggestion(suggestion.REFERENCE, (), (), 0.0, 0.0, "reference")
     if decision.verdict == "insufficient" and (note := suggestion.weather(found)):
         return note
-    sure = decision.effects[:1] if decision.rule == verdict.BESIDE_IT else decision.effects
-    claimed = decision.verdict in ("named", "sensor") or decision.rule == verdict.BESIDE_IT
-    if claimed and (
-        mended := suggestion.correction(
-            sure, dict(zip(best.ids, best.settings, strict=True)), found.problem.parts[0].record
-        )
-    ):
-        return mended
+    sure = decision.effects[:1] if decision.beside else decision.effects
+    if decision.verdict in ("named", "sensor") or decision.beside:
+        settings = dict(zip(best.ids, best.settings, strict=True))
+        if mended := suggestion.correction(sure, settings, found.problem.parts[0].record):
+            return mended
     lead = best.ids[0] if best.ids else singles[0]
-    listed = (*decision.effects, *(j for g in decision.classes for j in g), *singles)
-    rivals = [i for i in dict.fromkeys(listed) if i != lead and i in found.spans]
-    none = found.probability[NONE]
-    likelier = bool(rivals) and single[rivals[0]] > none
-    if not rivals or (decision.verdict == "insufficient" and not likelier):
-        rivals.insert(0, "")
-    else:
-        rivals.append("")
+    rivals = [i for i in dict.fromkeys((*decision.effects, *singles)) if i != lead and i in found.spans]
+    likelier = bool(rivals) and single[rivals[0]] > found.probability[NONE]
+    rivals.insert(0 if not rivals or (decision.verdict == "insufficient" and not likelier) else len(rivals), "")
     order = [lead, rivals[0], *sorted(rivals[1:], key=lambda i: -weight[i])][:_MOST_RIVALS]
     open_ = decision.verdict in ("class", "unknown", "insufficient")
     return suggestion.suggest(found, rivals_of(order), found.probability[UNKNOWN], reference=open_)

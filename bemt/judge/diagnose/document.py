@@ -10,18 +10,16 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.judge.compare.change_document import document as change_document
 from bemt.judge.compare.contrast_text import families
-from bemt.judge.compare.contrast_text import headline as change_headline
 from bemt.judge.compare.drive_laws import law
 from bemt.judge.diagnose import fit as fitting
-from bemt.judge.diagnose import wrong_rotor_check
+from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.confusion import nearest
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.diagnose.locate import bare
+from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.diagnose.verdict import BESIDE_IT, inclusion
+from bemt.judge.explanation import UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -51,6 +49,8 @@ _A_GROUP = 5
 _GUESS = 0.3
 # Level that is said even where no cause shows.
 _WORTH_SAYING = 0.05
+# Lines of an answer, and sentences that are only in its details.
+_LINES, _DETAILS = 12, ("Model: ", "Signature: ")
 # Ratios between these are said in percent.
 _PERCENT = (0.5, 2.0)
 
@@ -60,14 +60,14 @@ def document(d: Diagnosis) -> dict[str, Any]:
     found = d.found
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
-        parameters = fitting.intervals(found, name) if name and p > 1e-3 else {}
+        solved = name.ids and all(i in found.spans for i in name)
+        parameters = fitting.intervals(found, name) if solved and p > 1e-3 else {}
         if name == d.decision.leading:
             parameters = d.parameters
         flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
     said = d.said
-    own = {"verdict": d.decision.verdict, "effects": list(d.decision.effects), "rule": d.decision.why}
     return {
         "schema": SCHEMA,
         "version": __version__,
@@ -75,15 +75,15 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "effects": list(said.effects),
         "probability": said.probability,
         "systems": d.systems,
-        "ranking": list(_by_ratios(d)["ranking"]) if d.by_ratios else ranking,
-        "by_the_case": own | {"ranking": ranking} if d.by_ratios else None,
-        "inclusion": {k: v for k, v in inclusion(found).items() if v > 1e-3},
+        "ranking": ranking,
+        "expected_loss": dict(said.loss),
+        "inclusion": {k: v for k, v in found.inclusion.items() if v > 1e-3},
         "location": d.where.document(),
         "fit": {c: {k: or_null(v) for k, v in s.items()} for c, s in d.scores.items()},
         "blocks": d.blocks,
         "sets": [list(s) for s in said.sets],
         "in_reference": sorted(d.in_reference),
-        "classes": [list(c) for c in d.decision.classes] or d.alike.classes(),
+        "classes": d.alike.classes(),
         "next_measurement": d.next.document(),
         "p_value": d.p_value,
         "log_bayes": {str(e): found.log_bayes(e) for e in (*map(Explanation.of, found.spans), UNKNOWN)},
@@ -94,9 +94,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "baseline": [effects.to_text(e) for e in d.problem.baseline],
         "not_tried": dict(d.absent),
         "rule": said.why,
-        "rule_name": said.rule,
         "headline": headline(d),
-        "left_over": or_null(d.decision.left_over),
         "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
         "validity": list(d.problem.validity),
@@ -175,7 +173,9 @@ def _sized(p: Parameter, value: float, form: str = ".3g") -> str:
 
 def _with_size(d: Diagnosis, name: str) -> str:
     """Title of a named effect and, where one number is its size, that number."""
-    cls, found = effects.catalogue()[name], d.parameters.get(name, {})
+    cls, found = effects.catalogue().get(name), d.parameters.get(name, {})
+    if cls is None:
+        return _title(name)
     if cls.fault == "unit" and "unit" in found:
         return f"{cls.title} ({found['channel']['value']}: {found['unit']['value']})"
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
@@ -213,17 +213,12 @@ def explanation(d: Diagnosis) -> list[str]:
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
     )
-    if not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
+    alone = d.problem.free.all()
+    if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
-                     f"first. Nearest: {wrong_rotor_check.nearest_rotors(d.problem)}.")  # fmt: skip
+                     f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
-    if d.by_ratios:
-        if d.said.verdict == "class":
-            lines.append(f"One of these ({d.said.probability:.2f}): {_members(d.said.effects)}.")
-        lines += [f"The ratios to the reference: {d.said.why}. The diagnosis with the case: {decision.verdict}: "
-                  f"{decision.why}."]  # fmt: skip
-        return [*lines, *_next(d), *_not_tried(d)]
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -236,14 +231,11 @@ def explanation(d: Diagnosis) -> list[str]:
             f"Named: {', '.join(decision.effects)} (probability {decision.probability:.2f})"
             + (f": {told}." if told else ".")
         )
-        signs = [catalogue[i].sign for i in decision.effects if catalogue[i].sign]
+        signs = [catalogue[i].sign for i in decision.effects if i in catalogue and catalogue[i].sign]
         if signs:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
-        lead = "One of these, which this plan cannot distinguish" if decision.classes else decision.why.capitalize()
-        if len(decision.sets) > 1 and decision.rule != BESIDE_IT:
-            sets = " and ".join("{" + " or ".join(s) + "}" for s in decision.sets)
-            lines.append(f"One of each set ({decision.probability:.2f}): {sets}.")
+        lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
         lines.append(f"{lead} ({decision.probability:.2f}): {_members(decision.effects)}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
@@ -251,9 +243,6 @@ def explanation(d: Diagnosis) -> list[str]:
     else:
         lines.append(f"No name is given (p = {d.p_value:.2g}): {decision.why}.")
     lines.append(_gain(d))
-    others = [i for group in decision.classes for i in group if i not in decision.effects]
-    if others:
-        lines.append(f"Cannot be distinguished from: {', '.join(others)}.")
     if d.loads is not None and d.loads.decision.verdict != "none":
         lines.append(f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}")
     lines += [*_next(d), *_not_tried(d)]
@@ -287,12 +276,6 @@ def _not_tried(d: Diagnosis) -> list[str]:
     return [f"Not tried: {'; '.join(words)}."] if words else []
 
 
-def _by_ratios(d: Diagnosis) -> dict[str, Any]:
-    """Document of the change from the reference."""
-    assert d.change is not None
-    return change_document(d.change)
-
-
 def _title(name: str) -> str:
     """Title of a cause; of one that only the comparison knows, that of its scaling law."""
     if name in effects.catalogue():
@@ -303,39 +286,33 @@ def _title(name: str) -> str:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    if d.by_ratios:
-        words = change_headline(_by_ratios(d))
-        listed = d.change.loads.effects if d.change is not None else ()
-        # a cut tip is another diameter
-        lone = [i for i in d.said.effects if i not in listed and (i != "tip_cut" or "diameter" not in listed)]
-        also = " or ".join(_title(i) for i in lone)
-        return f"{words[:-1]}; the model also allows {also}." if also else words
     said = d.decision
     titles = [_title(i) for i in said.effects]
     off = _off(d)
-    if said.verdict == "insufficient" and wrong_rotor_check.foreign(d.problem):
+    if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
-    file, wrong, _ = wrong_rotor_check.contradiction(d.problem, said)
-    if file:
+    file, wrong, _ = other_rotor.contradiction(d.problem)
+    if file and said.verdict == "insufficient":
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
         apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause: {apart}, no more than runs do; from the model, {off}."
+        return f"No cause above {LEAST:.0%}: {apart}, no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
+    end = f"{_moved(d)}{_in_both(d)}."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
-        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{_in_both(d)}."
+        return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
     if said.verdict == "class":
-        if said.rule == BESIDE_IT:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{_in_both(d)}."
+        if said.beside:
+            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{end}"
         if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{_in_both(d)}."
+            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{end}"
         if len(titles) > _A_GROUP:
-            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}."
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{_in_both(d)}."
+            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{end}"
+        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{end}"
     if said.verdict == "unknown":
         what = _from_reference(d) or f"Recording and model differ ({off})"
         return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
@@ -359,13 +336,23 @@ def _guess(d: Diagnosis) -> str:
     return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
 
 
-def _from_reference(d: Diagnosis) -> str:
-    """Loads of the recording over those of the reference; "" where they were not compared."""
+def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
+    """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
     if d.change is None:
-        return ""
-    loads = [(c.name, d.change.ratios[c.channel]["ratio"]) for c in d.change.loads_by_name.values()]
-    words = " and ".join(f"{name} by {_share(ratio - 1.0)}" for name, ratio in loads)
+        return []
+    return [(c.name, d.change.ratios[c.channel]["ratio"] - 1.0) for c in d.change.loads_by_name.values()]
+
+
+def _from_reference(d: Diagnosis) -> str:
+    """What the recording differs from the reference by, in words."""
+    words = " and ".join(f"{name} by {_share(v)}" for name, v in _ratios(d))
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
+
+
+def _moved(d: Diagnosis) -> str:
+    """The same behind a cause."""
+    words = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
+    return f" ({words} against the reference)" if words else ""
 
 
 def _members(ids: Sequence[str]) -> str:
@@ -393,24 +380,33 @@ def _share(v: float) -> str:
     return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
-def text(d: Diagnosis) -> str:
-    """Lines, and the tables behind them."""
+def text(d: Diagnosis, details: bool = False) -> str:
+    """The answer in twelve lines; with ``details`` all sentences, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
     # it explains little and takes lines
     last = [line for line in rest if line.startswith("Not tried: ")]
-    said = d.said
+    said, steps = d.said, _next(d)
     named = f" {', '.join(said.effects)}" if said.effects else ""
-    out = [textwrap.fill(first, 110), f"verdict: {said.verdict}{named}"]
+    out = [*textwrap.wrap(first, 110), f"verdict: {said.verdict}{named}"]
     # a command stays in one line, to be copied
-    out += [f"  {line}" if line.startswith("  ") else
-            textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ")
-            for line in rest if line not in last]  # fmt: skip
+    shown = {line: [f"  {line}"] if line.startswith("  ") else
+             textwrap.wrap(line, 110, initial_indent="  ", subsequent_indent="    ")
+             for line in rest if line not in last}  # fmt: skip
+    if not details:
+        left = _LINES - len(out) - sum(len(shown.get(line, ())) for line in steps)
+        for line, wrapped in shown.items():
+            told = line in steps or (not line.startswith(_DETAILS) and len(wrapped) <= left)
+            left -= len(wrapped) if told and line not in steps else 0
+            out += wrapped if told else []
+        return "\n".join(out)
+    out += [line for wrapped in shown.values() for line in wrapped]
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
-        rows.append([str(name), f"{p:.3f}", f"{found.log_bayes(name):.1f}" if name != NONE else "0.0", seen])
+        odds = "-" if name not in found.states[0].log_z else f"{found.log_bayes(name):.1f}"
+        rows.append([str(name), f"{p:.3f}", odds, seen])
     out += [
         "",
         text_table(

@@ -11,10 +11,10 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.judge.diagnose import confusion
-from bemt.judge.diagnose.explanation import NONE, Explanation
 from bemt.judge.diagnose.fit import fit
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.explanation import NONE, Explanation
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
 
@@ -100,7 +100,7 @@ def _likely(answer: Diagnosis) -> dict[str, float]:
     """Effects of the ranking with the probability of the likeliest explanation that each is in, likeliest first."""
     share: dict[str, float] = {}
     for what, p in sorted(answer.found.probability.items(), key=lambda kv: -kv[1]):
-        for i in what.ids:
+        for i in what.ids & set(answer.found.spans):
             share.setdefault(i, p)
     return share
 

@@ -10,8 +10,8 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
 from bemt.judge.diagnose import fit
-from bemt.judge.diagnose.explanation import Explanation
 from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.explanation import Explanation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.answer import Diagnosis
     from bemt.judge.diagnose.signatures import Candidate
 
+_LEAST = 0.1  # probability from which the size of an effect is drawn [1]
 _MOST_PANELS, _MOST_BARS = 6, 6
 
 
@@ -64,7 +65,7 @@ def _words(setting: dict[str, Any]) -> str:
 
 def posterior(answer: Diagnosis) -> Figure | None:
     """Draw one panel per parameter, or a map of two."""
-    if not answer.best.ids:
+    if max((answer.found.inclusion[i] for i in answer.best.ids), default=0.0) < _LEAST:
         return None
     panels = []
     for i, p in fit.weights(answer.found, Explanation.of(*answer.best.ids)).items():

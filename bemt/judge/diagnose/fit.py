@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
-from bemt.judge.diagnose.evidence import unknown
-from bemt.judge.diagnose.explanation import Explanation
 from bemt.judge.diagnose.form import form_modes
 from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.explanation import Explanation
 from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.posterior import Evidence
     from bemt.physics.effects import Parameter
 
 _STEPS = 5
@@ -285,7 +283,7 @@ def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Ar
         candidate, g = found.of(i), c - found.spans[i].start
         spread = found.states[0].forms[i].size if size is None else size
         shape = spread * candidate.signatures[:, g, None] * modes[i]
-        B = np.column_stack([shape, candidate.between(g)])
+        B = np.column_stack([shape, candidate.other_laws(g)])
         out += B @ B.T
     return out
 
@@ -310,11 +308,3 @@ def smooth(found: Evidence, best: Fit) -> Array:
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
     return np.asarray(systematic @ whitener(C, problem.u).solve(problem.residual - best.signature))
-
-
-def left_over(found: Evidence, best: Fit) -> float:
-    """Logarithm of the odds that something smooth is left when an explanation is taken away. [1]"""
-    problem = found.problem
-    C = noise.covariance(problem, found.states[0].hyper) + form_covariance(found, best)
-    gains = unknown(noise.unlike(C, problem.u, found.rivals), problem.residual - best.signature)
-    return float(log_sum(gains)) - float(np.log(gains.size)) if gains.size else float("-inf")

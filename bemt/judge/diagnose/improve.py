@@ -21,7 +21,7 @@ _HEAD = "with what `bemt diagnose` found: "
 
 def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
     """Text of a case file with the effects of the verdict on."""
-    named = not answer.by_ratios and answer.decision.verdict in ("named", "class")
+    named = answer.decision.verdict in ("named", "class")
     found = [effect_of(i, s) for i, s in zip(answer.best.ids, answer.best.settings, strict=True)]
     found = [e for e in found if bem.acts_on_rotor(e) or (e.kind == "air" and not e.needs)]
     if not named or not found:

@@ -14,8 +14,8 @@ from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.evidence import Evidence
     from bemt.judge.diagnose.fit import Fit
+    from bemt.judge.diagnose.posterior import Evidence
 
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.

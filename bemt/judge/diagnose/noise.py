@@ -9,8 +9,10 @@ declared: a rotor whose curves have the right shape may still be off by a consta
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,26 +28,30 @@ if TYPE_CHECKING:
     from bemt.physics.effects.base import Effect
 
 # Noise over the stated uncertainty, or over the default where none is stated; correlation of neighbours.
-_SCALES = {True: (0.7, 1.0, 1.5, 2.5, 5.0), False: (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)}
-_AR = (0.0, 0.6, 0.9)
+_SCALES = {True: (0.7, 1.0, 1.6, 3.0), False: (0.15, 0.4, 1.0, 2.5)}
+_AR = (0.0, 0.6)
 _WHITE = 0.2
 # How good the solver is: smooth error over advance ratio as a share of the largest coefficient, and a factor on its own
-# nuisances, with the prior weight.  Declared after volume 1 of the UIUC database, where thrust and torque at rest are
-# off by 3 and 5 % (median) and one propeller in ten by more than 10 %.
-_MODEL = {(0.003, 0.3): 0.2, (0.01, 0.6): 0.25, (0.03, 1.0): 0.3, (0.08, 1.0): 0.25}
-# Probability that the rotor is a real one, of which no more is known than the case, and a reference, say; smooth error
-# beside, and size of what those differ by (heavy tails of the population, two for its six quantiles).
-_REAL, _REAL_SIZES = 0.5, {(0.01, 1.0): 0.8, (0.08, 2.0): 0.2}
-# Reference recordings show the error of the solver, however large: it need not be kept small by its prior.
-_MODEL_SHOWN = {(0.0, 1.0): 0.15, (0.01, 1.0): 0.2, (0.03, 1.0): 0.2, (0.08, 1.0): 0.2, (0.25, 1.0): 0.25}
+# nuisances, alike beforehand.  Declared after volume 1 of the UIUC database: thrust and torque at rest are off
+# by 3 and 5 % (median) and one propeller in ten by more than 10 %. A reference shows that error, however large.
+_MODEL = ((0.01, 0.33), (0.03, 1.0), (0.08, 1.0))
+_MODEL_SHOWN = (*_MODEL, (0.25, 1.0))
+# From this size on the rotor may be any real one of which no more is known than the case says.
+_REAL = 0.03
 _MODEL_RPM = 0.1
 _LENGTH_J = 0.3
 _LENGTH_RPM = 0.7
-# What a run may differ by from other runs of the stand (temperature of cells and blades, a mount put back), as a share,
-# with its prior weight: 0.2 % (median) and 0.4 % (nine in ten) between alternate runs of UIUC volume 1, 0.3 to 1.9 %
-# between runs of one configuration on a hobby stand.  Half of the variance is a gain, half smooth in speed and advance
-# ratio (declared).
-_SESSIONS = {0.002: 0.35, 0.006: 0.35, 0.02: 0.3}
+# What a run may differ by from other runs (temperature of cells and blades, a mount put back), as a share, with its
+# prior weight: of one stand and day 0.2 % (median) and 0.4 % (nine in ten) between alternate runs of UIUC volume 1, 0.3
+# to 1.9 % between runs of one configuration on a hobby stand; of other days or stands; and where several runs tell
+# themselves. Half of the variance is a gain, half smooth in speed and advance ratio (declared).
+_SESSIONS = {
+    "one": {0.002: 0.5, 0.007: 0.5},
+    "apart": {0.007: 0.3, 0.02: 0.7},
+    "told": {0.002: 0.35, 0.007: 0.35, 0.02: 0.3},
+}
+_SEVERAL = 4
+_DAY = re.compile(r"(?<!\d)((?:19|20)\d{2}[-_.]?[01]\d[-_.]?[0-3]\d)(?!\d)")
 _SESSION_GAIN = 0.5
 # Below the smooth error there is a finer one: stall and transition set in at other advance ratios than computed.
 _MODEL_FINE = 0.1
@@ -86,22 +92,30 @@ class Hyper:
 
 def hypers(problem: Problem) -> tuple[Hyper, ...]:
     """All settings, with prior weights that add up to 1."""
-    scales = _SCALES[problem.u_known]
-    each = 1.0 / (len(scales) * len(_AR))
-    model = {(m, f, 0.0): w for (m, f), w in (_MODEL if problem.free.all() else _MODEL_SHOWN).items()}
-    if all(p.as_built is not None for p in problem.parts):
-        model = {k: (1.0 - _REAL) * w for k, w in model.items()}
-        model |= {(least, 1.0, size): _REAL * w for (least, size), w in _REAL_SIZES.items()}
     stated = [p.record.repeatability for p in problem.parts if np.isfinite(p.record.repeatability)]
-    apart = {max(stated): 1.0} if stated else _SESSIONS
+    apart = {max(stated): 1.0} if stated else _SESSIONS[_session(problem)]
     apart = apart if np.ptp(problem.covariates["run"]) > 0.0 else {0.0: 1.0}
+    alone = bool(problem.free.all())
+    real = alone and all(p.as_built is not None for p in problem.parts)
+    grid = list(product(_SCALES[problem.u_known], _AR, _MODEL if alone else _MODEL_SHOWN))
     return tuple(
-        Hyper(s, a, m, f, each * w * v, d, real)
-        for s in scales
-        for a in _AR
-        for (m, f, real), w in model.items()
-        for d, v in apart.items()
+        Hyper(s, a, m, own, w / len(grid), d, 1.0 if real and m >= _REAL else 0.0)
+        for s, a, (m, own) in grid
+        for d, w in apart.items()
     )
+
+
+def _session(problem: Problem) -> str:
+    """Whether all runs are of one stand and day, as far as files say: by dates in their names, and by their columns.
+
+    Several runs show themselves what they differ by.
+    """
+    records = [p.record for p in problem.parts]
+    if np.unique(problem.covariates["run"]).size >= _SEVERAL:
+        return "told"
+    days = {day for r in records for day in _DAY.findall(r.name)}
+    columns = {frozenset(r.measured) for r in records}
+    return "one" if len(days) < 2 and len(columns) == 1 else "apart"
 
 
 def in_time(covariates: Mapping[str, Array]) -> tuple[Array, Array]:
@@ -265,9 +279,11 @@ def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
     return load, falling
 
 
-def law_of(effect: Effect | type[Effect]) -> tuple[str, ...]:
-    """What the law of an effect depends on, of speed, advance ratio and density."""
-    return () if effect.kind == "stand" or effect.exact else ("J",) if effect.inviscid else tuple(_FLOW)
+def law_of(effect: Effect | type[Effect], solved: bool = True) -> tuple[str, ...]:
+    """What the law of an effect depends on, of speed, advance ratio and density; a solved blade needs no law."""
+    if effect.kind == "stand" or effect.exact or (effect.geometric and solved):
+        return ()
+    return ("J",) if effect.inviscid else tuple(_FLOW)
 
 
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:

@@ -14,10 +14,12 @@ from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
 from bemt.judge.diagnose import confusion as look
-from bemt.judge.diagnose import evidence, noise, prior, problem, signatures, thresholds
+from bemt.judge.diagnose import noise, posterior, prior, problem, signatures
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
 from bemt.judge.diagnose.record import Record
+from bemt.judge.explanation import NONE, Explanation
+from bemt.judge.loss import COSTS
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -122,7 +124,7 @@ def record_of(imported: Dataset, case: Case) -> Record:
 
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
     """Say what a plan can see."""
-    with evidence.one_thread():
+    with posterior.one_thread():
         return _plan(record, case, progress)
 
 
@@ -135,7 +137,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
     candidates, absent = signatures.candidates(
         whole, None, (lambda n: progress(f"solving with {n}")) if progress else None
     )
-    found = evidence.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
+    found = posterior.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
     alike = look.confusion(found)
     size, best = _sizes(whole, candidates, [noise.Hyper(*h, 1.0) for h in (_HYPER, _BEST)])
     added = None
@@ -144,8 +146,9 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, [suggestion.Rival(i, settings[i], 0.5) for i in (a, b)])
-    weight = prior.prior_weights(whole, alike.ids)
-    bar = np.array([thresholds.EXPECTED if weight[i] > 1.0 else thresholds.ENOUGH for i in alike.ids])
+    before = prior.log_priors(prior.prior_weights(whole, alike.ids), pairs=False)
+    odds = float(np.log(COSTS.wrong / COSTS.silent))  # from which a name is the answer of least loss
+    bar = np.array([odds + before[NONE] - before[Explanation.of(i)] for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)
 
 

@@ -7,47 +7,57 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
 
-__all__ = ["ALWAYS", "BOTH", "EVIDENT", "LEFT_OUT", "PRESENT", "PRIOR", "log_priors", "present", "prior_weights"]
+__all__ = ["ALWAYS", "LEFT_OUT", "PRIOR", "log_priors", "present", "prior_weights"]
 
-PRIOR = {"none": 0.35, "single": 0.55, "pair": 0.05, "unknown": 0.05}
+PRIOR = {"none": 0.4, "single": 0.45, "pair": 0.1, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
-LEFT_OUT, PRESENT = 50.0, 0.2
+LEFT_OUT, PRESENT = 10.0, 0.01
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
-parameters, beside 1 for all others [1]."""
-BOTH = 0.01
-"""The same of what blade and air do in every run, where the baseline has it and a reference is given: two runs do not
-differ in it [1]."""
+parameters, beside 1 for all others, where no reference shows the rotor [1]."""
+BOTH, ELSE = 0.01, 0.2
+"""Beside a reference: weight of what blade and air do in every run and the baseline has, in which two runs do not
+differ, and of other physics that it has [1]."""
 ALWAYS = 9.0
 """Odds that physics of every rotor is at work, in every run, where the case leaves it out: nobody takes it away [1]."""
 # Recorded conditions that differ by less are the same, share.
 _SAME = 0.1
 EVIDENT = 0.2
-"""The same of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
+"""Weight of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
+CHANGED = 50.0
+"""Weight of what the user says he changed: said, weighed, checked [1]."""
 
 
 def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
     """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
     usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
-    on = present(problem)
-    # between two recordings the change is often one that was made and is known
-    rest = {i: EVIDENT if effects.catalogue()[i].evident and not problem.by_laws else 1.0 for i in ids}
-    usual |= {i for i in ids if recorded_change(problem, i)}
-    there = dict.fromkeys(on, PRESENT)
-    if any(p.record.reference for p in problem.parts):
-        there |= {e.id: BOTH for e in effects.standard() if e.id in on and not e.along}
-    return {i: there[i] if i in on else LEFT_OUT if i in usual else rest[i] for i in ids}
+    shown = any(p.record.reference for p in problem.parts)
+    on, everywhere = present(problem), {e.id for e in effects.standard() if not e.along}
+
+    def weight(i: str) -> float:
+        cls = effects.catalogue()[i]
+        if i in problem.told:
+            return CHANGED
+        if recorded_change(problem, i):
+            return LEFT_OUT
+        if i in on and not cls.evident:
+            return PRESENT if not shown else BOTH if i in everywhere else ELSE
+        # between two recordings the change is often one that was made and is known
+        rest = EVIDENT if cls.evident and not problem.by_laws else 1.0
+        return LEFT_OUT if i in usual and (not shown or i in problem.shared) else rest
+
+    return {i: weight(i) for i in ids}
 
 
 def recorded_change(problem: Problem, name: str) -> bool:
-    """Whether two recordings without a case tell themselves that what an effect follows differs between them."""
-    if not problem.by_laws:
+    """Whether recording and reference tell themselves that what an effect follows differs between them."""
+    if problem.free.all():
         return False
     test, known = ([p.record.extra for p in problem.parts if p.record.reference is which] for which in (False, True))
     for v in (v for v in effects.catalogue()[name].along if v != "time_s"):

@@ -190,6 +190,7 @@ class Problem:
     variants: tuple[tuple[Part, ...], ...] = ()
     # Physics that a reference shows as well as the recording (:mod:`bemt.judge.diagnose.shared_physics`)
     shared: frozenset[str] = frozenset()
+    told: frozenset[str] = frozenset()  # Effects that the user says he changed between reference and recording
     # Readings that were solved already, by the effects added
     predicted: dict[Any, Array] = field(default_factory=dict, repr=False)
 

@@ -22,7 +22,7 @@ from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.judge.diagnose.improve import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
-from bemt.judge.diagnose.wrong_rotor_check import FACTOR
+from bemt.judge.diagnose.other_rotor import FACTOR
 from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 from bemt.rotors.as_measured import AsMeasured, as_measured

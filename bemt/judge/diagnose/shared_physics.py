@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.judge.diagnose import evidence
+from bemt.judge.diagnose import posterior
 from bemt.judge.diagnose.prior import ALWAYS
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def ask_reference(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Pr
     if not asked:
         return replace(problem, shared=frozenset()), tuple(candidates)
     rows = ~problem.free
-    shows = evidence.log_odds(problem.of(rows), [c.seen_as(c.signatures[rows]) for c in asked])
+    shows = posterior.log_odds(problem.of(rows), [c.seen_as(c.signatures[rows]) for c in asked])
     both = frozenset(i for i, odds in shows.items() if odds + np.log(ALWAYS) > 0.0)
     alone = problem.missing - both
     kept = (c.seen_as(np.where(rows[:, None], 0.0, c.signatures)) if c.id in alone else c for c in candidates)

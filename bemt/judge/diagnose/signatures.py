@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +39,7 @@ class Candidate:
     solved: NDArray[np.bool_]  # (G,) Whether the setting was solved rather than interpolated
     # Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings]
     directions: Callable[[Effect], Array] | None = None
-    _between: dict[int, Array] = field(default_factory=dict, repr=False)
+    _other: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @property
     def kind(self) -> str:
@@ -49,7 +48,7 @@ class Candidate:
 
     def seen_as(self, signatures: Array) -> Candidate:
         """The same settings, of which other signatures (M, G) are known [units of the readings]."""
-        return replace(self, signatures=signatures, _between={})
+        return replace(self, signatures=signatures, _other={})
 
     def only(self, keep: NDArray[np.bool_]) -> Candidate | None:
         """Candidate with some of its settings; None without any."""
@@ -63,45 +62,14 @@ class Candidate:
             self.id, settings, self.signatures[:, keep], weight, self.solved[keep], self.directions
         )  # fmt: skip
 
-    def between(self, g: int) -> Array:
-        """Change of the signature within half the way to the neighbouring settings, one column per parameter.
-
-        Columns of other laws beside.
-        """
-        if g not in self._between:
-            steps = self._steps(g)
-            if self.directions is not None:
-                other = self.directions(effect_of(self.id, self.settings[g]))
-                steps = np.concatenate([steps, other[:, np.any(other != 0.0, axis=0)]], axis=1)
-            self._between[g] = steps
-        return self._between[g]
-
-    def _steps(self, g: int) -> Array:
-        discrete = effects.catalogue()[self.id].discrete
-        columns = []
-        for key, value in self.settings[g].items():
-            if key in discrete or not isinstance(value, float):
-                continue
-            near = self._lines[(key, _rest(self.settings[g], key))]
-            at = near.index(g)
-            a, b = near[max(at - 1, 0)], near[min(at + 1, len(near) - 1)]
-            if a != b:
-                columns.append(
-                    0.5
-                    * (self.signatures[:, b] - self.signatures[:, a])
-                    / (min(at + 1, len(near) - 1) - max(at - 1, 0))
-                )
-        return np.stack(columns, axis=1) if columns else np.zeros((self.signatures.shape[0], 0))
-
-    @cached_property
-    def _lines(self) -> dict[tuple[str, Any], list[int]]:
-        """Settings that differ in one parameter only, in its order."""
-        lines: dict[tuple[str, Any], list[int]] = {}
-        for g, setting in enumerate(self.settings):
-            for key, value in setting.items():
-                if isinstance(value, float):
-                    lines.setdefault((key, _rest(setting, key)), []).append(g)
-        return {k: sorted(v, key=lambda g: float(self.settings[g][k[0]])) for k, v in lines.items()}
+    def other_laws(self, g: int) -> Array:
+        """What the signature of a setting is off by in each of the other laws, (M, D) [units of the readings]."""
+        if self.directions is None:
+            return np.zeros((self.signatures.shape[0], 0))
+        if g not in self._other:
+            columns = self.directions(effect_of(self.id, self.settings[g]))
+            self._other[g] = columns[:, np.any(columns != 0.0, axis=0)]
+        return self._other[g]
 
     @property
     def middle(self) -> int:
@@ -114,10 +82,6 @@ class Candidate:
         w = self.weight[order]
         median = float(np.interp(0.5, (np.cumsum(w) - 0.5 * w) / w.sum(), size[order]))
         return int(np.nanargmin(np.where(size > 0, np.abs(size - median), np.nan)))
-
-
-def _rest(setting: dict[str, Any], key: str) -> tuple[tuple[str, Any], ...]:
-    return tuple((k, v) for k, v in setting.items() if k != key)
 
 
 def effect_of(id: str, setting: dict[str, Any]) -> Effect:  # noqa: A002

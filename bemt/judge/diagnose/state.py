@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.explanation import Explanation
 from bemt.judge.diagnose.form import Form
+from bemt.judge.explanation import Explanation
 
 if TYPE_CHECKING:
-    from bemt.base.gaussian.whitening import Conditional, Whitener
+    from bemt.base.gaussian.whitening import Conditional
     from bemt.judge.diagnose.noise import Hyper
 
 
@@ -27,27 +27,19 @@ class State:
     S: Array  # (M, G) Whitened signatures of all settings of all candidates [1]
     half: Array  # (G,) Half of their squared lengths [1]
     forms: dict[str, Form] = field(default_factory=dict)  # Error of the form of each candidate, at its best setting
-    # Factors without and with each unknown smooth effect
-    rivals: list[tuple[Conditional, Whitener]] = field(default_factory=list)
     log_z: dict[Explanation, float] = field(default_factory=dict)  # Logarithm of the evidence per explanation
+    small: dict[str, float] = field(default_factory=dict)  # The same of settings that are too small to count
+    best: dict[str, int] = field(default_factory=dict)  # Best setting of each candidate
     best_rival: str = ""  # Unknown smooth effect of largest evidence
-    # What two effects change together beyond the sum of both, whitened, and the columns at which it was solved
-    mixed: dict[Explanation, tuple[Array, int, int]] = field(default_factory=dict)
 
     def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
         """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
 
-        Signatures are added; what they change together, where it was solved, grows as the product of their sizes.
+        Signatures are added.
         """
         A, B = (spans[i] for i in pair)
         a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
         total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
-        if pair in self.mixed:
-            extra, i, j = self.mixed[pair]
-            share = np.outer(self.S[:, A].T @ self.S[:, i] / (2.0 * self.half[i]),
-                             self.S[:, B].T @ self.S[:, j] / (2.0 * self.half[j]))  # fmt: skip
-            met = (extra @ self.S[:, A])[:, None] + (extra @ self.S[:, B])[None, :]
-            total += share * (extra @ self.r - met) - 0.5 * share**2 * (extra @ extra)
         return np.asarray(total)
 
     def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:

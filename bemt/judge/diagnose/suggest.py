@@ -25,7 +25,7 @@ from bemt.physics.bem import model as bem
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.evidence import Evidence
+    from bemt.judge.diagnose.posterior import Evidence
 
 REFERENCE = (
     "a reference run: the same rotor, stand and points without the suspected cause (before the change, or another "
@@ -62,6 +62,7 @@ class Given:
     references: tuple[str, ...] = ()
     rest: str = "--case CASE"  # Options
     ruled_out: tuple[str, ...] = ()  # Effects that a check has ruled out
+    changed: tuple[str, ...] = ()  # Effects that the user says he changed
 
     def command(self, run: str = "", reference: str = "", ruled_out: str = "") -> str:
         """Command that diagnoses the same again, with one more file or one effect less."""
@@ -69,7 +70,8 @@ class Given:
         known = [*self.references, *([reference] if reference else [])]
         gone = [*self.ruled_out, *([ruled_out] if ruled_out else [])]
         words = ["bemt diagnose", *files, *(["--reference", *known] if known else []), self.rest]
-        return " ".join([*words, *(["--ruled-out", *gone] if gone else [])])
+        said = ["--changed", *self.changed] if self.changed else []
+        return " ".join([*words, *said, *(["--ruled-out", *gone] if gone else [])])
 
     def comparison(self, reference: str) -> str:
         """Command that sets the first recording beside a reference."""

@@ -440,6 +440,8 @@ class Effect:
     evident: ClassVar[bool] = False
     # A wrongly recorded number: its effect follows from the definition, so the law cannot be off.
     exact: ClassVar[bool] = False
+    # Its share of torque is not known from that of thrust: codes and ducts differ in it, even in its sign.
+    torque_open: ClassVar[bool] = False
     # How to check it without a run.
     check: ClassVar[str] = ""
     # Whether that check is one of a room: no tunnel can do it.

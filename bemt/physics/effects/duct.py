@@ -29,6 +29,7 @@ class DuctEffect(Effect):
     outer_drag: float = 0.0
 
     id = "duct"
+    torque_open = True
     inviscid = True
     evident = True
     title = "duct thrust"

@@ -38,6 +38,7 @@ class LipSeparation(Effect):
     by: str = "load"
 
     id = "lip_separation"
+    torque_open = True
     title = "flow separation at the duct lip"
     sign = (
         "thrust drops above one loading and recovers below a lower one, torque is unchanged; Mach effects have no "

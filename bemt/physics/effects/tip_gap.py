@@ -35,6 +35,7 @@ class TipGap(Effect):
     title = "tip gap leakage in a duct"
     check = "measure the gap with a feeler gauge, hot and at speed if possible"
     along = ("tip_gap_m",)
+    torque_open = True
     sign = "thrust and pressure rise drop in proportion to gap over span; no change on an open rotor"
     parameters = (
         Parameter("loss", "1", *GAP_LOSS, "Wisler 1985; Cumpsty 1989, not checked", 3),

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.thresholds import GATE, NAMED
 from bemt.tools.flight.balance import axes_of, directions
+from bemt.tools.flight.decision import GATE, NAMED
 from bemt.tools.flight.log import FlightLog
 
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks

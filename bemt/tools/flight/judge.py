@@ -21,13 +21,12 @@ from itertools import combinations
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.diagnose.prior import LEFT_OUT, log_priors
-from bemt.judge.diagnose.rule import decide
+from bemt.judge.diagnose.prior import log_priors
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.judge.diagnose.thresholds import GATE
-from bemt.judge.diagnose.verdict import CLAIMS, Decision
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.loss import CLAIMS
 from bemt.tools.flight.balance import BLADE, DAY, WIND, axes_of, directions, healthy_flight
+from bemt.tools.flight.decision import GATE, Decision, decide
 from bemt.tools.flight.next_flight import next_flight
 from bemt.tools.flight.rules import RULES, BesideBalance, FlightEvidence, FlightQuery
 
@@ -35,6 +34,7 @@ __all__ = ["FALSE_ALARM", "FlightVerdict", "judge", "weighed"]
 
 FALSE_ALARM = GATE
 """Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
+_USUAL = 50.0  # weight of wind beside 1 for every fault: it is there in most flights [1]
 _ALONG = 100.0  # condition number from which two rotors load the body along one line
 _OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
 _LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforehand: beyond, a motor has no more [1]
@@ -175,7 +175,7 @@ def weighed(
     log_bayes |= {NONE: 0.0, UNKNOWN: over_nothing(unlisted, float(np.exp(-0.5 * np.sum(free))))}
     # Wind is only listed where the log shows it, so it is as likely as physics that every rotor has.
     names_ = (i for e in found if not e.pair for i in e if i != DAY)
-    prior = log_priors({i: LEFT_OUT if i == WIND else 1.0 for i in names_})
+    prior = log_priors({i: _USUAL if i == WIND else 1.0 for i in names_})
     prior[Explanation.of(DAY)] = prior[NONE]  # as likely as not
     weight = {e: v + prior[e] for e, v in log_bayes.items()}
     top = max(weight.values())

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.thresholds import GATE
+from bemt.tools.flight.decision import GATE
 from bemt.tools.flight.log import FlightLog
 
 _SCATTER, _FREE, _EXPONENT, _U_EXPONENT = 0.011, 4, 0.5, 0.2

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.judge.diagnose.verdict import Decision
 from bemt.tools.flight.balance import BLADE, WEIGHT, WIND
+from bemt.tools.flight.decision import Decision
 from bemt.tools.flight.rules import DAYS
 
 _HOVER = "hover 30 s in still air and judge that flight"

@@ -8,12 +8,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from bemt.judge.diagnose.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.diagnose.rule import Rule
-from bemt.judge.diagnose.thresholds import EARNED, GATE, LARGEST, LEFT_OVER, LIKE, MOST, NAMED, NEAR, RARE, SMALL, SURE
-from bemt.judge.diagnose.verdict import BESIDE_IT, Decision, credible_sets
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, blade
 from bemt.tools.flight.change import FlightChange
+from bemt.tools.flight.decision import (
+    BESIDE_IT,
+    EARNED,
+    GATE,
+    LARGEST,
+    LEFT_OVER,
+    LIKE,
+    MOST,
+    NAMED,
+    NEAR,
+    RARE,
+    SMALL,
+    SURE,
+    Decision,
+    Rule,
+    credible_sets,
+)
 
 __all__ = ["BUILD", "DAYS", "IN_FLIGHT", "RULES", "WIDE", "BesideBalance", "FlightEvidence", "FlightQuery"]
 
@@ -126,7 +140,7 @@ class FlightQuery:
         names = tuple(dict.fromkeys(i for e in of for i in e)) + more
         chance = self.share(of) if of else self.P[NONE] if verdict == "none" else self.P[lead]
         rest = self.log_bayes[UNKNOWN] - self.log_bayes[lead]
-        return Decision(verdict, names, lead, chance, rest, (), why, sets=sets)
+        return Decision(verdict, names, lead, chance, rest, why, sets=sets)
 
     def share(self, of: Sequence[Explanation]) -> float:
         """Probability of some explanations among those of their kind, once something moved."""

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.thresholds import NAMED
 from bemt.tools.flight.balance import TRIM, TRIM_FREE, axes_of
+from bemt.tools.flight.decision import NAMED
 from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.log import FlightLog, SpeedSensor
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bemt.judge.diagnose.verdict import BESIDE_IT, Decision
 from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
+from bemt.tools.flight.decision import BESIDE_IT, Decision
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor

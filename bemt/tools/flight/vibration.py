@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.thresholds import GATE
+from bemt.tools.flight.decision import GATE
 from bemt.tools.flight.log import FlightLog
 
 _WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # lengths tried; longest used; least windows

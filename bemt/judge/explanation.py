@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 from bemt.physics import effects
 
-__all__ = ["NONE", "UNKNOWN", "Explanation"]
+__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation"]
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,7 @@ class Explanation:
 
     ids: frozenset[str] = frozenset()  # Effects at work
     smooth: bool = False  # Whether something smooth is at work that no effect of the catalogue is
+    doubt: bool = False  # Whether the files are not what they say: another rotor, stand or unit than stated
 
     @classmethod
     @cache
@@ -37,7 +38,7 @@ class Explanation:
 
     def without(self, effect: str) -> Explanation:
         """The others of its effects."""
-        return Explanation(self.ids - {effect}, self.smooth)
+        return replace(self, ids=self.ids - {effect})
 
     def __iter__(self) -> Iterator[str]:
         """Effects in the order of the catalogue."""
@@ -54,7 +55,7 @@ class Explanation:
 
     def __str__(self) -> str:
         """As documents write it."""
-        return "unknown" if self.smooth else "+".join(self) or "none"
+        return "doubt" if self.doubt else "unknown" if self.smooth else "+".join(self) or "none"
 
 
-NONE, UNKNOWN = Explanation(), Explanation(smooth=True)
+NONE, UNKNOWN, DOUBT = Explanation(), Explanation(smooth=True), Explanation(doubt=True)

@@ -18,13 +18,11 @@ from bemt.base.tables import number_text
 from bemt.base.units import INCH
 from bemt.judge.diagnose.blade import AsLabelled
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.diagnose.thresholds import ANOTHER
 from bemt.physics.effects.base import Effect, RotorBuild
 
 if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
-    from bemt.judge.diagnose.verdict import Decision
 
 FACTOR = 3.0
 """Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
@@ -33,8 +31,6 @@ UNREPEATABLE = 0.10
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.
 _OFF = 0.25
 _SHOWN = 3
-# A slip this much farther from the loads than the nearest one may still be it.
-_NEARLY = 1.0
 _ANGLES_DEG = (-12.0, -9.0, -6.0, -3.0, 3.0, 6.0, 9.0, 12.0, 16.0)
 # Kinds of slips that are another rotor.
 _ROTORS = ("pitch", "chord", "diameter", "blades")
@@ -43,8 +39,6 @@ _BLADES = (1, 2, 3, 4, 5, 6, 8, 12)
 _ERROR = ": error: "
 # Kind, words, logarithm of the loads over those of the case by channel, rarity.
 _Slip = tuple[str, str, dict[str, float], float]
-CONTRADICTED = "a recording contradicts itself; a physical residual cannot be distinguished from that"
-"""Why nothing unknown is claimed of it."""
 SLIPS = ("unit_slip", "rpm_scale")
 """Effects that are such a slip themselves."""
 
@@ -116,10 +110,11 @@ def _ranked(found: dict[str, float], slips: Iterable[_Slip]) -> list[Suspect]:
     return sorted(out.values(), key=lambda s: s.distance)
 
 
-def another_label(problem: Problem) -> bool:
-    """Whether all loads are so far off the case that the rotor is rather another one, and no reference shows it."""
-    shown = any(p.record.reference for p in problem.parts)
-    return not shown and min((abs(v) for v in problem.level.values()), default=0.0) > ANOTHER
+def odds(problem: Problem) -> float:
+    """Odds of another rotor over a slip of a unit or of the speed, by the level of the loads alone [1]."""
+    rotor, slip = (min((s.distance for s in suspects(problem) if (s.kind in _ROTORS) is which), default=math.inf)
+                   for which in (True, False))  # fmt: skip
+    return math.exp(min(0.5 * (slip**2 - rotor**2), 50.0)) if math.isfinite(rotor) else 0.0
 
 
 def nearest_rotors(problem: Problem) -> str:
@@ -199,29 +194,6 @@ def exact_faults(problem: Problem) -> Iterator[tuple[str, Finding]]:
                 yield "rpm_scale", f
 
 
-def to_mend(problem: Problem, decision: Decision) -> str:
-    """What comes before any run: whose rotor it is, or what cannot be so and would be in a reference, too."""
-    if decision.verdict != "insufficient":
-        return ""
-    if _suspicious(levels(problem)):
-        slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
-        return f"check that the case describes this rotor; other explanations for the loads: {slips}"
-    file, _, correction = contradiction(problem, decision)
-    return f"correct {file} before any run: {correction}" if file else ""
-
-
-def contradiction(problem: Problem, decision: Decision) -> tuple[str, str, str]:
-    """File that cannot be so, what in it and the correction, where that comes before any cause; empty elsewhere."""
-    wrong = impossible(problem)
-    alone = all(not part.record.reference for part in problem.parts)
-    if decision.verdict != "insufficient" or not wrong or not (alone or decision.why == CONTRADICTED):
-        return "", "", ""
-    file, _, said = wrong[0].partition(_ERROR)
-    what, _, correction = said.partition(". Correction: ")
-    _, _, channel = what.partition(" (")
-    return file, channel.replace("): ", ": ", 1) or what, correction or said
-
-
 def finding(problem: Problem) -> str:
     """Question to the user, "" where the loads may be those of the case's rotor, at rest but for what is recorded."""
     found, names = levels(problem), {"thrust_N": "thrust", "torque_Nm": "torque"}
@@ -234,10 +206,21 @@ def finding(problem: Problem) -> str:
     return f"{off} what the case gives. Is it this rotor? Most likely: {ranked}"
 
 
-def odd_speed(problem: Problem, slip: set[str]) -> bool:
-    """Whether a wrong speed is named that is none of pole pairs or units, while another rotor explains the loads."""
-    if "rpm_scale" not in slip:
-        return False
-    ranked = suspects(problem)
-    speed = min((s.distance for s in ranked if s.kind in ("poles", "speed")), default=math.inf)
-    return speed > ranked[0].distance + _NEARLY
+def to_mend(problem: Problem) -> str:
+    """What comes before any run: whose rotor it is, or what cannot be so; "" where nothing is wrong."""
+    if _suspicious(levels(problem)):
+        slips = "; ".join(f"{k}. {s.words}" for k, s in enumerate(suspects(problem)[:_SHOWN], 1))
+        return f"check that the case describes this rotor; other explanations for the loads: {slips}"
+    file, _, correction = contradiction(problem)
+    return f"correct {file} before any run: {correction}" if file else ""
+
+
+def contradiction(problem: Problem) -> tuple[str, str, str]:
+    """File that cannot be so, what in it and the correction; empty elsewhere."""
+    wrong = impossible(problem)
+    if not wrong:
+        return "", "", ""
+    file, _, said = wrong[0].partition(_ERROR)
+    what, _, correction = said.partition(". Correction: ")
+    _, _, channel = what.partition(" (")
+    return file, channel.replace("): ", ": ", 1) or what, correction or said

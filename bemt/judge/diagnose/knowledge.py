@@ -1,0 +1,186 @@
+"""What else is known, each as one factor of the posterior: laws of ratios, exact relations, files that are not right.
+
+The signatures of the solver and those of scaling laws are two banks for the same hypotheses. Where no signature of the
+solver fits, its law of the cause may be off for this blade; how loads changed from a reference at equal speed is
+measured and needs no blade, so there the laws tell what is unknown to the solver.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemt.base.errors import InputError
+from bemt.data.recordings.load import import_file
+from bemt.judge.compare.recordings import RunChange, changed
+from bemt.judge.compare.stand_run import StandRun, stand_run
+from bemt.judge.diagnose import other_rotor
+from bemt.judge.diagnose.record import merged
+from bemt.judge.explanation import DOUBT, UNKNOWN, Explanation
+from bemt.physics import effects
+from bemt.physics.dataset import Dataset
+
+if TYPE_CHECKING:
+    from bemt.judge.compare.drive_laws import Judgement
+    from bemt.judge.diagnose.posterior import Evidence
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.record import Record
+    from bemt.judge.diagnose.signatures import Candidate
+    from bemt.judge.loss import Decision
+
+EXACT = 1e4
+"""Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
+many ratios fit in between [1]."""
+DOUBTFUL = 9.0
+"""Odds that a file which cannot be right, or loads of a factor of three, are a fault of file or case before any physics
+[1]."""
+ANOTHER = 50.0
+"""Odds of another rotor over two faults at once that each shift a whole channel: as of one cause over two [1]."""
+# Faults of a cell that multiply its reading.
+_SHARES = ("gain", "cross-talk")
+_LOADS = {"thrust_N": "thrust", "torque_Nm": "torque"}
+
+
+def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Candidates without what cannot be: a density that nobody recorded has no wrong unit."""
+    if any(p.record.air_recorded for p in problem.parts if not p.record.reference):
+        return tuple(candidates)
+    kept = (c.only(np.array([s.get("channel") != "density_kg_m3" for s in c.settings])) for c in candidates)
+    return tuple(c for c in kept if c is not None)
+
+
+def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
+    """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
+    P = _exact(found.problem, found.probability)
+    if change is not None and change.loads.ranked:
+        P = both(P, change.loads.ranked)
+    return _doubted(found.problem, another_rotor(P, UNKNOWN))
+
+
+def both(P: Mapping[Explanation, float], laws: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Posterior over two banks of signatures: causes that laws know share what is unknown to the solver.
+
+    >>> one, two = Explanation.of("duct"), Explanation.of("section")
+    >>> found = both({one: 0.1, UNKNOWN: 0.9}, {one: 0.8, two: 0.1, UNKNOWN: 0.1})
+    >>> [round(found[k], 2) for k in (one, two, UNKNOWN)]
+    [0.82, 0.09, 0.09]
+    """
+    open_, out = P.get(UNKNOWN, 0.0), dict(P)
+    for k, p in laws.items():
+        if k.ids:
+            out[k] = out.get(k, 0.0) + open_ * p
+            out[UNKNOWN] -= open_ * p
+    return out
+
+
+def reason(problem: Problem, said: Decision) -> Decision:
+    """The same decision; of a broken relation the relation itself is the reason."""
+    for name, finding in other_rotor.exact_faults(problem):
+        if said.effects == (name,):
+            return replace(said, why=f"{finding.evidence}, by definition")
+    return said
+
+
+def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Explanation, float]:
+    """Two effects that only shift whole channels fit any two levels: another ``rotor`` does that, too."""
+
+    def level(i: str) -> bool:
+        cls = effects.catalogue()[i]
+        return cls.exact or (cls.fault in _SHARES and cls.sensor in ("", *_LOADS))
+
+    share = ANOTHER / (1.0 + ANOTHER)
+    lost = {k: share * p for k, p in P.items() if k.pair and all(map(level, k))}
+    return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == rotor else 0.0) for k, p in P.items()}
+
+
+def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Broken relations of the recording: power is torque times speed, two counters of one shaft agree."""
+    broken = {name for name, _ in other_rotor.exact_faults(problem)}
+    return _normal({k: p * (EXACT if k.ids & broken else 1.0) for k, p in P.items()})
+
+
+def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
+    where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
+    """  # noqa: D205
+    share = DOUBTFUL / (1.0 + DOUBTFUL)
+    shown = any(p.record.reference for p in problem.parts)  # a reference shows the rotor
+    if other_rotor.foreign(problem) and not shown and not problem.by_laws:
+        odds = DOUBTFUL * other_rotor.odds(problem)
+        lost = {k: p * (odds / (1.0 + odds) if k.ids and k.ids <= set(other_rotor.SLIPS) else share)
+                for k, p in P.items()}  # fmt: skip
+    elif other_rotor.unrepeatable(problem):
+        lost = {k: share * p for k, p in P.items() if k.ids}
+    elif other_rotor.impossible(problem):
+        lost = {UNKNOWN: share * P[UNKNOWN]}
+    else:
+        return dict(P)
+    return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
+
+
+def _normal(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
+    total = sum(P.values())
+    return {k: p / total for k, p in P.items()}
+
+
+def change_of(
+    records: Sequence[Record],
+    diameter_m: float,
+    absent: Collection[str],
+    judge: Callable[[RunChange], Judgement],
+    files: Sequence[str] | None = None,
+) -> RunChange | None:
+    """Change of the one recording from its references; None where ratios are no measure of it.
+
+    ``absent``: effects that cannot show; ``judge`` of the loads; ``files``: reference and test as a command names them.
+    """
+    known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
+    if len(tested) != 1 or not known or _transient(absent):
+        return None
+    pair = [merged(known), tested[0]]
+    if _turned(pair):
+        return None
+    try:
+        whole = _paths(files) if len(known) == 1 else []
+        runs = [_run(r, diameter_m, f) for r, f in zip(pair, whole or (None, None), strict=True)]
+        return changed(runs[0], runs[1], diameter_m, judge)
+    except InputError:
+        return None
+
+
+def _transient(absent: Collection[str]) -> bool:
+    """Whether the speed changes within a second in what was recorded: these rows are no steady points."""
+    return bool({"inflow_lag", "rotor_inertia"} - set(absent))
+
+
+def _turned(pair: Sequence[Record]) -> bool:
+    """Whether a load changed its sign: ratios are those of sizes."""
+    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
+    return any(a * b < 0.0 for a, b in sums)
+
+
+def _paths(files: Sequence[str] | None) -> list[str]:
+    """Files without the quotes that a command needs; none where they are not both there."""
+    names = [shlex.split(f)[0] for f in files or ()]
+    return names if len(names) == 2 and all(os.path.exists(n) for n in names) else []
+
+
+def _run(record: Record, diameter_m: float, file: str | None = None) -> StandRun:
+    """Points of a record as a comparison takes them: of its file where that is known, which says more."""
+    if file is not None:
+        whole = stand_run(import_file(file), file, diameter_m)
+        if {"airspeed_m_s", "J"} & whole.points.values.keys() or not np.any(record.V > 0.0):
+            return whole
+    loads = [k for k in _LOADS if k in record.measured]
+    values = {"rpm": record.rpm, "airspeed_m_s": record.V, **{k: record.measured[k] for k in loads}}
+    u = {k: np.nan_to_num(record.u[k]) for k in loads}
+    if "run" in record.extra:
+        values["run"] = record.extra["run"]
+    density = float(np.mean(record.air.rho)) if record.air_recorded else math.nan
+    return StandRun(Dataset("bench", record.name, values, u), "", density, diameter_m)

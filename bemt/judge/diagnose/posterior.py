@@ -1,0 +1,327 @@
+"""One posterior: nothing, every effect, every pair and something unknown, as one mixture of normal distributions.
+
+For readings with covariance C the evidence of a signature s_g of prior weight w_g is exact on the grid of settings:
+Z = sum_g w_g exp(-|L^-1 (r - s_g)|^2 / 2) / |L|, C = L L^T (MacKay 2003, Information Theory, ch. 28).  The error of an
+effect's law is a few more columns of that covariance, by Woodbury.  What else is known enters once, as a factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.arrays import Array
+from bemt.base.gaussian.evidence import log_sum, shares
+from bemt.base.gaussian.whitening import conditional
+from bemt.judge.diagnose import form, noise, prior
+from bemt.judge.diagnose.state import State
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.physics import effects
+
+if TYPE_CHECKING:
+    from bemt.base.gaussian.whitening import Conditional, Whitener
+    from bemt.judge.diagnose.noise import Hyper, SmoothAlternative
+    from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
+
+LEAST = 0.01
+"""A setting that changes every channel by less than this share of its size counts as no cause [1]."""
+EARNED = 3.0
+"""Log odds that a second effect must add to the better one of a pair; below, the pair counts as that one [1]."""
+# Settings of the covariance that are kept, settings of an effect that choose them, and settings of each effect in a
+# pair: evenly chosen and best; pairs with the errors of both laws.
+_KEEP, _FEW, _EVEN, _BEST, _PAIRS = 3, 9, 14, 10, 12
+_SHUT = -60.0
+# Log odds that a pair is expected to lack, where covariances are chosen: it has twice the settings.
+_TWICE = 4.0
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra to one thread: with a few hundred rows more only wait for each other, on a busy machine long.
+
+    scipy brings a BLAS of its own, which can only be limited once it is loaded.
+    """
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        yield
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Outcome of the weighing."""
+
+    problem: Problem  # Readings
+    candidates: tuple[Candidate, ...]  # Effects
+    states: tuple[State, ...]  # Settings of the covariance that matter, best for the likeliest explanation first
+    probability: dict[Explanation, float]  # Posterior probability [1]
+    spans: dict[str, slice]  # Columns of each candidate in ``State.S``
+    log_w: Array  # (G,) Logarithm of the prior weight of each column within its candidate [1]
+    rivals: tuple[SmoothAlternative, ...] = ()  # Unknown smooth effects
+
+    @property
+    def p_value(self) -> float:
+        """Probability of as large a misfit without any cause: the whitened residual of "none" is chi-square [1]."""
+        from scipy.special import chdtrc
+
+        return max(float(chdtrc(s.r.size, s.r @ s.r)) for s in self.states)
+
+    @property
+    def inclusion(self) -> dict[str, float]:
+        """Probability that an effect is at work, alone or in a pair, by id, likeliest first [1]."""
+        out = dict.fromkeys(self.spans, 0.0)
+        for what, p in self.probability.items():
+            for i in what.ids:
+                out[i] = out.get(i, 0.0) + p
+        return dict(sorted(out.items(), key=lambda kv: -kv[1]))
+
+    def of(self, name: str) -> Candidate:
+        """Candidate by id."""
+        return next(c for c in self.candidates if c.id == name)
+
+    def log_bayes(self, what: Explanation, over: Explanation = NONE) -> float:
+        """Natural logarithm of the odds of the readings under one explanation over another."""
+        w = np.log([s.hyper.weight for s in self.states])
+        mine, other = ([s.log_z.get(k, -np.inf) for s in self.states] for k in (what, over))
+        return float(log_sum(mine, w) - log_sum(other, w))
+
+
+@dataclass(frozen=True, eq=False)
+class _Bank:
+    """Signatures of all candidates side by side."""
+
+    problem: Problem
+    candidates: tuple[Candidate, ...]
+    spans: dict[str, slice]
+    S: Array  # (M, G) [units of the readings]
+    log_w: Array  # (G,)
+    seen: NDArray[np.bool_]  # (G,) Whether a setting changes the readings by as much as counts
+    modes: dict[str, Array]  # Of the error of each law, (M, q)
+    _columns: dict[tuple[str, int], tuple[int, Array]]
+
+    @classmethod
+    def of(cls, problem: Problem, candidates: Sequence[Candidate]) -> _Bank:
+        """Lay out."""
+        ends = np.cumsum([0, *(c.weight.size for c in candidates)])
+        spans = {c.id: slice(int(a), int(b)) for c, a, b in zip(candidates, ends, ends[1:], strict=False)}
+        S = np.concatenate([np.zeros((problem.y.size, 0)), *(c.signatures for c in candidates)], axis=1)
+        log_w = np.concatenate([np.zeros(0), *(np.log(c.weight) for c in candidates)])
+        seen = np.zeros(log_w.size, dtype=bool)
+        for k in np.unique(problem.channel[problem.changed]):
+            mine = problem.changed & (problem.channel == k)
+            seen |= np.sqrt(np.mean((S[mine] / problem.scale[mine, None]) ** 2, axis=0)) > LEAST
+        return cls(problem, tuple(candidates), spans, S, log_w, seen, form.form_modes(problem, candidates), {})
+
+    def columns(self, name: str, setting: int) -> tuple[int, Array]:
+        """How many modes the error of a law has at a setting, and all its columns."""
+        if (name, setting) not in self._columns:
+            candidate = next(c for c in self.candidates if c.id == name)
+            self._columns[name, setting] = form.columns(self.problem, candidate, setting, self.modes[name])
+        return self._columns[name, setting]
+
+
+def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True) -> Evidence:
+    """Weigh all explanations."""
+    bank = _Bank.of(problem, candidates)
+    rivals = noise.rivals(problem, _told(candidates))
+    states = []
+    for h in _leading(bank):
+        C = noise.covariance(problem, h)
+        state = _single(bank, h, conditional(C, problem.u, problem.changed))
+        gains = unknown(noise.unlike(C, problem.u, rivals), problem.residual)
+        state.log_z[UNKNOWN] = state.log_z[NONE]
+        if gains.size:
+            state.best_rival = rivals[int(np.argmax(gains))].name
+            state.log_z[UNKNOWN] += float(log_sum(gains)) - float(np.log(gains.size))
+        if pairs:
+            _pairs(bank, state)
+        states.append(state)
+    before = prior.log_priors(prior.prior_weights(problem, list(bank.spans)), pairs)
+    rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
+             and not effects.catalogue()[c.id].exact}  # fmt: skip
+    probability = _posterior(states, before, rough)
+    likeliest = max(probability, key=lambda k: probability[k])
+    states.sort(key=lambda s: -(s.log_z[likeliest] + np.log(s.hyper.weight)))
+    return Evidence(problem, tuple(candidates), tuple(states), probability, bank.spans, bank.log_w, rivals)
+
+
+def log_odds(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
+    """Natural logarithm of the odds of each effect alone over none, the likeliest covariances added up."""
+    bank = _Bank.of(problem, candidates)
+    states = [_single(bank, h, conditional(noise.covariance(problem, h), problem.u, problem.changed))
+              for h in _leading(bank)]  # fmt: skip
+    found = Evidence(problem, tuple(candidates), tuple(states), {}, bank.spans, bank.log_w)
+    return {i: found.log_bayes(Explanation.of(i)) for i in bank.spans}
+
+
+def bare(problem: Problem, candidates: Sequence[Candidate], hyper: Hyper) -> Evidence:
+    """Whitened signatures under one covariance, without weighing: all that a plan needs."""
+    bank = _Bank.of(problem, candidates)
+    white = conditional(noise.covariance(problem, hyper), problem.u, problem.changed)
+    S = white.changes(bank.S)
+    state = State(hyper, white, white(problem.residual), S, 0.5 * np.sum(S * S, axis=0))
+    return Evidence(problem, tuple(candidates), (state,), {}, bank.spans, bank.log_w)
+
+
+def unknown(rivals: Sequence[tuple[Conditional, Whitener]], residual: Array) -> Array:
+    """Log evidence over that of "none" of each rival for residuals (M,) or (M, B): (K,) or (K, B)."""
+    rest: dict[int, tuple[Array, Array]] = {}
+    rows = []
+    for given, white in rivals:
+        if id(given) not in rest:
+            e = given.rest(residual)
+            w = given.white(e)
+            rest[id(given)] = e, 0.5 * np.sum(w * w, axis=0)
+        e, base = rest[id(given)]
+        w = white(e)
+        rows.append(base - 0.5 * np.sum(w * w, axis=0) - (white.log_det - given.white.log_det))
+    return np.array(rows)
+
+
+def _told(candidates: Sequence[Candidate]) -> list[str]:
+    """Variables that one effect alone follows: what changes along a wall's distance is the wall, whatever its law."""
+    along = [(v, e.id) for e in effects.catalogue().values() for v in e.along]
+    tried = {c.id for c in candidates}
+    return [v for v, i in along if i in tried and [w for w, _ in along].count(v) == 1]
+
+
+def _leading(bank: _Bank) -> list[Hyper]:
+    """Settings of the covariance under which some explanation is best, and the best of none and of one effect.
+
+    A few settings of each effect are enough to see that. Something unknown is not asked: under the least noise it also
+    fits what the few settings leave between them.
+    """
+    problem = bank.problem
+    few = _few(bank)
+    S = bank.S[:, few]
+    scores, hypers = [], []
+    for h, C in noise.covariances(problem):
+        white = conditional(C, problem.u, problem.changed)
+        r, X = white(problem.residual), white.changes(S)
+        none = -0.5 * float(r @ r) - white.log_det - float(white.misfit(problem.residual)) + np.log(h.weight)
+        gain = X.T @ r - 0.5 * np.sum(X * X, axis=0) if few.size else np.zeros(1)
+        best = int(np.argmax(gain))
+        two = float(np.max(gain + gain[best] - X.T @ X[:, best])) if few.size else 0.0
+        one = max(0.0, float(gain[best]))
+        scores.append((none, none + one, none + max(one, two - _TWICE)))
+        hypers.append(h)
+    table = np.array(scores)
+    if not np.isfinite(table).all():
+        raise FloatingPointError("a covariance of the readings is not finite")
+    chosen = [*np.argsort(-table[:, 2])[:_KEEP], int(np.argmax(table[:, 0])), int(np.argmax(table[:, 1]))]
+    return [hypers[int(i)] for i in dict.fromkeys(chosen)]
+
+
+def _few(bank: _Bank) -> NDArray[np.intp]:
+    """Columns that stand for each candidate, evenly chosen; of exact ratios those nearest to the readings."""
+    out = []
+    rough = np.hypot(bank.problem.u, 0.03 * bank.problem.scale)[:, None]
+    for c in bank.candidates:
+        span, cls = bank.spans[c.id], effects.catalogue()[c.id]
+        if cls.kind == "stand" and cls.discrete:
+            apart = np.sum(((bank.problem.residual[:, None] - c.signatures) / rough) ** 2, axis=0)
+            chosen = np.argsort(apart, kind="stable")[:_FEW]
+        else:
+            chosen = np.unique(np.linspace(0, c.weight.size - 1, _FEW).round().astype(int))
+        out.append(span.start + np.sort(chosen))
+    return np.concatenate([np.zeros(0, dtype=np.intp), *out])
+
+
+def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
+    """Whitened readings and signatures, and the evidence of none and of every single effect."""
+    problem = bank.problem
+    r, S = white(problem.residual), white.changes(bank.S)
+    none = -0.5 * float(r @ r) - white.log_det - float(white.misfit(problem.residual))
+    state = State(h, white, r, S, 0.5 * np.sum(S * S, axis=0), log_z={NONE: none})
+    gain = S.T @ r - state.half + bank.log_w
+    for name, span in bank.spans.items():
+        total, best = gain[span], int(np.argmax(gain[span]))
+        for _ in range(2):  # the error of the law follows the size of the best setting, which depends on it
+            width, columns = bank.columns(name, best)
+            law = form.Law.of(white.changes(columns), width)
+            total = gain[span] + law.gain(r[:, None] - S[:, span])
+            if (again := int(np.argmax(total))) == best:
+                break
+            best = again
+        state.forms[name] = law.at(r - S[:, span.start + best])
+        counts = bank.seen[span]
+        state.log_z[Explanation.of(name)] = none + (float(log_sum(total[counts])) if counts.any() else _SHUT)
+        state.small[name] = none + (float(log_sum(total[~counts])) if not counts.all() else _SHUT)
+        state.best[name] = best
+    return state
+
+
+def _pairs(bank: _Bank, state: State) -> None:
+    """Evidence of two effects at a time, signatures added; the errors of both laws for the leading ones."""
+    none, some = state.log_z[NONE], {}
+    gain = state.S.T @ state.r - state.half
+    for name, span in bank.spans.items():
+        n, weight = span.stop - span.start, bank.log_w[span]
+        at = np.arange(n)
+        if n > _EVEN + _BEST:  # the best ones stand for themselves, even ones for what is nearest to them
+            best = np.unique([*np.argsort(-gain[span])[:_BEST], state.best[name]])
+            even = np.setdiff1d(np.linspace(0, n - 1, _EVEN).astype(int), best)
+            rest = np.setdiff1d(at, best)
+            near = np.argmin(np.abs(rest[:, None] - even[None, :]), axis=1)
+            lent = np.log(np.bincount(near, np.exp(weight[rest]), even.size))
+            at, weight = np.concatenate([best, even]), np.concatenate([weight[best], lent])
+        some[name] = span.start + at, gain[span][at] + weight + np.where(bank.seen[span][at], 0.0, _SHUT)
+    tables = {}
+    for a, b in combinations(bank.spans, 2):
+        (A, of_a), (B, of_b) = some[a], some[b]
+        total = of_a[:, None] + of_b[None, :] - state.S[:, A].T @ state.S[:, B]
+        pair = Explanation.of(a, b)
+        state.log_z[pair], tables[pair] = none + float(log_sum(total.ravel())), (a, b, total)
+
+    def most(pair: Explanation) -> float:
+        return max(state.log_z[pair], *(state.log_z[Explanation.of(i)] for i in pair.ids))
+
+    for pair in sorted(tables, key=most, reverse=True)[:_PAIRS]:
+        a, b, total = tables[pair]
+        A, B = some[a][0], some[b][0]
+        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
+        each = [bank.columns(k, int(c) - bank.spans[k].start) for k, c in ((a, A[i]), (b, B[j]))]
+        law = form.Law.of(state.white.changes(np.concatenate([x for _, x in each], axis=1)),
+                          *(part for width, x in each for part in (width, x.shape[1] - width)))  # fmt: skip
+        value = total + law.gain_of_two(state.r, state.S[:, A], state.S[:, B])
+        state.log_z[pair] = none + float(log_sum(value.ravel()))
+
+
+def _posterior(
+    states: Sequence[State], before: dict[Explanation, float], rough: Collection[str] = ()
+) -> dict[Explanation, float]:  # fmt: skip
+    """Probabilities: what is too small to count is none, a second effect that adds too little is not there.
+
+    Evidence between ``rough`` laws is tempered: they are off by a share of what they explain, so that they are told
+    apart by no less than that share of the log odds (a power likelihood, as for any model that is known to be wrong).
+    """
+    weight = np.array([np.log(s.hyper.weight) for s in states])
+
+    def together(values: Sequence[float]) -> float:
+        return float(log_sum(np.array(values), weight))
+
+    log_z = {k: together([s.log_z[k] for s in states]) for k in states[0].log_z}
+    plain = dict(log_z)
+    if near := {k: v for k, v in log_z.items() if k.ids & set(rough)}:
+        top = max(near.values())
+        power = EARNED / max(EARNED, min(form.FORM) * (top - log_z[NONE]))
+        log_z |= {k: top - power * (top - v) for k, v in near.items() if len(k) == 1}
+    small = {k: together([s.small[k] for s in states]) for k in states[0].small}
+    log_p = [log_z[k] + before[k] for k in log_z] + [v + before[Explanation.of(k)] for k, v in small.items()]
+    p = shares(log_p)
+    out = dict(zip(log_z, p.tolist(), strict=False))
+    out[NONE] += float(np.sum(p[len(log_z) :]))
+    for k in [k for k in out if k.pair]:
+        better = max((Explanation.of(i) for i in k.ids), key=lambda i: plain[i])
+        if plain[k] < plain[better] + EARNED:
+            out[better] += out[k]
+            out[k] = 0.0
+    return out

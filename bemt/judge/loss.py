@@ -1,0 +1,150 @@
+"""What is said is the answer of least expected loss: one posterior, one table of costs, no rule beside.
+
+A cause is a set of effects. The answer is "none", a name (one or two causes), a class (one of these), "unknown" (none
+of the library) or "insufficient". A loss is counted in units of one "insufficient" where there is a cause.  Decisions
+of least expected loss: Berger 1985, Statistical Decision Theory and Bayesian Analysis, ch. 1 and 4 (not checked).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.physics import effects
+
+__all__ = ["CLAIMS", "COSTS", "Costs", "Decision", "decide"]
+
+CLAIMS = ("named", "sensor", "class")
+"""Verdicts that give a cause."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The table: what a wrong answer costs, chosen on half of the concealed recordings and shown on the others."""
+
+    wrong: float = 8.0  # A cause is given, and it is another one, none, or not in the library: work on a sound part
+    half: float = 8.0 / 3.0  # One of two causes is given right, or one too many: the next run shows the rest
+    phantom: float = 4.0  # "Something unknown" where nothing is wrong: a search without an end
+    missed: float = 2.5  # "None" where there is a cause, or "unknown" where it is a listed one: nobody looks on
+    silent: float = 1.0  # "Insufficient" where there is a cause: another run, the unit of the table
+    timid: float = 0.7  # "Insufficient" where nothing is wrong: another run for nothing
+    member: float = 0.12  # Each member of a class that is not a cause: one more thing to look at
+
+
+COSTS = Costs()
+# Likeliest explanations that are tried as a name, and most members of a class.
+_NAMES, _MEMBERS = 6, 6
+# Explanations below this are not counted; shares of a class from which its first member is in all of it, and may be
+# alone.
+_NOTHING, _NEARLY_ALL, _ALONE = 1e-5, 0.9, 0.1
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What is said, and why."""
+
+    verdict: str  # none, named, class, sensor, unknown or insufficient
+    effects: tuple[str, ...]  # Effects of the verdict; of a class all members
+    leading: Explanation  # What is shown
+    probability: float  # Of the verdict [1]
+    why: str  # Reason, in words
+    sets: tuple[tuple[str, ...], ...] = ()  # One set of effects per cause: one of each is at work
+    beside: bool = False  # Whether the second of two sets may as well be empty
+    loss: Mapping[str, float] = field(default_factory=dict)  # Least expected loss of each kind of answer [1]
+    # Whose evidence it is: of the "model", of the "drive", of "both", or what the "files" say themselves
+    by: str = "model"
+
+
+def expected(said: frozenset[str], named: bool, P: Mapping[Explanation, float], c: Costs = COSTS) -> float:
+    """Expected loss of a name or of a class."""
+    total = 0.0
+    for truth, p in P.items():
+        if truth.ids and (said == truth.ids if named else truth.ids <= said):
+            total += p * c.member * (len(said) - len(truth.ids))
+        else:
+            total += p * (c.half if truth.ids & said else c.wrong)
+    return total
+
+
+def decide(P: Mapping[Explanation, float], costs: Costs = COSTS) -> Decision:
+    """Answer of least expected loss.
+
+    Examples
+    --------
+    >>> gain, zero = Explanation.of("thrust_gain"), Explanation.of("thrust_zero")
+    >>> decide({gain: 0.97, NONE: 0.03}).verdict, decide({gain: 0.5, zero: 0.48, NONE: 0.02}).verdict
+    ('sensor', 'class')
+    >>> decide({NONE: 0.9, gain: 0.1}).verdict, decide({NONE: 0.5, gain: 0.5}).verdict
+    ('none', 'insufficient')
+    """
+    c = costs
+    none, unknown, doubt = (P.get(k, 0.0) for k in (NONE, UNKNOWN, DOUBT))
+    listed = dict(sorted(((k, p) for k, p in P.items() if k.ids and p > _NOTHING), key=lambda kv: -kv[1]))
+    counted = {**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}
+    cause = sum(listed.values())
+    answers: dict[tuple[str, tuple[str, ...]], float] = {
+        ("none", ()): c.missed * (cause + unknown) + c.wrong * doubt,
+        ("unknown", ()): c.phantom * none + c.missed * cause + c.wrong * doubt,
+        ("insufficient", ()): c.silent * (cause + unknown) + c.timid * none,
+    }
+    for k in list(listed)[:_NAMES]:
+        answers["named", tuple(k)] = expected(k.ids, True, counted, c)
+    for pool in (listed, [k for k in listed if not k.pair]):
+        members: tuple[str, ...] = ()
+        for k in pool:
+            members += tuple(i for i in k if i not in members)
+            if len(members) > _MEMBERS:
+                break
+            if len(members) > 1:
+                answers["class", members] = expected(frozenset(members), False, counted, c)
+    verdict, said = min(answers, key=lambda k: answers[k])
+    least: dict[str, float] = {}
+    for (kind, _), v in answers.items():
+        least[kind] = min(v, least.get(kind, v))
+    first = next(iter(listed), NONE)
+    decision = Decision(verdict, said, first, 0.0, "", loss=least)
+    if verdict == "named":
+        what = Explanation.of(*said)
+        stand = all(i in effects.catalogue() and effects.catalogue()[i].kind == "stand" for i in said)
+        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
+        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P[what], why=why,
+                       sets=tuple((i,) for i in said))  # fmt: skip
+    if verdict == "class":
+        inside = {k: p for k, p in listed.items() if k.ids <= set(said)}
+        first, sets = _sets(said, inside)
+        alone = inside.get(Explanation.of(first), 0.0)
+        beside = len(sets) > 1 and alone > _ALONE * sum(inside.values())
+        why = "these readings do not tell them apart"
+        if len(sets) > 1:
+            why = f"{first} is present; whether another is, too, is left open" if beside else "two causes are present"
+        return replace(decision, probability=sum(inside.values()), why=why, sets=sets, beside=beside)
+    if verdict == "none":
+        return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")
+    if verdict == "unknown":
+        return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
+    if doubt >= 0.5:
+        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
+    most = max(none, unknown, *listed.values(), 0.0)
+    return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
+
+
+def _sets(
+    said: tuple[str, ...], inside: Mapping[Explanation, float]
+) -> tuple[str, tuple[tuple[str, ...], ...]]:  # fmt: skip
+    """Effect of the largest probability, and one set of effects per cause: that one if it is in nearly all of it."""
+    share = {i: sum(p for k, p in inside.items() if i in k) for i in said}
+    first = max(said, key=lambda i: share[i])
+    rest = tuple(i for i in said if i != first)
+    total, pairs = sum(inside.values()), sum(p for k, p in inside.items() if k.pair)
+    sure = share[first] > _NEARLY_ALL * total and pairs > _ALONE * total
+    return first, ((first,), rest) if sure else (said,)
+
+
+def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> str:
+    """Why nothing is said."""
+    if none >= max(unknown, *listed.values(), 0.0):
+        return f"nothing is likeliest ({none:.0%}), but not sure enough"
+    if unknown >= max(listed.values(), default=0.0):
+        return f"something that is not in the library is likeliest ({unknown:.0%}), but not sure enough"
+    return "several different explanations are possible"

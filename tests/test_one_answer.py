@@ -1,0 +1,47 @@
+"""One file, one answer: every door that compares a recording with its reference says the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from bemt.app.commands.cli import main
+from bemt.app.library import propeller
+from diagnosing import case, points, recording
+
+import bemt
+from bemt.base.errors import EXIT_OK
+from bemt.physics.dataset import Dataset
+
+CASE = str(Path(__file__).resolve().parent.parent / "cases" / "prop_8x5")
+CHANGES: list[tuple[float, float]] = [(1.0, 1.0), (1.08, 1.0), (1.1, 1.1), (0.93, 0.97), (1.0, 0.85)]
+MORE = [(a, b) for a in (0.85, 0.95, 1.05, 1.2, 1.5) for b in (0.85, 0.95, 1.0, 1.05, 1.2)]
+
+
+def written(path: Path, seed: int, thrust: float, torque: float) -> str:
+    """A recording of the case with loads off by two factors."""
+    r: Dataset = recording(case(), points("static"), seed=seed)
+    columns = {k: r[k] for k in ("rpm", "thrust_N", "torque_Nm")}
+    columns["thrust_N"], columns["torque_Nm"] = thrust * columns["thrust_N"], torque * columns["torque_Nm"]
+    rows = zip(*columns.values(), strict=True)
+    path.write_text("\n".join([",".join(columns), *(",".join(f"{v:.8g}" for v in row) for row in rows)]) + "\n", "utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize("change", [*CHANGES[:3], *(pytest.param(c, marks=pytest.mark.slow)
+                                                    for c in CHANGES[3:] + MORE)])  # fmt: skip
+def test_diagnose_compare_and_the_library_agree(
+    change: tuple[float, float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a, b = written(tmp_path / "a.csv", 1, 1.0, 1.0), written(tmp_path / "b.csv", 2, *change)
+    said = []
+    for words in (["diagnose", b, "--reference", a], ["compare", a, b]):
+        assert main([*words, "--case", CASE, "--json"]) == EXIT_OK
+        doc = json.loads(capsys.readouterr().out)
+        said.append((doc["verdict"], tuple(doc["effects"]), round(doc["probability"], 6)))
+    answer = bemt.diagnose(b, propeller(CASE), reference=a)
+    assert said[0] == said[1]
+    assert said[0][:2] == (answer.verdict, answer.effects)
+    if change == (1.0, 1.0):
+        assert said[0][0] == "none"
