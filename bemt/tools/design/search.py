@@ -49,7 +49,7 @@ RATIOS = (0.35, 0.45, 0.55, 0.7)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
-SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, WINDING, ESC_DROP)}
+SHARES = {item.key.rpartition(".")[2]: item for item in (DRIVE[0], WINDING, DRIVE[2], ESC_DROP)}
 LOADING = (15.0, 1200.0)
 """Disk loading of the labels that are tried [N/m2]."""
 DRAWS = 256
