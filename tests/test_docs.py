@@ -486,6 +486,7 @@ def test_every_imported_library_is_declared(project: Path) -> None:
         "requests": "pooch",
         "pydantic_core": "pydantic",
         "python_calamine": "python-calamine",  # its name when it is imported
+        "pythrust": "setuav-pythrust",
     }
     assert set(comes_with.values()) <= declared
     scripts = (p.stem for place in ("tests", "docs", "reports/studies") for p in (project / place).glob("*.py"))

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
 
@@ -57,9 +58,14 @@ def class_resistance(table: DriveTable) -> float:
         usual = a + b * math.log(table.kv) + c * math.log(mass)
     else:
         volts = table.cells * float(np.interp(table.soc, LIPO_SOC, LIPO_V)) * (1.0 - (table.battery.sag or 0.0))
-        a, b, c = _BY_VOLTAGE
-        usual = a + b * math.log(table.kv) + c * math.log(volts)
+        usual = math.log(float(usual_resistance(table.kv, volts)))
     return math.exp(usual + m.size)
+
+
+def usual_resistance(kv: Array | float, volts: Array | float) -> Array:
+    """Resistance of motors of which only K_v [rev/min/V] and the loaded voltage are known [ohm]."""
+    a, b, c = _BY_VOLTAGE
+    return np.asarray(np.exp(a + b * np.log(kv) + c * np.log(volts)))
 
 
 def full_speed(case: Case) -> float:

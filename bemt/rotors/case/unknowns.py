@@ -97,11 +97,6 @@ DRIVE = (
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
     ),
 )
-WINDING = Unknown(
-    "drive.motor.winding_drop", 0.20, 0.05, 0.39,
-    "a motor as large as its rotor needs: winding, controller and leads take 11 to 31 % of the voltage in two of three "
-    "of 859 motors",
-)  # fmt: skip
 PAIR = (
     Unknown(
         "second_rotor.wake_radius",

@@ -21,7 +21,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.prepare import prepare_case
-from bemt.tools.exports.performance import Performance
+from bemt.tools.exports.performance import LOWEST, Performance
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case
@@ -51,7 +51,7 @@ def hub_of(case: Case, table: Performance) -> HubTable:
     """Solve the table of an open rotor; beyond the flight range, unsolved points hold the last one towards rest."""
     ready, air, D = prepare_case(case), case.air(), table.diameter_m
     greatest = float(table.J_zero.max())
-    rpm = np.linspace(table.rpm[0], table.rpm[-1], N_RPM)
+    rpm = np.linspace(LOWEST * table.rpm[-1], table.rpm[-1], N_RPM)
     deep = np.linspace(min(table.J[0], -0.5 * greatest), 0.0, 5)[:-1]
     J = np.concatenate([deep, greatest * IN_FLIGHT, greatest * FAST])
     side = np.concatenate([greatest * IN_FLIGHT, greatest * FAST])
