@@ -18,7 +18,9 @@ from bemt.data.recordings.cfd_setup import grid_floor
 from bemt.data.recordings.cfd_study import are_grids, by_grid, together
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import as_dataset, document, import_file
+from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all
+from bemt.judge.import_files import import_
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
 
@@ -182,6 +184,23 @@ def test_three_grids_are_no_repeats_where_a_diagnosis_reads_them(project: Path, 
     assert record.gain["thrust_N"] == pytest.approx(0.0146, abs=0.0003)
     assert len(load_all(runs[:1], [case])[1]) == 1
     assert load_case(Path(case) / "case.toml").name == "prop_8x5"
+
+
+def test_what_is_stated_counts_beside_a_case(project: Path, tmp_path: Path) -> None:
+    """Exports without units are not forgotten on the way to the band, and need no file in between."""
+    file = histories(tmp_path)[-1]
+    case, told = project / "cases" / "prop_8x5", {"thrust": "N", "torque": "N m"}
+    seen = import_(file, case=case, rpm=6000.0, unit=told).to_dict()["prediction"]
+    assert seen["channels"]["thrust_N"]["readings"] == 1
+    wrong = import_(file, case=case, rpm=6000.0, unit=told | {"thrust": "mN"}).to_dict()["prediction"]
+    right, small = (1.0 + d["channels"]["thrust_N"]["median_change"] for d in (seen, wrong))
+    assert small == pytest.approx(1e-3 * right, rel=1e-3)
+    found = compare(file, case=case, rpm=6000.0, unit=told).to_dict()
+    (point,) = found["points"]
+    assert point["loads"]["thrust_N"]["cfd"] == pytest.approx(7.57, rel=1e-4)
+    assert point["loads"]["thrust_N"]["u_cfd"] == pytest.approx(7.57 * grid_floor("thrust_N", False), rel=1e-3)
+    thousandth = compare(file, case=case, rpm=6000.0, unit={"thrust": "mN", "torque": "N m"}).to_dict()
+    assert thousandth["points"][0]["loads"]["thrust_N"]["cfd"] == pytest.approx(7.57e-3, rel=1e-4)
 
 
 def test_a_condition_on_one_grid_owes_what_the_grid_costs_elsewhere() -> None:

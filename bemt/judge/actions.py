@@ -116,8 +116,9 @@ def diagnose(
 def compare(
     a: Path, b: Path | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
     diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
-    air_b: str | None = None, out: Path | None = None, figures: bool = True,
-    progress: Callable[[str], None] | None = None,
+    air_b: str | None = None, rpm: float | None = None, unit: Mapping[str, str] = {},  # noqa: B006
+    column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, zones: Sequence[str] = (),  # noqa: B006
+    out: Path | None = None, figures: bool = True, progress: Callable[[str], None] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     r"""Say what changed between two recordings, or compare one CFD run with BEMT.
 
@@ -138,6 +139,12 @@ def compare(
         Rows of `a` or `b` to use: column=text, column=number, column=low:high, rotor=left.
     air_a, air_b : str, optional
         Air of `a` or `b`, overrides the recording: 22C,1013hPa, or only 22C, or 1.19kg/m3; wind: 18m/s, 35kt.
+    rpm : float, optional
+        One CFD run: its speed, where no file states it. [rev/min]
+    unit, column, sign : mapping
+        One CFD run: what its exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
+    zones : sequence of str
+        One CFD run: zones whose loads count.
     out : path, optional
         Folder for comparison.json, its text and a picture.
     figures : bool
@@ -173,6 +180,7 @@ def compare(
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import number, path_text
     from bemt.judge.diagnose import contrast
+    from bemt.judge.import_files import words
 
     if diameter_m is not None and not 0.01 <= number("diameter_m", diameter_m) <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
@@ -180,6 +188,7 @@ def compare(
     return contrast.compared(
         *names, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
         out=None if out is None else path_text("out", out), figures=figures, progress=progress,
+        run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
 
 

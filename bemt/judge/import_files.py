@@ -64,11 +64,13 @@ def import_(
     density_kg_m3 : float, optional
         Density of the fluid. [kg/m3]
     reference : mapping
-        What coefficients rest on: area=A length=L speed=V density=RHO. [m2, m, m/s, kg/m3]
+        What coefficients rest on: area=A length=L speed=V density=RHO sound=A. [m2, m, m/s, kg/m3, m/s]
     setup : mapping
-        How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2.
+        How it was computed: cells=2.1e6 grid_level=fine turbulence='k-omega SST' solver=pressure steady=no gci_pct=2;
+        cells=0.5e6,1.7e6,5.8e6 makes a grid study of three files.
     out : path, optional
-        File that keeps what you state, run.toml or recording.toml; every command takes it in place of the files.
+        File that keeps what you state, run.toml, study.toml of several grids or recording.toml; every command takes it
+        in place of the files.
 
     Returns
     -------
@@ -99,9 +101,9 @@ def import_(
     names, wrote = paths_text("files", files, 1), ""
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
-    told: dict[str, Any] = {"unit": _words(unit), "column": _words(column), "sign": _words(sign)}
+    told: dict[str, Any] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
-           "density_kg_m3": density_kg_m3, "reference": _words(reference), "setup": _words(setup)}  # fmt: skip
+           "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
     lines, insist = [], any(told.values()) or any(run.values()) or out is not None
     if insist and (table := _table(names, run)):
         from bemt.data.recordings.stated import write_recording
@@ -119,13 +121,15 @@ def import_(
         made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
         wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
     if case is not None:
-        seen = [wrote] if wrote else names
-        sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote))
+        runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
+        rest = [f["path"] for f in found["files"] if f["kind"] != "cfd"] if runs else names
+        seen = [wrote] if wrote else [*runs, *rest]
+        sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
     return Told(found, "\n".join([*lines, load.text(found, wrote)]), exit_code=load.exit_code(found))
 
 
-def _words(given: Mapping[str, str]) -> list[str]:
+def words(given: Mapping[str, str]) -> list[str]:
     """``NAME=VALUE`` of a mapping; the empty name stands for all."""
     return [f"{name}={value}" if name else str(value) for name, value in given.items()]
 
@@ -147,7 +151,7 @@ def _table(files: Sequence[str], run: Mapping[str, object]) -> str | None:
 
 
 def _beside(
-    files: list[str], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
+    files: Sequence[Any], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
 ) -> tuple[str, dict[str, Any]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
     from bemt.base.tables import write_atomic

@@ -66,16 +66,17 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
 
 
 def compare_run(
-    path: str | os.PathLike[str], case: Any, progress: Callable[[str], None] | None = None
+    path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None
 ) -> dict[str, Any]:
     """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
     ``bemt.run-comparison/1``: ``points`` (each with ``loads``: cfd, u_cfd, bemt, u_bemt by origin, difference, u_both),
     ``audit``, ``notes``, ``sentence``, ``next``. A file that is no run, or of another rotor, is refused.
     """
-    name = os.fspath(path)
+    given = path if isinstance(path, Dataset) else None
+    name = os.fspath(path) if not isinstance(path, Dataset) else str(path.provenance.get("file", path.name))
     made = rotor_of(case).case
-    points, imported = cfd_points(name)
+    points, imported = cfd_points(name, given)
     notes = list(points.notes)
     for channel, words, value in (
         ("rpm", "rev/min", made.rpm),

@@ -15,6 +15,8 @@ from bemt.base.action import Told
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.face import as_html
 from bemt.base.given import path_text
+from bemt.data.recordings.cfd_study import together
+from bemt.data.recordings.load import import_file
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
 from bemt.judge.diagnose import folder
@@ -182,10 +184,11 @@ def diagnosed(
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
     except InputError as error:
-        if len(files) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
+        if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
         # one point cannot be diagnosed: it is shown beside the model
-        found = one_run.compare_run(files[0], cases[0], progress) | {"verdict": "insufficient", "effects": []}
+        seen = files[0] if len(files) == 1 else together([import_file(f) for f in files])  # grids of one condition
+        found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []}
         return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
     names = [one if isinstance(one, str) else "recording" for one in files]

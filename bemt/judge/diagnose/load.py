@@ -300,6 +300,8 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, flo
 def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspeed_m_s: float | None) -> Record:
     if isinstance(given, str):
         return load(given, case, run, rpm, airspeed_m_s)
+    if isinstance(given, Dataset) and given.provenance.get("format") == "cfd_run":
+        return load(given.name, case, given)
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
 
