@@ -17,7 +17,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -164,7 +164,7 @@ def _changed(edits: dict[str, list[tuple[str, str]]]) -> None:
     external.cache_from_source = cache_from_source  # type: ignore[assignment]
 
 
-def _child(tests: str, mutant: Mutant | None, log: Path) -> int:
+def _child(tests: str, mutant: Mutant, log: Path) -> int:
     """Run tests in this process; its exit code."""
     import shlex
 
@@ -174,15 +174,13 @@ def _child(tests: str, mutant: Mutant | None, log: Path) -> int:
     with log.open("w") as stream:
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
-    edits: dict[str, list[tuple[str, str]]] = {}
-    if mutant is not None:
-        edits[mutant.file] = [(mutant.text, mutant.instead)]
-        if mutant.file in (RES, KER):
-            for file, pairs in INTERPRETED.items():
-                edits.setdefault(file, []).extend(pairs)
-        elif mutant.file.startswith(K):
-            os.environ["NUMBA_CACHE_DIR"] = str(log.with_suffix(".numba"))
-        _changed(edits)
+    edits = {mutant.file: [(mutant.text, mutant.instead)]}
+    if mutant.file in (RES, KER):
+        for file, pairs in INTERPRETED.items():
+            edits.setdefault(file, []).extend(pairs)
+    elif mutant.file.startswith(K):
+        os.environ["NUMBA_CACHE_DIR"] = str(log.with_suffix(".numba"))
+    _changed(edits)
     files = [w if not w.startswith("test_") else f"tests/{w}" for w in shlex.split(tests)]
     return int(
         pytest.main(
@@ -204,7 +202,7 @@ def _child(tests: str, mutant: Mutant | None, log: Path) -> int:
     )
 
 
-def _forked(tests: str, mutant: Mutant | None, log: Path) -> tuple[int, float]:
+def _forked(tests: str, mutant: Mutant, log: Path) -> tuple[int, float]:
     """Exit code and CPU time of a child."""
     pid = os.fork()
     if pid == 0:
@@ -229,15 +227,17 @@ def run(mutants: Iterable[Mutant], folder: Path) -> dict[str, Any]:
     assert not any(name == "bemt" or name.startswith("bemt.") for name in sys.modules)
     began, mutants = time.monotonic(), list(mutants)
     found: dict[str, Any] = {"mutants": len(mutants), "killed": 0, "survived": [], "broken": [], "cpu_s": 0.0}
-    sound: dict[str, int] = {}
+    sound: dict[tuple[str, bool], int] = {}
     for k, mutant in enumerate(mutants):
-        if mutant.tests not in sound:
-            sound[mutant.tests], seconds = _forked(mutant.tests, None, folder / f"sound_{k}.txt")
+        key = mutant.tests, mutant.file in (RES, KER)
+        if key not in sound:  # the same way, without a change
+            same = replace(mutant, instead=mutant.text)
+            sound[key], seconds = _forked(mutant.tests, same, folder / f"sound_{k}.txt")
             found["cpu_s"] += seconds
         code, seconds = _forked(mutant.tests, mutant, folder / f"mutant_{k}.txt")
         found["cpu_s"] += seconds
-        if sound[mutant.tests] != 0 or code in (3, 4, 5, 70):
-            found["broken"].append(f"{mutant.name} (tests {sound[mutant.tests]}, mutant {code})")
+        if sound[key] != 0 or code in (3, 4, 5, 70):
+            found["broken"].append(f"{mutant.name} (tests {sound[key]}, mutant {code})")
         elif code == 0:
             found["survived"].append(mutant.name)
         else:

@@ -155,7 +155,7 @@ def test_a_tip_gap_costs_its_share_of_the_span_times_the_stated_loss() -> None:
 
 
 def test_pressures_of_one_atmosphere_and_the_vapour_in_it() -> None:
-    """29.921 inHg, 760 mmHg and 14.696 psi are 101,325 Pa; saturated air of 20 deg C holds 2.318 % vapour (CIPM-2007)."""
+    """29.921 inHg, 760 mmHg and 14.696 psi are 101,325 Pa; saturated air of 20 deg C has 2.318 % vapour."""
     for value, unit in ((29.921, "inHg"), (760.0, "mmHg"), (14.696, "psi")):
         assert units.to_si(value, unit) == pytest.approx(101_325.0, rel=3e-5)
     assert air.vapour_fraction(101_325.0, 293.15, 100.0) == pytest.approx(0.02318, abs=2e-5)

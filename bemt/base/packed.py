@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import IO, Any
 from xml.parsers import expat
 
 from bemt.base.errors import Fault, InputError
@@ -144,14 +144,22 @@ def _of_zip(archive: zipfile.ZipFile, raw: bytes, name: str, most: int | None, d
         for item in files.values():  # sizes and checksums as the directory says, or an error
             sheet = item.filename == "content.xml" if is_ods else item.filename.startswith("xl/worksheets/")
             with archive.open(item) as stream:
-                blocks = iter(lambda stream=stream: stream.read(_BLOCK), b"")
-                _Extent(name, item.filename, is_ods).check(blocks) if sheet else sum(map(len, blocks))
+                blocks = _blocks(stream)
+                if sheet:
+                    _Extent(name, item.filename, is_ods).check(blocks)
+                else:
+                    sum(map(len, blocks))
         return _workbook(raw, name, most)
     shown = [f for f in files if not f.startswith("__MACOSX/") and not f.rpartition("/")[2].startswith(".")]
     if len(shown) != 1:
         got = f"a zip of {len(shown)} files ({', '.join(shown[:4])}{', ...' if len(shown) > 4 else ''})"
         raise InputError(Fault(name, "", got, "a zip of one file of measurements", "Unpack it and name the file"))
     return unpacked(archive.read(shown[0]), name, most, depth + 1)
+
+
+def _blocks(stream: IO[bytes]) -> Iterator[bytes]:
+    while block := stream.read(_BLOCK):
+        yield block
 
 
 @dataclass

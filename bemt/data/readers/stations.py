@@ -74,7 +74,7 @@ def _column(at: int, text: str, R: float) -> _Column | None:
             return _Column(at, name, share[1], True, text)
         of_tip = re.fullmatch(r"(%?) ?(?:of )?R|-", unit)
         if name == "r" and of_tip or name == "chord" and of_tip and unit != "-":
-            return _Column(at, name, 0.01 if of_tip[1] else 1.0, True, text)  # type: ignore[index]
+            return _Column(at, name, 0.01 if of_tip[1] else 1.0, True, text)
         if name in ("beta", "pitch") and (angle := unit_for("angle", unit)):
             return _Column(at, "beta", angle[0].factor / units.DEG, False, text)
         if name in ("r", "chord", "pitch") and (length := unit_for("length", unit)):
