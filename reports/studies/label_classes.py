@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from bemt.base.units import G0, INCH
 from bemt.data.readers import uiuc
 from bemt.data.readers.uiuc_names import class_of
+from bemt.data.readers.uiuc import UiucPropeller
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.rotors.case import case_of, fresh
@@ -74,8 +75,8 @@ def beside(source: str, kind: str | None, width: int, size: tuple[float, float, 
     return Labelled(source, kind, width, blades, D, at, (ends[1] - ends[0]) / math.log(1.1 / 0.9), y)
 
 
-def of_uiuc(folders: Sequence[Path]) -> Iterator[Labelled]:
-    """Every measured propeller with a pitch, whether its stations are known or not."""
+def readings(folders: Sequence[Path]) -> Iterator[tuple[UiucPropeller, Array, Array, Array]]:
+    """Every measured propeller with a pitch: rpm, J, CT and CP, (2, P), of up to four static and ten flight points."""
     for p in (p for folder in folders for p in uiuc.scan_folder(folder).propellers):
         if not p.pitch_in or not (p.statics or p.lines):
             continue
@@ -86,8 +87,13 @@ def of_uiuc(folders: Sequence[Path]) -> Iterator[Labelled]:
         keep = np.concatenate([r[np.unique(np.linspace(0, r.size - 1, min(n, r.size)).round().astype(int))]
                                for r, n in zip(rows, (4, 10), strict=True) if r.size] or [rows[0]])  # fmt: skip
         if keep.size:
-            size = (p.diameter_in, p.pitch_in, p.blades)
-            yield beside("uiuc", class_of(p.family), 0, size, rpm[keep], J[keep], np.array([CT, CP])[:, keep])
+            yield p, rpm[keep], J[keep], np.array([CT, CP])[:, keep]
+
+
+def of_uiuc(folders: Sequence[Path]) -> Iterator[Labelled]:
+    """Every measured propeller with a pitch, whether its stations are known or not."""
+    for p, rpm, J, y in readings(folders):
+        yield beside("uiuc", class_of(p.family), 0, (p.diameter_in, p.pitch_in, p.blades), rpm, J, y)
 
 
 def of_drivecalc(file: Path) -> Iterator[Labelled]:
