@@ -6,11 +6,11 @@ import json
 from pathlib import Path
 
 import pytest
-from bemt.app.cli import main
 from bemt.app.library import propeller
 from diagnosing import case, points, recording
 
 import bemt
+from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 from bemt.physics.dataset import Dataset
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import runpy
 import shlex
@@ -74,8 +75,10 @@ def test_the_quick_start_runs_as_printed(
             monkeypatch.setattr(sys, "argv", words[1:])
             runpy.run_path(str(ROOT / words[1]), run_name="__main__")
         shown += capsys.readouterr().out
-    verdict = re.search(r"offset_deg ([\d.]+)", shown)
-    assert verdict is not None and abs(float(verdict[1]) - 1.5) < 0.3
+    told = json.loads(Path("diagnosis/diagnosis.json").read_text(encoding="utf-8"))
+    first = told["ranking"][0]
+    assert told["effects"][0] == first["effect"] == "pitch_offset" and len(told["effects"]) <= 2
+    assert abs(first["parameters"]["offset_deg"]["value"] - 1.5) < 0.3
     assert re.search(r"^ +pitch_offset .* no  ", shown, flags=re.M)
     assert main(["diagnose", "after.csv", "--case", "prop_10x5"]) == 0
     assert "verdict: insufficient" in capsys.readouterr().out

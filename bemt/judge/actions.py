@@ -103,8 +103,8 @@ def diagnose(
     from bemt.judge.diagnose.ask import diagnosed
 
     return diagnosed(
-        recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
-        channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
+        recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
+        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
         out=out, figures=figures, progress=progress,
     )  # fmt: skip
 

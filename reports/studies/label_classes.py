@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from bemt.base.units import G0, INCH
 from bemt.data.readers import uiuc
-from bemt.data.readers.uiuc_names import class_of
 from bemt.data.readers.uiuc import UiucPropeller
+from bemt.data.readers.uiuc_names import class_of
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.rotors.case import case_of, fresh
