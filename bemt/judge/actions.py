@@ -104,8 +104,8 @@ def diagnose(
 
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
-        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
-        out=out, figures=figures, progress=progress,
+        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
+        repeatability_pct=repeatability_pct, along=along, out=out, figures=figures, progress=progress,
     )  # fmt: skip
 
 
