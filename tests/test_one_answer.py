@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from bemt.app.library import propeller
 from diagnosing import case, points, recording
 
 import bemt
+from bemt import propeller
 from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 from bemt.physics.dataset import Dataset

@@ -289,7 +289,7 @@ def validate(
     folders : path or sequence of paths
         Folders with geometry, static and J files, or ``uiuc`` for the installed data.
     reynolds : float, optional
-        Section tables at this one Reynolds number.
+        Section tables at this one Reynolds number. [1]
     off : sequence of str
         Effects to switch off.
     match_J0 : bool

@@ -68,8 +68,8 @@ TIP_IN_WATER = 40.0
 """Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
 POWER_BAND = 0.7
 """Standard uncertainty of the power at a thrust over the scatter of the draws: on 261 readings of six stands the rms of
-the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err together
-more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
+the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err
+together more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
@@ -157,15 +157,19 @@ def choose(
         Labels to try, as ``10x5`` or ``9x4.5x3``; standard sizes by default.
     blades : int or sequence of int
         Of the standard sizes.
-    mass_kg, rotors : optional
-        Vehicle; power, current and time are then those of hover instead of those at `thrust_N`.
+    mass_kg : float, optional
+        Mass of the vehicle; power, current and time are then those of hover instead of those at `thrust_N`. [kg]
     rest_kg : float, optional
         Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
         this and what it weighs itself (:mod:`bemt.tools.design.masses`). [kg]
-    airspeed_m_s, max_diameter_in, max_tip_mach : optional
-        Flight speed [m/s], limit on size [in] and on the helical tip Mach number at `thrust_N`.
+    rotors : int
+        Rotors that carry the vehicle.
+    airspeed_m_s, max_diameter_in : float, optional
+        Flight speed [m/s], limit on size [in].
     arm_mm : float, optional
         From the middle of the frame to a shaft, or from the only shaft to what is next to it: limits the diameter. [mm]
+    max_tip_mach : float
+        Limit on the helical tip Mach number at `thrust_N`. [1]
     capacity_Ah, minutes : optional
         Battery capacity; with it, time in hover that is part of the target [min].
     fan : bool
