@@ -5,8 +5,8 @@ form:
 
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
-with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by its
-K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
+with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
 class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v and
 voltage, as in `drive`. Idle current and battery take the
 shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
@@ -186,8 +186,8 @@ def choose(
     -------
     pandas.DataFrame
         A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass of one
-        rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass of
+        one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
         first.
 
     Raises
