@@ -79,7 +79,8 @@ class Builder:
         """Add a stand's own column in its usual unit or in the one that its heading states; no such unit is a fault."""
         head = usual(self.table.headings[index].strip(), base, unit)
         if head.unit is None:
-            self.fault(f"{self.table.headings_line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
+            top = self.table.headings_line if isinstance(self.table, SplitTable) else 1
+            self.fault(f"{top}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
         else:
             self.add(index, head)
 
