@@ -128,7 +128,7 @@ MUTANTS = (
     Mutant(f"{X}gazebo.py", "{kQ / kT:.12e}", "{kT / kQ:.12e}", EXPORTS.format("gazebo")),
     Mutant(f"{X}rotorpy.py", "float(scale * a)", "float(2.0 * scale * a)", EXPORTS.format("rotorpy")),
     Mutant(f"{X}ardupilot.py", "ROTORS * np.pi * t.diameter_m**2 / 4.0", "ROTORS * np.pi * t.diameter_m**2",
-           EXPORTS.format("ardupilot")),
+           "test_exports.py -k sweeps_its_disks"),
     Mutant(f"{X}rotor_disk.py", "cl = thrust / (q * p.blades)", "cl = thrust / q", "test_exports.py -k own_formula"),
     Mutant(f"{X}xrotor.py", "{p.Rhub / p.R:.10g} {p.Rhub / p.R:.10g}", "{p.Rhub:.10g} {p.Rhub:.10g}", EXPORTS.format("xrotor")
            .replace("nobody_fitted", "(nobody_fitted or comes_back)")),
