@@ -68,7 +68,7 @@ def choose(
     fan : bool
         Ducted fans on sale, 30 to 120 mm, instead of propellers.
     fluid : {"air", "water"}
-        What the propeller turns in; in water, too little blade area for the thrust is refused: it cavitates.
+        What the propeller turns in; in water, too little blade area for the thrust is named: it may cavitate.
     coaxial : bool
         Each propeller is one of a pair, one above the other.
     sure : float

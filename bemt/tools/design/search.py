@@ -175,7 +175,7 @@ def choose(
     fan : bool
         Ducted fans on sale, 30 to 120 mm, instead of propellers.
     fluid : {"air", "water"}
-        What the propeller turns in; in water a blade area too small for the thrust is refused (Keller's criterion).
+        What the propeller turns in; in water a blade area too small for the thrust is named (Keller's criterion).
     coaxial : bool
         Each propeller is one of a pair, one above the other; `rotors` counts both.
     sure : float
@@ -460,8 +460,6 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
     mach = np.broadcast_to(loads.tip_mach(n_full, target.airspeed_m_s), duty.shape)
     met = np.isfinite(duty) & (mach <= target.max_tip_mach)
-    if target.fluid == "water":
-        met &= np.broadcast_to(asked <= loads.keller_N, met.shape)
     minutes = 60.0 * (1.0 - SOC_END) * (target.capacity_Ah or 1.0) / target.rotors / amps
     if target.minutes is not None:
         met &= minutes >= target.minutes
@@ -516,7 +514,7 @@ def _reasons(table: pd.DataFrame, target: Target, sure: float) -> list[str]:
         if row.tip_mach > target.max_tip_mach:
             words.append(f"tip Mach {row.tip_mach:.2f}")
         if target.fluid == "water" and row.asked_N > row.keller_N:
-            words.append(f"cavitates above {row.keller_N:.3g} N")
+            words.append(f"may cavitate: wants wider blades above {row.keller_N:.3g} N")
         if target.minutes is not None and row.minutes < target.minutes:
             words.append(f"{row.minutes:.1f} min")
         if not words and row.probability < sure:
