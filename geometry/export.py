@@ -275,9 +275,7 @@ def _step(
             "solids": [part for _, part, _ in parts.solids], "faces": faces}  # fmt: skip
 
 
-def _flow(
-    rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel
-) -> dict[str, Any]:
+def _flow(rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel) -> dict[str, Any]:
     """Air round the parts, in a box, its faces named; read back it must be one valid solid of the same volume."""
     cq = needs("cadquery", "cad")
 

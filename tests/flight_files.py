@@ -164,9 +164,7 @@ def dataflash(
     return bytes(out)
 
 
-def ulog(
-    flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0, motors: bool = True
-) -> bytes:
+def ulog(flight: Hover, imu_hz: float = 200.0, fifo: bool = False, airframe: int = 0, motors: bool = True) -> bytes:
     """A ULog: parameters of the allocation, actuator_motors, esc_status, sensors, attitude, position, battery.
 
     With the number of an airframe it is one of before the allocation: pulse widths, and no speeds; below zero, of the

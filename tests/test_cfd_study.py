@@ -22,6 +22,7 @@ from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all
 from bemt.judge.import_files import import_
 from bemt.physics.dataset import Dataset
+from bemt.results.report.audit_block import study_parts
 from bemt.rotors.case import load_case
 
 SPEEDS, LOADS = (0.0, 5.0, 10.0, 15.0), (7.6, 6.0, 4.0, 1.5)
@@ -264,3 +265,17 @@ def test_a_heading_that_is_repeated_ten_thousand_times_costs_no_more_than_anothe
     assert time.perf_counter() - start < 5.0
     assert len(set(made)) == len(made) and made[:3] == ["x", "x#2", "x#3"] and made[-2:] == ["x#7", "y"]
     assert made[6] == "x#8"  # a heading of the file keeps its name
+
+
+def test_a_study_in_the_folder_of_a_case_stands_for_the_runs_that_it_names(
+    project: Path, tmp_path: Path, runs: list[str]
+) -> None:
+    (tmp_path / "case.toml").write_bytes((project / "cases" / "prop_8x5" / "case.toml").read_bytes())
+    (tmp_path / "references.csv").write_bytes((project / "cases" / "prop_8x5" / "references.csv").read_bytes())
+    case = load_case(tmp_path / "case.toml")
+    assert [p.name for p in case.run_paths] == sorted(Path(r).name for r in runs)
+    study = write_run(run_from(runs), str(tmp_path / "study.toml"))
+    assert case.run_paths == (study,)
+    assert {Path(r).name for r in runs} | {"study.toml"} <= {p.name for p in case.files()}
+    (_, figures), *_ = study_parts([s.document() for s in import_file(study).provenance["studies"]])
+    assert len(figures) == 2 and "order 2.22, 7.67" in figures[0]["note"]

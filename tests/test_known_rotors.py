@@ -182,7 +182,9 @@ def test_three_blades_of_racers_are_those_of_a_stand(shared_data: Path) -> None:
 
 
 def test_one_motor_turns_a_smaller_propeller_faster() -> None:
-    small, large = (drive_result.solve(drive_result.with_drive(rotor_of(label).case, kv=920, cells=3)) for label in ("9x4", "12x6"))
+    small, large = (
+        drive_result.solve(drive_result.with_drive(rotor_of(label).case, kv=920, cells=3)) for label in ("9x4", "12x6")
+    )
     assert small.drive.motor.resistance_ohm == pytest.approx(large.drive.motor.resistance_ohm)
     for one in (small, large):  # by hand: k (I - I0) is the torque at the speed that U - R I leaves
         motor, n = one.drive.motor, one.full["rpm"].value
@@ -206,7 +208,9 @@ def test_a_motor_by_name() -> None:
     pytest.importorskip("pythrust", reason="the optional package setuav-pythrust is not installed")
     one = named_motor("T-Motor MN2212 920")
     assert one.kv == 920.0 and one.resistance_mohm and one.no_load_A and "Apache-2.0" in one.source
-    motor = drive_result.solve(drive_result.with_drive(rotor_of("9x4.5").case, "T-Motor MN2212 920", cells=3)).drive.motor
+    motor = drive_result.solve(
+        drive_result.with_drive(rotor_of("9x4.5").case, "T-Motor MN2212 920", cells=3)
+    ).drive.motor
     assert motor.kv_rpm_V == 920.0 and motor.resistance_ohm == pytest.approx(1e-3 * one.resistance_mohm)
     with pytest.raises(InputError, match="KV780"):
         named_motor("MN2212")

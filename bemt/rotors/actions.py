@@ -81,9 +81,7 @@ def estimate(
     from bemt.rotors.case.estimate import of_label
 
     density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3, finite=False)
-    return of_label(
-        label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg, reading
-    )
+    return of_label(label, rpm, airspeed_m_s, blades, chord_mm, measured_pitch_in, series, density, angle_deg, reading)
 
 
 @action(

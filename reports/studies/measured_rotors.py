@@ -67,7 +67,7 @@ def record(seen: Observed, p: Population) -> MeasuredRotor:
     mean, sd, rpm, J, y, single = smooth(seen, p)
     case = case_of(case_text(seen), ends=False)
     D = case.diameter_m
-    scale = (np.array([one.diameter_m / D]) ** np.array([[4.0], [5.0]]))  # labels are rounded
+    scale = np.array([one.diameter_m / D]) ** np.array([[4.0], [5.0]])  # labels are rounded
     V = J * rpm / 60.0 * D
     found = as_measured(case, rpm, V, Air.from_density(), *(y * scale), *(single * scale), others=apart(D))
     at, kept = found.reference.at, case.file.blade

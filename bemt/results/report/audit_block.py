@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.data.recordings.audit import Audit
@@ -31,10 +32,10 @@ def audit_parts(audit: Audit) -> list[Part]:
     return [("words", words), ("table", table(head, rows))]
 
 
-def study_parts(studies: Sequence[LoadStudy]) -> list[Part]:
+def study_parts(studies: Sequence[Mapping[str, Any]]) -> list[Part]:
     """Grid studies: a picture each, values over the size of the cells down to zero, and what they say."""
     figures = []
-    for s in studies:
+    for s in map(LoadStudy.from_document, studies):
         h = [(s.cells[0] / n) ** (1.0 / 3.0) for n in s.cells]
         unit = f" [{LOADS[s.channel]}]" if LOADS[s.channel] else ""
         u = [s.u_relative * abs(s.values[0]), *[math.nan] * (len(h) - 1)]

@@ -180,7 +180,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
         audit=tuple(_audit(r, ready, case.ducted) for r in beside if r.source == "cfd"),
-        grid_studies=tuple(s for _, d in computed for s in d.provenance.get("studies", ())),
+        grid_studies=tuple(s.document() for _, d in computed for s in d.provenance.get("studies", ())),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
         references=tuple(Stated(r.quantity, r.kind, r.printed, r.value, r.u, r.channel, r.source, r.remark)

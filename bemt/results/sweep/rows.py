@@ -13,7 +13,6 @@ from typing import Any
 
 from bemt.base.document import Documented
 from bemt.data.recordings.audit import Audit
-from bemt.data.recordings.grid_study import LoadStudy
 from bemt.results.sweep.comparison import Comparison
 
 ROW_SOURCES = ("bemt", "k1k2", "cfd", "bench", "vendor")
@@ -211,7 +210,7 @@ class Result(Documented):
     other_rows: tuple[Row, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
     audit: tuple[Audit, ...] = ()
-    grid_studies: tuple[LoadStudy, ...] = ()
+    grid_studies: tuple[Mapping[str, Any], ...] = ()  # Documents of `LoadStudy`
     conditions: Conditions | None = None
     assumptions: tuple[AssumptionRow, ...] = ()
     references: tuple[Stated, ...] = ()

@@ -110,7 +110,12 @@ def _latest(days: Sequence[int]) -> int:
 
 
 def weighed(
-    flight: Array, calm: Array, layout: Array | None, alarm: float, windy: bool = False, days: Sequence[int] = (),
+    flight: Array,
+    calm: Array,
+    layout: Array | None,
+    alarm: float,
+    windy: bool = False,
+    days: Sequence[int] = (),
     day: int | None | str = 0,
 ) -> tuple[FlightQuery, FlightVerdict]:
     """Weigh all explanations; gives what the rules ask, and the answer that has no decision yet."""

@@ -26,9 +26,7 @@ class Sessions:
     by: str  # What tells: "stated", "date", or empty where nothing does
 
 
-def sessions(
-    flight: FlightLog, healthy: Sequence[FlightLog], stated: Sequence[str] = (), day: str = ""
-) -> Sessions:
+def sessions(flight: FlightLog, healthy: Sequence[FlightLog], stated: Sequence[str] = (), day: str = "") -> Sessions:
     """Group healthy flights, and place the judged one.
 
     Parameters

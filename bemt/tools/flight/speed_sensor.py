@@ -170,9 +170,7 @@ def _mode(mine: Array, other: Array) -> float:
     return float(np.median(x[np.abs(x - peak) < 0.1]))
 
 
-def _repaired(
-    log: FlightLog, on: NDArray[np.bool_], reading: Array, root: Array, best: _Reading
-) -> FlightLog:
+def _repaired(log: FlightLog, on: NDArray[np.bool_], reading: Array, root: Array, best: _Reading) -> FlightLog:
     """The log with the speeds that the evidence leaves."""
     assert log.rpm is not None
     rpm, out = log.rpm.copy(), []

@@ -35,8 +35,11 @@ _CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time", "time_s
 _USED = re.compile(r"t|t_s|time|time_s|timestamp|p|v|R|w|fa|pwm"
                    r"|(motor|pwm|rpm|acc|gyro|pm|stateEstimate|controller)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
-_SPEED = re.compile(r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?"
-                    r"|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm", re.IGNORECASE)
+_SPEED = re.compile(
+    r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?"
+    r"|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm",
+    re.IGNORECASE,
+)
 """Headings of the speed of one rotor: rpm1, rpm_1, motor_1_rpm, esc.rpm[0]."""
 _CLOCK = r"\btime\b|\btime_s\b|\bt\b|\bt_s\b|loopIteration|\btimestamp\b"
 _HEAD_BYTES = 1 << 18  # within which the headings stand
