@@ -49,7 +49,7 @@ def class_resistance(table: DriveTable) -> float:
     """Resistance of winding, controller and leads together, of the class of a motor [ohm].
 
     >>> round(1e3 * class_resistance(DriveTable(kv=900, cells=3)))
-    150
+    139
     """
     m = table.motor
     mass = m.mass_g if m.mass_g is not None else None if m.stator is None else stator_mass_g(m.stator)
