@@ -160,11 +160,16 @@ class Propagated:
         A stand that nobody calibrated has `bemt.rotors.reference.STAND` besides, a rotor that others measured their
         campaign; a rotor that its own run calibrated is met again on that stand.
         """
-        return np.asarray(np.sqrt(self.points.u[channel] ** 2 + self.stand.get(channel, 0.0)))
+        return self._on_stand(channel, self.points.u[channel], 1.0)
 
     def reading95(self, channel: str) -> Array:
         """Half width of the 95 % interval of what a stand shows, (P,)."""
-        return np.asarray(np.sqrt(self.half_width95(channel) ** 2 + 4.0 * self.stand.get(channel, 0.0)))
+        return self._on_stand(channel, self.half_width95(channel), 2.0)
+
+    def _on_stand(self, channel: str, half: Array, times: float) -> Array:
+        """A band with what the stand adds or takes; never narrower than a session repeats itself."""
+        least = (times * SESSION * self.points[channel]) ** 2
+        return np.asarray(np.sqrt(np.maximum(half**2 + times**2 * self.stand.get(channel, 0.0), least)))
 
     def carry(self, answer: Callable[[Answers], Answers]) -> tuple[dict[str, Array], dict[str, dict[str, Array]]]:
         """Carry the bands through any function of the channels at all points: its values, and their u by origin.
