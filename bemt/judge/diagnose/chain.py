@@ -168,10 +168,10 @@ def _with_drive(loads: loss.Decision, drive: loss.Decision) -> loss.Decision:
         return loads
     if loads.verdict not in loss.CLAIMS:
         return replace(drive, by="drive")
-    exact = {loads.verdict, drive.verdict} <= {"named", "sensor"}
-    sets = (*(loads.sets or (loads.effects,)), *(drive.sets or (drive.effects,)))
-    return replace(loads, verdict="named" if exact else "class", effects=(*loads.effects, *drive.effects), sets=sets,
-                   probability=min(loads.probability, drive.probability), by="both", beside=False)  # fmt: skip
+    if "class" in (loads.verdict, drive.verdict):  # a load that changed somehow changes the speed as well
+        return loads
+    return replace(loads, verdict="named", effects=(*loads.effects, *drive.effects), by="both",
+                   sets=(*loads.sets, *drive.sets), probability=min(loads.probability, drive.probability))  # fmt: skip
 
 
 def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:

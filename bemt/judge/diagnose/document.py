@@ -296,7 +296,7 @@ def headline(d: Diagnosis) -> str:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
         apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause above {LEAST:.0%}: {apart}, no more than runs do; from the model, {off}."
+        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model, {off}."
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":

@@ -186,9 +186,9 @@ def choose(
     -------
     pandas.DataFrame
         A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass of
-        one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
-        first.
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass
+        of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is
+        not the first.
 
     Raises
     ------
@@ -290,8 +290,9 @@ def _target(
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
         raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
+    arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
-                  thrust_N is not None, fluid, coaxial, fan, True, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
+                  thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
