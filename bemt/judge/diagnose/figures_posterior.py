@@ -65,7 +65,8 @@ def _words(setting: dict[str, Any]) -> str:
 
 def posterior(answer: Diagnosis) -> Figure | None:
     """Draw one panel per parameter, or a map of two."""
-    if max((answer.found.inclusion[i] for i in answer.best.ids), default=0.0) < _LEAST:
+    likely = max((answer.found.inclusion[i] for i in answer.best.ids), default=0.0) >= _LEAST
+    if not answer.best.ids or not (likely or set(answer.best.ids) & set(answer.decision.effects)):
         return None
     panels = []
     for i, p in fit.weights(answer.found, Explanation.of(*answer.best.ids)).items():
