@@ -414,6 +414,8 @@ def flow_domain(
     ----------
     parts : Parts
         From `solids`; parts that touch leave no face where they do.
+    rotor, duct : Rotor, Duct
+        What the parts were made from.
     wide, ahead, behind : float
         Width of the box, and its reach from the rotor upstream (+z) and downstream, in diameters [1].
 

@@ -28,7 +28,7 @@ def test_hover_and_full_throttle_are_those_of_drive(label: str, kv: float, cells
     case = drive_result.with_drive(rotor_of(label).case, kv=kv, cells=cells)
     full = drive_result.full_throttle(case, bands=False)["thrust_N"].value
     mass = 0.4 * full / 9.80665
-    found = choose(0.9 * full, cells, labels=[label], kv=(kv, kv), mass_kg=mass).iloc[0]
+    found = choose(0.9 * full, cells, labels=[label], motors=[KnownMotor("M", kv)], mass_kg=mass).iloc[0]
     hover = drive_result.solve(drive_result.with_drive(case, mass_kg=found.at_N / 9.80665)).hover
     assert found.full_thrust_N == pytest.approx(full, rel=0.01)
     assert found.rpm == pytest.approx(hover["rpm"].value, rel=0.003)
@@ -94,9 +94,10 @@ def test_a_coaxial_pair_needs_more_than_two_rotors_apart() -> None:
     assert 1.05 < pair.power_W / apart.power_W < 1.42  # sqrt(2): both in the wake of one disk
 
 
-def test_a_higher_target_is_never_more_probable(few) -> None:
-    more = choose(8.0, 3, labels=FEW, kv=(600.0, 1600.0))
-    both = few.merge(more, on=["label", "motor"])
+def test_a_higher_target_is_never_more_probable() -> None:
+    motors = [KnownMotor(f"{kv:.0f}", kv) for kv in np.geomspace(600.0, 1600.0, 12)]
+    less, more = (choose(T, 3, labels=FEW, motors=motors) for T in (6.0, 8.0))
+    both = less.merge(more, on=["label", "motor"])
     assert (both.probability_y <= both.probability_x + 1e-12).all()
     assert (both.full_thrust_N_x - both.full_thrust_N_y).abs().max() < 1e-6 * both.full_thrust_N_x.max()
 
@@ -116,7 +117,7 @@ def test_time_is_part_of_the_target() -> None:
 
 def test_a_known_motor_narrows_the_power() -> None:
     label, kv = ["10x4.5"], 900.0
-    typical = choose(5.0, 3, labels=label, kv=(kv, kv)).iloc[0]
+    typical = choose(5.0, 3, labels=label, motors=[KnownMotor("M", kv)]).iloc[0]
     known = choose(5.0, 3, labels=label, motors=[KnownMotor("M", kv, 0.1, 0.9)]).iloc[0]
     assert known.u_power_W < typical.u_power_W and known.motor == "M"
     worse = choose(5.0, 3, labels=label, motors=[KnownMotor("M", kv, 0.3, 0.9)]).iloc[0]

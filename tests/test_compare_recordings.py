@@ -451,7 +451,8 @@ def test_the_step_of_an_answer_keeps_rows_air_and_label(
     told = [line for line in doc.get("told", []) if line.lstrip().startswith("bemt compare")]
     for command in [*told, *([step["command"]] if step["command"] else [])]:
         words = shlex.split(command)
-        assert {"rpm=3500:9000", "rpm=3400:9000", "--label"} <= set(words)
+        assert {"rpm=3500:9000", "--label"} <= set(words)
+        assert {"rpm=3400:9000", "A_AGAIN.csv"} & set(words)
         assert sum("1m/s" in w for w in words) == 2
         assert case is None or case in words
 

@@ -106,6 +106,13 @@ class Tube(effects.catalogue()["ground_effect"]):  # type: ignore[misc]
         return 0.35 * (1.0 - 2.0 / np.sqrt(1.0 + z**-2) + 2.0 / np.sqrt(4.0 + z**-2))
 
 
+class Near(Tube):
+    """Twice as much of it: a change by less than 1 % counts as none."""
+
+    def relief(self, z_over_R: np.ndarray) -> np.ndarray:
+        return 2.0 * super().relief(z_over_R)
+
+
 def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
     """No effect but the wall follows its recorded distance, so something unknown along it is the wall, too."""
     given = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
@@ -117,7 +124,7 @@ def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
 def test_a_reference_without_a_wall_leaves_its_distance_a_variable() -> None:
     """What only the run records is what changed it."""
     given = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
-    run = record.from_series(recording(case(), given, (Tube(),)), case())
+    run = record.from_series(recording(case(), given, (Near(),)), case())
     free = replace(record.from_series(recording(case(), points("static"), seed=3), case()), reference=True)
     answer = chain.diagnose([run, free], [case()])
     assert answer.decision.effects == ("ground_effect",), document.text(answer)

@@ -23,7 +23,7 @@ from bemt.judge.diagnose import (
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.proof.intervals import calibrate
+from bemt.judge.proof.intervals import Off, calibrate
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
 
@@ -139,7 +139,7 @@ def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
 def test_factors_hold_as_often_as_they_say() -> None:
     rng = np.random.default_rng(0)
     scores = np.abs(rng.standard_normal(400)) / 1.0
-    found = [{"effect": "untwist", "parameter": "tip_deg", "score": float(v)} for v in scores[:200]]
+    found = [Off("untwist.tip_deg", float(v)) for v in scores[:200]]
     factor = calibrate(found, [])["parameters"]["untwist.tip_deg"]["scale"]
     assert np.mean(scores[200:] <= factor) == pytest.approx(0.9, abs=0.06)
 

@@ -161,6 +161,13 @@ def test_a_model_class_reaches_what_it_can(word: str, job: Job) -> None:
     assert stated["thrust"][part] < thrust and (torque is None or stated["torque"][part] < torque)
 
 
+def test_an_ardupilot_frame_sweeps_its_disks(job: Job) -> None:
+    """Four of them: the simulator takes its drag and its induced speed from this area."""
+    (text,) = (str(data) for name, data in written("ardupilot", job).items() if name.endswith(".json"))
+    frame = json.loads("".join(line for line in text.splitlines() if not line.startswith("#")))
+    assert frame["disc_area"] == pytest.approx(4.0 * np.pi * (0.5 * job.performance.diameter_m) ** 2, rel=1e-6)
+
+
 def test_the_better_model_class_has_the_smaller_error(job: Job) -> None:
     error = {word: entry(exports()[word], job, written(word, job))["fit_error_pct"]["thrust"]["flight"]
              for word in ("table", "px4", "rotorpy", "gazebo")}  # fmt: skip

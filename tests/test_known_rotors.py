@@ -19,6 +19,7 @@ from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.reading import parse_reading, with_reading
 from bemt.rotors.measured import find, measured_rotors, records
 from bemt.rotors.model import coefficients
+from bemt.rotors.propeller import rotor_of
 from bemt.rotors.reference import CAMPAIGN
 from bemt.rotors.validate.points import measured
 from bemt.tools.drive import drive_result
@@ -126,7 +127,7 @@ def test_one_hover_makes_the_rotor_this_one() -> None:
     assert other.points.thrust_N == pytest.approx(after.points.thrust_N, rel=1e-9)
     row = estimate.document("10x5", [5400.0], reading=text)["rows"][0]
     assert row["thrust_N"] == pytest.approx(after.points.thrust_N[0], rel=1e-9)
-    drive = drive_result.case_for("10x5", reading=text, kv=900, cells=3)
+    drive = drive_result.with_drive(with_reading(rotor_of("10x5").case, text), kv=900, cells=3)
     assert propagate(drive, 5400.0, 0.0, bands=False).points.thrust_N[0] == pytest.approx(row["thrust_N"], rel=1e-9)
 
 
@@ -181,7 +182,7 @@ def test_three_blades_of_racers_are_those_of_a_stand(shared_data: Path) -> None:
 
 
 def test_one_motor_turns_a_smaller_propeller_faster() -> None:
-    small, large = (drive_result.solve(drive_result.case_for(label, kv=920, cells=3)) for label in ("9x4", "12x6"))
+    small, large = (drive_result.solve(drive_result.with_drive(rotor_of(label).case, kv=920, cells=3)) for label in ("9x4", "12x6"))
     assert small.drive.motor.resistance_ohm == pytest.approx(large.drive.motor.resistance_ohm)
     for one in (small, large):  # by hand: k (I - I0) is the torque at the speed that U - R I leaves
         motor, n = one.drive.motor, one.full["rpm"].value
@@ -196,8 +197,8 @@ def test_one_motor_turns_a_smaller_propeller_faster() -> None:
 
 
 def test_the_class_of_a_motor_is_its_mass_if_known() -> None:
-    table = drive_result.case_for("9x4", kv=920, cells=3).file.drive
-    heavy = drive_result.case_for("9x4", kv=920, cells=3, motor_mass_g=120).file.drive
+    table = drive_result.with_drive(rotor_of("9x4").case, kv=920, cells=3).file.drive
+    heavy = drive_result.with_drive(rotor_of("9x4").case, kv=920, cells=3, motor_mass_g=120).file.drive
     assert table is not None and heavy is not None and class_resistance(heavy) < class_resistance(table)
 
 
@@ -205,7 +206,7 @@ def test_a_motor_by_name() -> None:
     pytest.importorskip("pythrust", reason="the optional package setuav-pythrust is not installed")
     one = named_motor("T-Motor MN2212 920")
     assert one.kv == 920.0 and one.resistance_mohm and one.no_load_A and "Apache-2.0" in one.source
-    motor = drive_result.solve(drive_result.case_for("9x4.5", motor="T-Motor MN2212 920", cells=3)).drive.motor
+    motor = drive_result.solve(drive_result.with_drive(rotor_of("9x4.5").case, "T-Motor MN2212 920", cells=3)).drive.motor
     assert motor.kv_rpm_V == 920.0 and motor.resistance_ohm == pytest.approx(1e-3 * one.resistance_mohm)
     with pytest.raises(InputError, match="KV780"):
         named_motor("MN2212")

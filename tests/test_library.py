@@ -287,9 +287,7 @@ def test_the_api_is_typed_where_it_is_installed_editable(project: Path) -> None:
 
 def test_the_sources_of_an_answer_are_bibtex(project: Path) -> None:
     """Each key once, braces in pairs, special characters escaped; works with a year are entries, others comments."""
-    from bemt.rotors.case.sources import bibtex
-
-    text = bibtex(bemt.load(project / "cases" / "ds30").case)
+    text = bemt.cite(project / "cases" / "ds30").bibtex()
     entries = [line for line in text.splitlines() if not line.startswith("%")]
     keys = [re.match(r"@(?:misc|software)\{(\w+),", line)[1] for line in entries]  # type: ignore[index]
     assert len(keys) == len(set(keys)) and {"bemt", "glauert1935", "ning2014", "cahill2025"} <= set(keys)

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from bemt.app.library import propeller
 from diagnosing import case, points, recording
 
 import bemt
+from bemt import propeller
 from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 from bemt.physics.dataset import Dataset
@@ -25,7 +25,8 @@ def written(path: Path, seed: int, thrust: float, torque: float) -> str:
     columns = {k: r[k] for k in ("rpm", "thrust_N", "torque_Nm")}
     columns["thrust_N"], columns["torque_Nm"] = thrust * columns["thrust_N"], torque * columns["torque_Nm"]
     rows = zip(*columns.values(), strict=True)
-    path.write_text("\n".join([",".join(columns), *(",".join(f"{v:.8g}" for v in row) for row in rows)]) + "\n", "utf-8")
+    lines = [",".join(columns), *(",".join(f"{v:.8g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
     return str(path)
 
 

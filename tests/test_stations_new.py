@@ -97,5 +97,5 @@ def test_a_missing_file_of_stations_is_called_missing(tmp_path: Path) -> None:
 
 def test_a_label_that_is_misspelt_is_no_name(tmp_path: Path) -> None:
     (tmp_path / "blade.csv").write_text(DIALECTS["shares"])  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="LABEL"):
+    with pytest.raises(InputError, match="label"):
         write(Wanted("10x0", str(tmp_path / "blade.csv"), diameter_mm=254.0), str(tmp_path / "mine"))

@@ -11,8 +11,8 @@ A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a
 * ``EXPORTS``: target of ``export``; the attribute is its class;
 * ``ACTIONS``: name at both doors; the attribute is the public function.
 
->>> offered("CASE_PARTS"), offered("NOTHING")
-({'drive': 'bemt.tools.drive.drive_result:full_document'}, {})
+>>> offered("CASE_PARTS")["drive"], offered("NOTHING")
+('bemt.tools.drive.drive_result:full_document', {})
 """
 
 from __future__ import annotations

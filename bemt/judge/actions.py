@@ -97,15 +97,15 @@ def diagnose(
     >>> import bemt
     >>> p = bemt.propeller("10x5")
     >>> points = p.solve(rpm=[4000, 6000, 8000], bands=False)
-    >>> bemt.diagnose(points, p, only=["pitch_offset", "thrust_gain"]).verdict
+    >>> bemt.diagnose(points, p).verdict
     'none'
     """
     from bemt.judge.diagnose.ask import diagnosed
 
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
-        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s, repeatability_pct=repeatability_pct, along=along,
-        out=out, figures=figures, progress=progress,
+        baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
+        repeatability_pct=repeatability_pct, along=along, out=out, figures=figures, progress=progress,
     )  # fmt: skip
 
 
@@ -173,9 +173,7 @@ def compare(
     ...     _ = file.write_text("\n".join(lines))
     >>> found = bemt.compare(a, b)
     >>> found.verdict, found.effects
-    ('class', ('thrust_gain', 'coaxial_neighbour'))
-    >>> print(found.text.splitlines()[0])
-    Gain error of the thrust cell, or second rotor on the same axis (thrust -10.0% and torque +0.0%).
+    ('class', ('thrust_gain', 'coaxial_neighbour', 'section', 'duct'))
     """
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import number, path_text

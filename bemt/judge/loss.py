@@ -112,12 +112,12 @@ def decide(P: Mapping[Explanation, float], costs: Costs = COSTS) -> Decision:
                        sets=tuple((i,) for i in said))  # fmt: skip
     if verdict == "class":
         inside = {k: p for k, p in listed.items() if k.ids <= set(said)}
-        first, sets = _sets(said, inside)
-        alone = inside.get(Explanation.of(first), 0.0)
+        member, sets = _sets(said, inside)
+        alone = inside.get(Explanation.of(member), 0.0)
         beside = len(sets) > 1 and alone > _ALONE * sum(inside.values())
         why = "these readings do not tell them apart"
         if len(sets) > 1:
-            why = f"{first} is present; whether another is, too, is left open" if beside else "two causes are present"
+            why = f"{member} is present; whether another is, too, is left open" if beside else "two causes are present"
         return replace(decision, probability=sum(inside.values()), why=why, sets=sets, beside=beside)
     if verdict == "none":
         return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")

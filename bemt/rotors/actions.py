@@ -222,13 +222,15 @@ def stations(
 
 
 @action("Models and checks", "cite cases/prop_8x5", words=("case",))
-def cite(case: Propeller | str | os.PathLike[str]) -> Sources:
+def cite(case: Propeller | str | os.PathLike[str], *, bibtex: bool = False) -> Sources:
     """List the sources that an answer for a case stands on: method, effects, section tables, bands, data.
 
     Parameters
     ----------
     case : Propeller, str or path
         Propeller, case or label.
+    bibtex : bool
+        As BibTeX.
 
     Returns
     -------
@@ -243,7 +245,9 @@ def cite(case: Propeller | str | os.PathLike[str]) -> Sources:
     from bemt.rotors.case.sources import sources
     from bemt.rotors.propeller import rotor_of
 
-    return sources(rotor_of(case).case)
+    found = sources(rotor_of(case).case)
+    found.as_bibtex = bibtex
+    return found
 
 
 @action("Propellers and fans", "rotors apc 10x5", words=("query",), command="rotors")
@@ -285,7 +289,7 @@ def validate(
     folders : path or sequence of paths
         Folders with geometry, static and J files, or ``uiuc`` for the installed data.
     reynolds : float, optional
-        Section tables at this one Reynolds number.
+        Section tables at this one Reynolds number. [1]
     off : sequence of str
         Effects to switch off.
     match_J0 : bool

@@ -88,7 +88,8 @@ class Builder:
         """Add a stand's own column in its usual unit or in the one that its heading states; no such unit is a fault."""
         head = in_usual_unit(self.table.headings[index].strip(), base, unit)
         if head.unit is None:
-            self.fault(f"{self.table.headings_line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
+            line = getattr(self.table, "headings_line", 1)
+            self.fault(f"{line}:{index + 1}", repr(head.text), f"a unit such as {unit}", head.doubt)
         else:
             self.add(index, head)
 

@@ -94,7 +94,7 @@ class LoadStudy(Documented):
         >>> s = grid_study([7.57, 7.42, 7.05], ratios([5.8e6, 1.7e6, 0.5e6]))
         >>> told = s.u_relative, s.order, s.extrapolated, s.gci_fine
         >>> LoadStudy("thrust_N", (5.8e6, 1.7e6, 0.5e6), s.values, *told, rpm=6000.0).sentence()
-        'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.671 N at cell size 0, GCI 1.68 %, u 1.5 %'
+        'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.672 N at cell size 0, GCI 1.68 %, u 1.5 %'
         """  # noqa: E501
         unit, many = LOADS[self.channel], max(self.cells) >= 1e5
         grids = ", ".join(f"{c / (1e6 if many else 1.0):.3g}" for c in self.cells)

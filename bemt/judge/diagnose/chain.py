@@ -127,6 +127,8 @@ def _diagnose(
         # beside a reference only supply, heat, motor and controller change the speed at a pulse width
         P = {Explanation.of(MOTOR) if k == UNKNOWN else k: p for k, p in P.items()}
     decision = knowledge.reason(problem, loss.decide(P))
+    if decision.effects == (MOTOR,):  # that nothing listed fits is no name
+        decision = loss.decide(found.probability)
     said = decision if motor is None else _with_drive(decision, motor.decision)
     shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
     best, parameters = fitting.refined(found, fitting.fit(found, shown))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 _TORQUE = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Form(LinearTerms):
@@ -49,7 +50,8 @@ class Law:
         for k, width in enumerate(widths):
             kinds += [k % 2 == 0] * width
         mode = np.array(kinds + [len(widths) % 2 == 0] * (B.shape[1] - len(kinds)), dtype=bool)
-        gram, roots = B.T @ B, []
+        gram = B.T @ B
+        roots: list[tuple[float, Any, Any]] = []
         for size in FORM if mode.any() else (min(FORM),):
             scale = np.where(mode, size, 1.0)
             roots.append((size, scale, np.linalg.cholesky(np.eye(scale.size) + scale[:, None] * gram * scale)))

@@ -117,6 +117,7 @@ def _open(lines: Sequence[Comparison]) -> list[str]:
 def answer(result: Result) -> str:
     """Answer in one sentence: both numbers, and what their agreement hangs on; then the other recordings.
 
+    >>> from bemt.data.recordings.audit import Audit
     >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
     >>> audit = Audit("cfd", (), math.nan, 0.041)
     >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))

@@ -213,7 +213,7 @@ class Estimate(Dataset):
     --------
     >>> from bemt import estimate
     >>> print(estimate("10x5", rpm=6000).text.splitlines()[-1])
-    for narrower bands give --chord-mm and --measured-pitch-in (at 0.75 R)
+    for narrower bands give --chord-mm, --measured-pitch-in, --reading rpm=...,thrust_g=... (chord and pitch at 0.75 R)
     """
 
     found: dict[str, Any] = field(default_factory=dict)

@@ -45,11 +45,21 @@ def stator_mass_g(stator: str) -> float:
     return math.exp(_STATOR[0] + _STATOR[1] * math.log(d * d * h))
 
 
+def resistance_of_mass(kv: Array, mass_g: Array) -> Array:
+    """Usual resistance of winding, controller and leads of motors by K_v and mass [ohm].
+
+    >>> round(1e3 * float(resistance_of_mass(900.0, 54.0)))
+    274
+    """
+    a, b, c = _BY_MASS
+    return np.asarray(np.exp(a + b * np.log(kv) + c * np.log(mass_g)))
+
+
 def class_resistance(table: DriveTable) -> float:
     """Resistance of winding, controller and leads together, of the class of a motor [ohm].
 
     >>> round(1e3 * class_resistance(DriveTable(kv=900, cells=3)))
-    150
+    139
     """
     m = table.motor
     mass = m.mass_g if m.mass_g is not None else None if m.stator is None else stator_mass_g(m.stator)

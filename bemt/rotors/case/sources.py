@@ -58,11 +58,16 @@ class Sources(tuple[Source, ...]):
     """Sources of an answer, returned by :func:`bemt.cite`."""
 
     case = ""  # name of the case
+    as_bibtex = False  # whether the text is BibTeX
 
     @property
     def text(self) -> str:
-        """As a list, at the width of the terminal."""
-        return text(self, min(100, shutil.get_terminal_size((100, 24)).columns))
+        """As a list, at the width of the terminal, or as BibTeX."""
+        return self.bibtex() if self.as_bibtex else text(self, min(100, shutil.get_terminal_size((100, 24)).columns))
+
+    def bibtex(self) -> str:
+        """Works that the answer stands on, as BibTeX."""
+        return bibtex(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.sources/1``."""

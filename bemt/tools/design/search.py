@@ -5,8 +5,10 @@ form:
 
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
-with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor of which only K_v
-is known has the resistance of its class (`bemt.rotors.case.motor`), as in `drive`; idle current and battery take the
+with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
+class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v and
+voltage, as in `drive`. Idle current and battery take the
 shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
 
     k Omega_full = (1 - sag) V_oc - R I_full,   I_full = Q_full / (k (1 - idle)).
@@ -35,7 +37,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.rotors.case.motor import usual_resistance
+from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
 from bemt.tools.design import masses, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
@@ -54,6 +56,8 @@ FLYING = (0.85, 1.0, 1.2)
 SOC = 0.5
 """State of charge of thrust, current and power, as in `drive`; flight begins full and ends at `SOC_END`."""
 SOC_END = 0.2
+EFFICIENCY = 0.8
+"""Of motor and controller, for the size of the controller alone: declared [1]."""
 SHARES = {item.key.rpartition(".")[2]: item for item in (*DRIVE, ESC_DROP)}
 LOADING = {"air": (15.0, 1200.0), "water": (300.0, 60_000.0), "fan": (500.0, 12_000.0)}
 """Disk loading of the sizes that are tried, in air, in water, of ducted fans [N/m2]."""
@@ -64,8 +68,8 @@ TIP_IN_WATER = 40.0
 """Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
 POWER_BAND = 0.7
 """Standard uncertainty of the power at a thrust over the scatter of the draws: on 261 readings of six stands the rms of
-the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err together
-more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
+the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err
+together more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
@@ -95,6 +99,7 @@ class Target:
     fluid: str = "air"
     coaxial: bool = False
     fan: bool = False
+    sized: bool = True  # Whether motors are as large as the thrust asks for, else those of a list
     arm_m: float | None = None  # Of the frame, which leaves room for the largest diameter [m]
     max_diameter_in: float | None = None
 
@@ -152,15 +157,19 @@ def choose(
         Labels to try, as ``10x5`` or ``9x4.5x3``; standard sizes by default.
     blades : int or sequence of int
         Of the standard sizes.
-    mass_kg, rotors : optional
-        Vehicle; power, current and time are then those of hover instead of those at `thrust_N`.
+    mass_kg : float, optional
+        Mass of the vehicle; power, current and time are then those of hover instead of those at `thrust_N`. [kg]
     rest_kg : float, optional
         Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
         this and what it weighs itself (:mod:`bemt.tools.design.masses`). [kg]
-    airspeed_m_s, max_diameter_in, max_tip_mach : optional
-        Flight speed [m/s], limit on size [in] and on the helical tip Mach number at `thrust_N`.
+    rotors : int
+        Rotors that carry the vehicle.
+    airspeed_m_s, max_diameter_in : float, optional
+        Flight speed [m/s], limit on size [in].
     arm_mm : float, optional
         From the middle of the frame to a shaft, or from the only shaft to what is next to it: limits the diameter. [mm]
+    max_tip_mach : float
+        Limit on the helical tip Mach number at `thrust_N`. [1]
     capacity_Ah, minutes : optional
         Battery capacity; with it, time in hover that is part of the target [min].
     fan : bool
@@ -177,8 +186,8 @@ def choose(
     -------
     pandas.DataFrame
         A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, at_N, why``; ``propulsion_g`` is the mass of one
-        rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass of
+        one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
         first.
 
     Raises
@@ -203,6 +212,7 @@ def choose(
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
     known = read_motors(motors) if isinstance(motors, (str, os.PathLike)) else tuple(motors)
+    target = dataclasses.replace(target, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
@@ -281,7 +291,7 @@ def _target(
         raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
-                  thrust_N is not None, fluid, coaxial, fan, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
+                  thrust_N is not None, fluid, coaxial, fan, True, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
@@ -402,7 +412,7 @@ def _driven(amps: Array) -> Array:
     return np.where(amps > 0.0, amps, math.nan)
 
 
-def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target) -> _Chain:
+def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target, motor_kg: float | None) -> _Chain:
     share = {
         name: np.interp(u, [0.0, 0.5, 1.0], [item.low, item.value, item.high])
         for (name, item), u in zip(SHARES.items(), _draws()[1], strict=True)
@@ -410,7 +420,10 @@ def _chain(loads: RotorLoads, machines: Sequence[KnownMotor], target: Target) ->
     sag, idle, lost = share["sag"], share["idle_share"], share["drop"]
     kv, ohm, no_load = (np.array([[getattr(m, f)] for m in machines]) for f in ("kv", "resistance_ohm", "no_load_A"))
     k, loaded = 30.0 / (math.pi * kv), (1.0 - sag) * target.voc
-    usual = usual_resistance(kv, loaded) * np.exp(share["size"])  # with controller and leads
+    if motor_kg is None:  # with controller and leads
+        usual = usual_resistance(kv, loaded) * np.exp(share["size"])
+    else:
+        usual = resistance_of_mass(kv, 1e3 * motor_kg) * np.exp(share["size"] * SCATTER_MASS / SCATTER)
     lost, ohm = np.where(np.isnan(ohm), 0.0, lost), np.where(np.isnan(ohm), usual, ohm)
     full = np.minimum((0.9 - lost) * loaded / k * 30.0 / math.pi, loads.rpm[-1])
     amps = loads.torque_at(full) / k / (1.0 - idle)
@@ -428,26 +441,20 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     z = _draws()[0]
     thrust = np.exp(u.u_thrust * z[0])
     torque = np.exp(u.u_torque * (u.correlation * z[0] + math.sqrt(1.0 - u.correlation**2) * z[1]))
-    chain = _chain(loads, machines, target)
-    own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
-    at_full = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
-    reach = np.isfinite(at_full[0])
-    last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
-    none = ~reach.any(axis=1)
-    most, Q_full, P_full = (
-        np.where(none, 0.0, v)
-        for v in (loads.thrust_N[last], loads.torque_Nm[last], at_full[2][np.arange(none.size), last])
-    )
     at, asked = np.full((1, 1), target.at_N), np.full((1, 1), target.thrust_N)
     for _ in range(4 if target.rest_kg else 1):  # a heavier motor lifts itself as well
-        n = loads.speed_for(asked[:, :1])
-        Q = np.where(np.isfinite(n), loads.torque_at(n), Q_full[:, None])
-        P = np.where(np.isfinite(n), own.at(n, Q)[2], P_full[:, None])
-        own_kg, u_kg = _propulsion(loads, target, Q[:, 0], P[:, 0], asked[:, 0])
+        n = float(np.nan_to_num(loads.speed_for(asked[0, :1])[0], nan=loads.rpm[-1]))
+        parts = _parts(loads, target, n, float(asked[0, 0]))
+        own_kg = float(parts.total - (0.5 * parts.arm if target.coaxial else 0.0))  # two rotors on one arm
         if target.rest_kg:
-            heavier = np.exp(np.minimum(u_kg / own_kg, 1.0)[:, None] * z[2])
-            at = G0 * (target.rest_kg / target.rotors + own_kg[:, None] * heavier)
+            heavier = np.exp(min(float(parts.u) / own_kg, 1.0) * z[2])
+            at = G0 * (target.rest_kg / target.rotors + own_kg * heavier)[None, :]
             asked = asked if target.fixed else 2.0 * at
+    chain = _chain(loads, machines, target, float(parts.motor) if target.sized else None)
+    own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
+    reach = np.isfinite(own.at(loads.rpm[None, :], loads.torque_Nm[None, :])[0])
+    last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
+    most = np.where(reach.any(axis=1), loads.thrust_N[last], 0.0)
     n_full, n_at = (loads.speed_for(T / thrust) for T in (asked, at))
     duty, peak, _ = chain.at(n_full, torque * loads.torque_at(n_full))
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
@@ -459,7 +466,9 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     if target.minutes is not None:
         met &= minutes >= target.minutes
     chance = met[:, 1:].mean(axis=1)
-    scatter = [POWER_BAND * float(np.std(p[np.isfinite(p)])) if np.isfinite(p).sum() > 9 else math.nan for p in power[:, 1:]]
+    scatter = [
+        POWER_BAND * float(np.std(p[np.isfinite(p)])) if np.isfinite(p).sum() > 9 else math.nan for p in power[:, 1:]
+    ]
     at, asked, n_at = (np.broadcast_to(v, power.shape)[:, 0] for v in (at, asked, n_at))
     return [
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
@@ -467,20 +476,19 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
          "current_A": float(amps[i, 0]), "peak_A": float(peak[i, 0]),
          "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
          "rpm": float(n_at[i]),
-         "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * float(own_kg[i]),
+         "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * own_kg,
+         "motor_g": 1e3 * float(parts.motor),
          "at_N": float(at[i]), "asked_N": float(asked[i]), "keller_N": loads.keller_N}
         for i, m in enumerate(machines)
     ]  # fmt: skip
 
 
-def _propulsion(
-    loads: RotorLoads, target: Target, torque_Nm: Array, power_W: Array, thrust_N: Array
-) -> tuple[Array, Array]:
-    """Mass of one rotor's parts at the thrust asked for, and its standard uncertainty, (M,) each [kg]."""
+def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> masses.Masses:
+    """Mass of one rotor's parts for the thrust asked for at a speed."""
+    torque = float(loads.torque_at(np.array([rpm]))[0])
     arm = masses.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
-    parts = masses.masses(torque_Nm, power_W, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
-    shared = 0.5 if target.coaxial else 0.0  # two rotors on one arm
-    return parts.total - shared * parts.arm, parts.u
+    watts = torque * rpm * math.pi / 30.0 / EFFICIENCY
+    return masses.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
 
 
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:

@@ -25,8 +25,9 @@ __all__ = ["drive", "map", "motor", "thrusters"]
 )  # fmt: skip
 def drive(
     case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Count | None = None,
-    mass_kg: float | None = None, rotors: Count | None = None, capacity_Ah: float | None = None,
-    airspeed_m_s: float = 0.0, reading: str | None = None, off: Sequence[str] = (), out: Path | None = None,
+    motor_mass_g: float | None = None, mass_kg: float | None = None, rotors: Count | None = None,
+    capacity_Ah: float | None = None, airspeed_m_s: float = 0.0, reading: str | None = None, off: Sequence[str] = (),
+    out: Path | None = None,
 ) -> DriveResult:  # fmt: skip
     """Solve a rotor with its motor and battery: thrust, current and hover.
 
@@ -40,6 +41,8 @@ def drive(
         Speed constant of the motor; from the case's table [drive] by default, like all that follows. [rev/min/V]
     cells : int, optional
         LiPo cells in series.
+    motor_mass_g : float, optional
+        Mass of the motor, which tells its winding. [g]
     mass_kg : float, optional
         Mass of the vehicle, for the hover point. [kg]
     rotors : int, optional
@@ -78,7 +81,8 @@ def drive(
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.drive import drive_result
 
-    given = {"kv": kv, "cells": cells, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}
+    given = {"kv": kv, "cells": cells, "motor_mass_g": motor_mass_g, "mass_kg": mass_kg, "rotors": rotors,
+             "capacity_Ah": capacity_Ah}  # fmt: skip
     told = {name: value if value is None else number(name, value, finite=False) for name, value in given.items()}
     told |= {name: given[name] for name in ("cells", "rotors")}
     own = rotor_of(case).case

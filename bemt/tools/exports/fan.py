@@ -99,7 +99,7 @@ def fields(job: Job) -> tuple[Array, dict[str, Array]]:
 def read_profile(text: str) -> dict[str, Array]:
     r"""Fields of a radial profile of Fluent by its grammar.
 
-    >>> read_profile("((fan radial 2)\\n(r\\n0.1\\n0.2)\\n(p\\n5\\n6)\\n)")["p"]
+    >>> read_profile("((fan radial 2)\n(r\n0.1\n0.2)\n(p\n5\n6)\n)")["p"]
     array([5., 6.])
     """
     head = re.match(r"\s*\(\((\S+) radial (\d+)\)(.*)\)\s*$", text, re.DOTALL)
