@@ -392,8 +392,8 @@ In JSBSim the loads act as external reactions of the aircraft file, and the shaf
 
 `fan`, `rotor-disk` and `su2-disk` prescribe the load from BEMT. The other two solve the inflow themselves. `fan` is a
 radial profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt`, which says axis, direction and units.
-OpenFOAM's `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the axis, and the torque lacks
-cl sin(phi). See [reports/disk](../reports/disk/README.md) for the run.
+OpenFOAM's `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the axis, and the torque
+lacks cl sin(phi). See [reports/disk](../reports/disk/README.md) for the run.
 
 ## Blades for design tools
 

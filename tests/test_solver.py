@@ -342,6 +342,7 @@ def test_a_few_points_are_interpreted_and_many_compiled(
 
     class Nothing:
         signatures = ()  # in this process, and no cache on the disk
+        _cache = None
 
         def __call__(self, *given: object) -> None:
             run.append("compiled")
