@@ -60,24 +60,33 @@ def gunzip(raw: bytes, name: str, most: int | None = None) -> tuple[bytes, str]:
     InputError
         If there is more than :data:`MAX_BYTES` in it.
     """
-    out, limit, at, view = bytearray(), MAX_BYTES if most is None else most, 0, memoryview(raw)
+    out = io.BytesIO()
+    damage = gunzip_stream(io.BytesIO(raw), out, name, most)
+    return out.getvalue()[:most], damage
+
+
+def gunzip_stream(source: IO[bytes], out: IO[bytes], name: str, most: int | None = None) -> str:
+    """Unpack gzip from one open file to another, for what need not be held at once; else as :func:`gunzip`."""
+    size, limit, stream = 0, MAX_BYTES if most is None else most, zlib.decompressobj(31)
+    block = source.read(_BLOCK)
     try:
-        while at < len(raw):
-            stream = zlib.decompressobj(31)
-            while not stream.eof and len(out) <= limit:
-                block = view[at : at + _BLOCK]
-                some = stream.decompress(block, _BLOCK)
-                out += some
-                at += len(block) - len(stream.unconsumed_tail) - len(stream.unused_data)
-                if not block and not some:
-                    return bytes(out), "it ends early"
-            if len(out) > limit and most is None:
-                raise InputError(_too_large(name, f"more than {MAX_BYTES} bytes of gzip data, unpacked"))
-            if len(out) > limit or view[at : at + 2] != GZIP:  # zeros of a tape behind the last member
-                break
+        while block:
+            if stream.eof:
+                block += source.read(1)  # a member may start on the last byte of a block
+                if block[:2] != GZIP:
+                    break  # zeros of a tape behind the last member
+                stream = zlib.decompressobj(31)
+            some = stream.decompress(block, _BLOCK)
+            size += len(some)
+            out.write(some)
+            if size > limit:
+                if most is None:
+                    raise InputError(_too_large(name, f"more than {MAX_BYTES} bytes of gzip data, unpacked"))
+                return ""
+            block = (stream.unused_data if stream.eof else stream.unconsumed_tail) or source.read(_BLOCK)
+        return "" if stream.eof else "it ends early"
     except zlib.error as error:
-        return bytes(out), str(error)
-    return bytes(out[:limit]), ""
+        return str(error)
 
 
 def unpacked(raw: bytes, name: str, most: int | None = None, depth: int = 0) -> bytes:

@@ -10,13 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.packed import GZIP, gunzip_stream
 from bemt.tools.flight import ardupilot, crazyflie, px4, table
 from bemt.tools.flight.log import FlightLog
 
-MAX_BYTES = 1 << 29
-"""Largest log that is unpacked. [bytes]"""
 _READERS = (crazyflie, px4, ardupilot, table)
-_BLOCK = 1 << 16
 _BETAFLIGHT = b"H Product:Blackbox"
 
 
@@ -24,7 +22,8 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
     """Read a flight log by its content, gzipped or not.
 
     Crazyflie, PX4 ULog, ArduPilot DataFlash, Betaflight or other CSV. InputError for a file that is no flight log,
-    damaged before its first twenty samples, or larger than :data:`MAX_BYTES` once unpacked.
+    damaged before its first twenty samples, or larger than :data:`bemt.base.packed.MAX_BYTES` once
+    unpacked.
     """
     name = os.fspath(path)
     if Path(path).is_dir():
@@ -32,11 +31,12 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
     try:
         with Path(path).open("rb") as file:
             head = file.read(4096)
-        if head[:2] != b"\x1f\x8b":
+        if head[:2] != GZIP:
             return _read(Path(path), head)
         with tempfile.TemporaryDirectory() as folder:
             inside = Path(folder) / "log"
-            damage = _gunzip(Path(path), inside)
+            with Path(path).open("rb") as file, inside.open("wb") as out:
+                damage = gunzip_stream(file, out, name)
             with inside.open("rb") as file:
                 head = file.read(4096)
             try:
@@ -59,7 +59,7 @@ def kind_of(path: str | os.PathLike[str]) -> str:
             head = file.read(1 << 16)
     except OSError:
         return ""
-    if head[:2] == b"\x1f\x8b":
+    if head[:2] == GZIP:
         with contextlib.suppress(zlib.error):
             head = zlib.decompressobj(31).decompress(head, 4096)
     if head.startswith(_BETAFLIGHT):
@@ -76,28 +76,3 @@ def _read(path: Path, head: bytes) -> FlightLog:
         raise InputError(Fault(str(path), "", "unknown first bytes", "a usdlog, ULog, DataFlash or CSV"))
     found: FlightLog = reader.read(path)
     return found
-
-
-def _gunzip(path: Path, target: Path) -> str:
-    """Unpack to a file, block by block; gives what is damaged. InputError beyond the limit."""
-    size, stream = 0, zlib.decompressobj(31)
-    with path.open("rb") as file, target.open("wb") as out:
-        left = file.read(_BLOCK)
-        while left:
-            if stream.eof:
-                if left[:2] != b"\x1f\x8b":
-                    break  # zeros of a tape behind the last member
-                stream = zlib.decompressobj(31)
-            try:
-                some = stream.decompress(left, _BLOCK)
-            except zlib.error as error:
-                return str(error)
-            size += len(some)
-            out.write(some)
-            if size > MAX_BYTES:
-                got, expected = f"more than {MAX_BYTES >> 20} MB, unpacked", f"at most {MAX_BYTES >> 20} MB"
-                raise InputError(Fault(str(path), "", got, expected, "Unpack it, and give the log itself"))
-            left = stream.unused_data if stream.eof else stream.unconsumed_tail
-            if not left:
-                left = file.read(_BLOCK)
-    return "" if stream.eof else "it ends early"
