@@ -5,8 +5,8 @@ form:
 
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
-with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by its
-K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
+with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
 class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v and
 voltage, as in `drive`. Idle current and battery take the
 shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
@@ -68,8 +68,8 @@ TIP_IN_WATER = 40.0
 """Tip speed to which a propeller is solved in water: it cavitates long before [m/s]."""
 POWER_BAND = 0.7
 """Standard uncertainty of the power at a thrust over the scatter of the draws: on 261 readings of six stands the rms of
-the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err together
-more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
+the error over it is 0.62, stand by stand 0.8 (0.71 to 0.86 with one left out). Thrust and torque of a label err
+together more than the draws say; with 0.7, 79 % lie within one and 96 % within two (docs/choose.md) [1]."""
 NEAR = 0.05
 """The smallest within this share of the least power comes first: the optimum is flat, and no label is known better."""
 DRAWS = 256
@@ -182,9 +182,9 @@ def choose(
     -------
     pandas.DataFrame
         A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass of one
-        rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is not the
-        first.
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the
+        mass of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it
+        is not the first.
 
     Raises
     ------
@@ -287,7 +287,8 @@ def _target(
         raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
-                  thrust_N is not None, fluid, coaxial, fan, True, None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
+                  thrust_N is not None, fluid, coaxial, fan,
+                  arm_m=None if arm_mm is None else 1e-3 * arm_mm)  # fmt: skip
 
 
 def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blades: Sequence[int]) -> None:
