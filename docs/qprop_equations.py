@@ -1,9 +1,9 @@
 """A QPROP file by QPROP's own equations, for where the program is not built: ``python docs/qprop_equations.py``.
 
 M. Drela, "QPROP formulation" (MIT, 2006; not read): swirl by Prandtl's factor at the local wake angle, without
-light-loading assumption, as in gvcalc.f, tqcalc.f and cdfun.f of QPROP 1.22 (read). The Reynolds number to which
-drag is scaled is that of the first station for all, as there; 25 stations with splines between those of the file. The
-rise of the drag above the critical Mach number is left out.
+light-loading assumption, as in gvcalc.f, tqcalc.f and cdfun.f of QPROP 1.22 (read). The Reynolds number to which drag
+is scaled is that of the first station for all, as there; 25 stations with splines between those of the file. The rise
+of the drag above the critical Mach number is left out.
 """
 
 from __future__ import annotations

@@ -221,8 +221,8 @@ SEEN = {
              "iterations; with 40 or 60 it is NaN"),
     "openfoam": ("OpenFOAM 1912 of Debian", "2026-11-23", "10x5, 10,000 rev/min, at rest, level 5: Allrun ends with "
                  "11.4 N and 0.205 N m; BEMT 13.5 N and 0.200 N m; the grid is the coarsest and shows no convergence"),
-    "qprop": ("its own equations (docs/qprop_equations.py)", "2026-11-26", "the propellers of `cases/`, table below; "
-              "QPROP 1.22, built from its source, agreed within +9 to -1 %"),
+    "qprop": ("its own equations (docs/qprop_equations.py)", "2026-11-26", "the four propellers of `cases/`, table "
+              "below; QPROP 1.22, built from its source, agreed within +9 to -1 %"),
     "xrotor": ("XROTOR 7.55, built from its source", "2026-11-26", "10x5: thrust and torque within +3.9 to -0.5 % of "
                "BEMT's; with an earlier fit of the sections torque was +5 to +16 %, and at one speed XROTOR settled on "
                "a stalled root"),

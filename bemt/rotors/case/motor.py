@@ -45,7 +45,7 @@ def stator_mass_g(stator: str) -> float:
     return math.exp(_STATOR[0] + _STATOR[1] * math.log(d * d * h))
 
 
-def resistance_of_mass(kv: Array, mass_g: Array) -> Array:
+def resistance_of_mass(kv: Array | float, mass_g: Array | float) -> Array:
     """Usual resistance of winding, controller and leads of motors by K_v and mass [ohm].
 
     >>> round(1e3 * float(resistance_of_mass(900.0, 54.0)))

@@ -186,9 +186,9 @@ def choose(
     -------
     pandas.DataFrame
         A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the mass
-        of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it is
-        not the first.
+        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the
+        mass of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it
+        is not the first.
 
     Raises
     ------
