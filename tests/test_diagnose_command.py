@@ -334,7 +334,7 @@ def test_a_reference_that_the_run_agrees_with_is_the_first_word() -> None:
     made = record.from_series(Dataset("bench", "log", values, dict(series.u)), case())
     answer = chain.diagnose([made, replace(made, reference=True)], [case()])
     first = document.headline(answer)
-    assert first.startswith("No cause above 1%: the recording differs from the reference")
+    assert first.startswith("No cause above 1 %: the recording differs from the reference")
     assert "no more than runs do" in first
     assert "thrust by" in first and "torque by" in first, "the figure stands beside it"
 

@@ -489,25 +489,21 @@ def test_every_effect_is_in_every_form(capsys: pytest.CaptureFixture[str]) -> No
     assert len(by_id) == len(document["effects"]) and set(by_id) == set(effects.catalogue())
     for name, cls in effects.catalogue().items():
         assert any(line.split()[:1] == [name] for line in table.splitlines())
-        assert f"### {name}\n" in page and f"](#{name}) | {cls.title} | {cls.sign} |" in page
+        assert f"### {name}\n" in page and cls.title[1:] in " ".join(page.split())
         given = by_id[name]["parameters"]
         assert [(p["name"], p["unit"]) for p in given] == [(p.name, p.unit) for p in cls.parameters]
         ends = [(p["low"], p["high"]) for p in given]
         assert ends == [pytest.approx((p.low, p.high), rel=1e-9) for p in cls.parameters]
-        assert all(f"| `{p.name}` | {p.unit} |" in page and p.source in page for p in cls.parameters)
+        flat = " ".join(page.split())
+        assert all(f"* `{p.name}` " in page and " ".join(p.source.split()) in flat for p in cls.parameters)
         assert by_id[name]["source"], "no Notes"
-
-
-def test_a_page_has_no_line_that_breaks_its_table(project: Path) -> None:
-    rows = [line for line in (project / "docs" / "effects.md").read_text().splitlines() if line.startswith("|")]
-    assert rows and {line.count("|") for line in rows} <= {4, 7}
 
 
 @pytest.mark.usefixtures("made_up")
 def test_a_new_file_is_listed_without_another_edit(capsys: pytest.CaptureFixture[str]) -> None:
     page = printed(capsys, "--markdown")
-    assert "### made_up" in page and "| `size` | furlong | 0.5 | 0.25 to 0.75 |" in page
-    assert "`form`: `round`, `square`" in page
+    assert "### made_up" in page and "* `size` 0.5 (0.25 to 0.75 furlong: nobody" in " ".join(page.split())
+    assert "* `form` `round`, `square`" in page
     assert "made up for a test" in printed(capsys)
     (ours,) = [e for e in effects_list.document()["effects"] if e["id"] == "made_up"]
     assert ours["choices"] == {"form": ["round", "square"]} and ours["kind"] == "drive"

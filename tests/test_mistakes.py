@@ -43,9 +43,9 @@ def changed(*pairs: tuple[str, str]) -> str:
 
 
 def workbook() -> str:
-    with zipfile.ZipFile("t.xlsx", "w") as book:
-        book.writestr("[Content_Types].xml", "x")
-    return "t.xlsx"
+    with zipfile.ZipFile("t.xlsb", "w") as book:
+        book.writestr("xl/workbook.bin", "x")
+    return "t.xlsb"
 
 
 def twice() -> list[str]:
@@ -87,10 +87,10 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
         ("two.csv", "2 set-ups", "a separate file")),
     "UIUC geometry given to stations": (lambda put: ["stations", put("x_geom.txt", "r/R c/R beta\n0.2 0.1 30\n")], 2,
                                         ("x_geom.txt", "bemt new --stations")),
-    "validate without data": (lambda put: ["validate", "uiuc"], 2, ("uiuc", "bemt data uiuc")),
+    "validate without data": (lambda put: ["validate", "uiuc"], 2, ("uiuc", "bemt fetch uiuc")),
     "a case for a recording": (lambda put: ["import", "mine"], 2, ("mine", "a recording", "bemt sweep")),
     "a recording for a case": (lambda put: ["sweep", put("l.csv", TABLE)], 2, ("l.csv", "bemt import")),
-    "workbook": (lambda put: ["import", workbook()], 2, ("t.xlsx", "CSV")),
+    "workbook": (lambda put: ["import", workbook()], 2, ("t.xlsb", "CSV")),
     "two cases of one name": (lambda put: ["sweep", *twice()], 2, ("again/case.toml", "name", "prop_8x5")),
     "two columns of one name": (lambda put: ["import", put("n.csv", "rpm,thrust_N,thrust_N\n4000,1,1\n6000,2,2\n")], 0,
                                 ("name of another column",)),
