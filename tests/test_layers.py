@@ -44,6 +44,7 @@ ROOMS: tuple[str, ...] = (
     "data",
     "rotors|rotors.*",
     # judge
+    "judge.explanation|judge.loss",
     "judge.compare|judge.compare.*",
     "judge.diagnose|judge.diagnose.*",
     "judge.proof|judge.proof.*",
