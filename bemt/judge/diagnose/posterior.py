@@ -23,7 +23,7 @@ from bemt.judge.diagnose import form, noise, prior
 from bemt.judge.diagnose.state import State
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
-from bemt.physics.effects.base import FORM
+from bemt.physics.effects import base as effect_base
 
 if TYPE_CHECKING:
     from bemt.base.gaussian.whitening import Conditional, Whitener
@@ -313,7 +313,7 @@ def _posterior(
     plain = dict(log_z)
     if near := {k: v for k, v in log_z.items() if k.ids & set(rough)}:
         top = max(near.values())
-        power = EARNED / max(EARNED, min(FORM) * (top - log_z[NONE]))
+        power = EARNED / max(EARNED, min(effect_base.FORM) * (top - log_z[NONE]))
         log_z |= {k: top - power * (top - v) for k, v in near.items() if len(k) == 1}
     small = {k: together([s.small[k] for s in states]) for k in states[0].small}
     log_p = [log_z[k] + before[k] for k in log_z] + [v + before[Explanation.of(k)] for k, v in small.items()]
