@@ -10,7 +10,7 @@ import argparse
 import math
 
 import numpy as np
-from bemt.data.readers._uiuc_names import class_of
+from bemt.data.readers.uiuc_names import class_of
 from label_classes import readings
 
 from bemt.rotors.case import case_of, fresh
