@@ -10,9 +10,9 @@ import argparse
 import math
 
 import numpy as np
-from bemt.data.readers.uiuc_names import class_of
 from label_classes import readings
 
+from bemt.data.readers.uiuc_names import class_of
 from bemt.rotors.case import case_of, fresh
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.validate.propellers import where
