@@ -113,8 +113,8 @@ FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
     "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
-    "motor": (MotorToml, "Measurements of a motor constant, for `bemt motor`:"),
-    "thrusters": (ThrustersFile, "For `bemt thrusters`:"),
+    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor`:"),
+    "thrusters": (ThrustersFile, "For `bemt lab thrusters`:"),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd`:"),
 }
 """Files on the reference page: model, and what the file is for."""

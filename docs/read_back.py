@@ -417,7 +417,7 @@ At rest QPROP's lift goes on straight to its largest value, where the section's 
 where the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference
 Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
-`bemt stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
+`bemt lab stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
 
 ## Solids
 

@@ -87,7 +87,7 @@ RUNS: dict[str, tuple[Callable[[Put], list[str]], int, tuple[str, ...]]] = {
         ("two.csv", "2 set-ups", "a separate file")),
     "UIUC geometry given to stations": (lambda put: ["stations", put("x_geom.txt", "r/R c/R beta\n0.2 0.1 30\n")], 2,
                                         ("x_geom.txt", "bemt new --stations")),
-    "validate without data": (lambda put: ["validate", "uiuc"], 2, ("uiuc", "bemt fetch uiuc")),
+    "validate without data": (lambda put: ["validate", "uiuc"], 2, ("uiuc", "bemt lab fetch uiuc")),
     "a case for a recording": (lambda put: ["import", "mine"], 2, ("mine", "a recording", "bemt sweep")),
     "a recording for a case": (lambda put: ["sweep", put("l.csv", TABLE)], 2, ("l.csv", "bemt import")),
     "workbook": (lambda put: ["import", workbook()], 2, ("t.xlsb", "CSV")),

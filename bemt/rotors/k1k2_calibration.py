@@ -223,7 +223,7 @@ def _read(given: Sequence[str], test: Sequence[str]) -> tuple[FitPoints, FitPoin
 def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, FitPoints | None]:
     """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
     if not given and find_data("uiuc") is None:
-        hint = "Name files, or fetch a database: bemt fetch uiuc"
+        hint = "Name files, or fetch a database: bemt lab fetch uiuc"
         raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
     return _read(given, test)
 

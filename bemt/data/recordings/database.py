@@ -134,7 +134,7 @@ def text(doc: dict[str, Any]) -> str:
         f"sha256 {doc['sha256']} ({said[doc['checksum']]})",
     ]
     if doc["refused"]:
-        lines.append(f"{doc['refused']} faults in its files; bemt calibrate names them")
+        lines.append(f"{doc['refused']} faults in its files; bemt lab calibrate names them")
     return "\n".join([*lines, f"please cite: {doc['cite']}"])
 
 

@@ -218,7 +218,7 @@ def _commands(chosen: suggestion.Suggestion, given: suggestion.Given) -> tuple[s
     if chosen.kind == "air":
         return given.of_days()
     if chosen.kind == "rotor":
-        return f"bemt calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
+        return f"bemt lab calibrate-rotor REFERENCE {given.rest}", given.command(reference="REFERENCE")
     if chosen.kind == "mend":
         return tuple(f"bemt import {f}" for f in given.recordings)
     return ()

@@ -1,7 +1,7 @@
 """Factors on the intervals of parameters, so that as many hold the truth as they say: split conformal calibration.
 
 A half-width times the factor of its parameter (of its kind of fault, where few were seen) held 90 % of the truths
-in the development sets that ``bemt prove --calibrate-intervals DIR`` drew (Vovk, Gammerman and Shafer
+in the development sets that ``bemt lab prove --calibrate-intervals DIR`` drew (Vovk, Gammerman and Shafer
 2005, Algorithmic Learning in a Random World, ch. 4; Lei et al. 2018, J. Am. Stat. Assoc. 113:1094). The file says
 which seeds and version.
 """

@@ -269,6 +269,6 @@ def draw_real(rng: np.random.Generator) -> list[Item]:
     items = [*_uiuc(rng), *_x22a(), *_fan(), *_caradonna_tung(), *_tmotor(), *draw_pairs()]
     if not items:
         roots = ", ".join(r.as_posix() for r in data_roots())
-        hint = "`bemt fetch uiuc` fetches the largest; BEMT_DATA names a folder of them"
+        hint = "`bemt lab fetch uiuc` fetches the largest; BEMT_DATA names a folder of them"
         raise InputError(Fault(roots, "", "no published recordings", "uiuc, x22a, jmajew ...", hint))
     return [items[int(i)] for i in rng.permutation(len(items))]

@@ -480,7 +480,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
             found += here
         elif item.is_file() and item.suffix.lower() in (".csv", ".txt", ".dat", ".xlsx", ".stl", ".step", ".out"):
             solid = item.suffix.lower() in (".stl", ".step")
-            hint = "`bemt stations` cuts one from a solid" if solid else "`bemt import` reads recordings"
+            hint = "`bemt lab stations` cuts one from a solid" if solid else "`bemt import` reads recordings"
             faults.append(Fault(item.as_posix(), "", f"a {item.suffix} file", "a case, case.toml or its folder", hint))
         elif item.is_file():
             found.append(item)

@@ -155,7 +155,7 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
     if (blade.known_from == "reference") != posterior:
         got = 'known_from = "reference" without as_built.file or reading' if not posterior else "as_built"
         expected = 'known_from = "reference" and blade.as_built.file or reading together'
-        out.add("blade.known_from", got, expected, "bemt calibrate-rotor writes both")
+        out.add("blade.known_from", got, expected, "bemt lab calibrate-rotor writes both")
     if told.file is not None and (told.reading is not None or measured is not None):
         out.add("blade.as_built.file", repr(told.file), "nothing else that tells of the rotor beside it")
     if told.reading is not None:

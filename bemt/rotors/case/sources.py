@@ -117,7 +117,7 @@ def _bands(case: Case) -> list[Source]:
     if stated is not None and stated.measured is not None:
         found.insert(0, Source("band", "measured", f"{records()[stated.measured].source}; numbers of bemt's own fit"))
     elif stated is not None:
-        origin = "runs of this rotor, taken in by `bemt calibrate-rotor`"
+        origin = "runs of this rotor, taken in by `bemt lab calibrate-rotor`"
         found.insert(0, Source("band", "as built", origin))
     return found
 

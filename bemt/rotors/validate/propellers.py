@@ -226,7 +226,7 @@ def where(name: str) -> Path:
     """Folder as named, or that of the database of this name."""
     found = Path(name) if Path(name).exists() else find_data(name)
     if found is None and name.partition("/")[0] == "uiuc":
-        hint = "Fetch them: bemt fetch uiuc, or set BEMT_DATA to the folder that holds uiuc"
+        hint = "Fetch them: bemt lab fetch uiuc, or set BEMT_DATA to the folder that holds uiuc"
         raise InputError(Fault(name, "", "no data", "the UIUC Propeller Database", hint))
     return found or Path(name)
 

@@ -183,7 +183,7 @@ def text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
 
 def generated_text(made: dict[str, Any]) -> str:
     """Say what was generated and how to go on."""
-    return f"generated trials (seed {made['seed']}); now: bemt motor {made['folder']}\n"
+    return f"generated trials (seed {made['seed']}); now: bemt lab motor {made['folder']}\n"
 
 
 def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, dict[str, Any]]:
