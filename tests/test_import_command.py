@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from bemt.app.cli import main
+from bemt.base.errors import InputError
 from bemt.data.recordings.choice import Choice
 from bemt.data.recordings.load import document, import_file
 
@@ -208,3 +209,9 @@ def test_a_reader_that_fails_loses_its_own_file_only(
     assert "IndexError" in first["error"] and "report it" in first["error"]
     assert second["error"] is None and second["rows"] == 2
     assert third["error"] is not None and "internal" not in third["error"]
+
+
+def test_a_file_of_another_command_is_handed_over(tmp_path: Path) -> None:
+    (tmp_path / "log.bbl").write_bytes(b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" + bytes(99))
+    with pytest.raises(InputError, match="Betaflight .*bemt fly"):
+        import_file(tmp_path / "log.bbl")

@@ -9,6 +9,8 @@ A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a
 * ``REPORT_PARTS``: part of a report; the attribute takes its :class:`bemt.results.report.book.Book` and the folder of
   results, and gives the book with what it knows put to the cases and its pages to the tools;
 * ``EXPORTS``: target of ``export``; the attribute is its class;
+* ``FILE_KINDS``: command that takes a file which no reader of recordings knows; the attribute takes a path and gives
+  what the file is, empty if another's;
 * ``ACTIONS``: name at both doors; the attribute is the public function.
 
 >>> offered("CASE_PARTS")["drive"], offered("NOTHING")

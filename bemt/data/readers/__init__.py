@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base import plugins
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
@@ -296,6 +297,9 @@ def detect(path: str | os.PathLike[str]) -> str:
             place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
         kinds = [k for k, m in known.items() if m.sniff(head)]
         kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
+        for command, where in plugins.offered("FILE_KINDS").items() if not kinds else ():
+            if kind := plugins.load(where)(target):
+                place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
         if not kinds and _binary(head):
             place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
         if not kinds:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base import units
-from bemt.base.canvas import CYCLE
 from bemt.base.errors import Fault, InputError, needs
 from bemt.physics import coefficients as co
 
@@ -89,6 +88,8 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
         raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}"))
     beside, points = ax is not None, d.kind in ("bench", "cfd", "vendor")
     if ax is None:
+        from bemt.base.canvas import CYCLE
+
         ax = plt.subplots(layout="constrained")[1]
         ax.set_prop_cycle(color=CYCLE)
     drawn = [line.get_gid() for line in ax.lines]
