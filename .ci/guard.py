@@ -21,7 +21,10 @@ def faults(junit: Path, run: str, data: bool) -> list[str]:
     rules = tomllib.loads(RULES.read_text(encoding="utf-8"))
     cases = list(tree.parse(junit).iter("testcase"))
     skips = Counter(
-        str(s.get("message")) for case in cases for s in case.findall("skipped") if s.get("type") != "pytest.xfail"
+        f"{s.get('message')} {s.text or ''}".strip()
+        for case in cases
+        for s in case.findall("skipped")
+        if s.get("type") != "pytest.xfail"
     )
     failed = sum(bool(case.findall("failure") or case.findall("error")) for case in cases)
     passed = len(cases) - failed - sum(bool(case.findall("skipped")) for case in cases)

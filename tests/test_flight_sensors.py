@@ -11,7 +11,6 @@ import pytest
 from flight_files import Hover, dataflash, ulog
 
 from bemt.base.errors import InputError
-from bemt.tools.flight import read as reading
 from bemt.tools.flight.actions import fly
 from bemt.tools.flight.answer import answer_on
 from bemt.tools.flight.balance import DAY, SESSION, axes_of, features, healthy_flight
@@ -310,7 +309,7 @@ def test_what_is_packed_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert read_log(tmp_path / "a.bin.gz").rotors == 4 and kind_of(tmp_path / "a.bin.gz").startswith("ArduPilot")
     (tmp_path / "cut.gz").write_bytes(packed[: len(packed) // 2])
     assert "gzip" in read_log(tmp_path / "cut.gz").ends
-    monkeypatch.setattr(reading, "MAX_BYTES", 100_000)
+    monkeypatch.setattr("bemt.base.packed.MAX_BYTES", 100_000)
     with pytest.raises(InputError):
         read_log(tmp_path / "a.bin.gz")
 

@@ -250,7 +250,8 @@ def heading(text: str) -> Heading:
     parts = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
     if not parts and (loose := re.fullmatch(r"(.+?)(?:[_ ]| - |, ?)(\w+)", text)) and loose[2] in WEIGHTS:
         parts = loose  # thrust_g, Thrust kg
-    if not text.startswith("u_") and (by_words := _by_words(text)) is not None:  # u_: a standard uncertainty
+    uncertainty = text.startswith("u_") and _by_words(text[2:]) is not None  # u_inf is none
+    if not uncertainty and (by_words := _by_words(text)) is not None:
         return by_words
     unit = WEIGHTS.get(parts[2]) if parts else None
     if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):

@@ -91,7 +91,7 @@ def _metres_of(inch: float | None, millimetre: float | None, metre: float | None
 class RotorTable(Table):
     """[rotor]: rotor and hub."""
 
-    kind: Literal["propeller", "fan"] = entry("open rotor or fan; fan if there is a [duct]", default="propeller")
+    kind: Literal["propeller", "fan"] = entry("open rotor or fan; fan if there is a duct table", default="propeller")
     blades: int = entry("number of blades", low=1, high=64, required=True)
     diameter_in: float | None = entry("tip diameter", _DIAMETER_IN)
     diameter_mm: float | None = entry("tip diameter", "mm", 10, 6000, _metres("diameter_mm", 6.0))
