@@ -261,6 +261,7 @@ def test_a_killed_campaign_goes_on(project: Path, tmp_path: Path, programs: Path
     solver = int(asleep[0].read_text())
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+    end = time.monotonic() + 60
     while _alive(solver) and time.monotonic() < end:
         time.sleep(0.1)
     assert not _alive(solver), "kill -9 leaves no solver behind"
