@@ -169,7 +169,8 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
 
 def _add(parser: Parser, one: Parameter, told: About, visible: bool) -> None:
     """Option or bare word of a parameter."""
-    words = one.help.replace("%", "%%") if visible else argparse.SUPPRESS
+    said = f"Do not {one.help[:1].lower()}{one.help[1:]}" if one.option.startswith("--no-") else one.help
+    words = said.replace("%", "%%") if visible else argparse.SUPPRESS
     metavar = one.name.split("_")[0].upper()
     if one.kind == "flag":
         parser.add_argument(one.option, dest=one.name, action="store_const", const=one.default is not True, help=words)

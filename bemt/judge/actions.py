@@ -75,7 +75,7 @@ def diagnose(
     out : path, optional
         Folder for diagnosis.json, figures and the improved cases.
     figures : bool
-        With a folder: draw the figures.
+        Draw the figures into the folder.
     progress : callable, optional
         Called with a line of text.
 
@@ -148,7 +148,7 @@ def compare(
     out : path, optional
         Folder for comparison.json, its text and a picture.
     figures : bool
-        With a folder: draw the picture.
+        Draw the picture into the folder.
     progress : callable, optional
         Called with a line of text.
 
