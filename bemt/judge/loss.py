@@ -144,7 +144,7 @@ def _sets(
 def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> str:
     """Why nothing is said."""
     if none >= max(unknown, *listed.values(), 0.0):
-        return f"nothing is likeliest ({none:.0%}), but not sure enough"
+        return f"the spread of rotors and runs alone is likeliest ({none:.0%}), but not sure enough"
     if unknown >= max(listed.values(), default=0.0):
         return f"something that is not in the library is likeliest ({unknown:.0%}), but not sure enough"
     return "several different explanations are possible"
