@@ -316,6 +316,7 @@ def test_a_map_of_two_rotors_is_the_second_rotor_and_no_fault_of_the_stand(share
         assert not {"torque_zero", "thrust_zero", "torque_gain", "thrust_gain"} & set(answer.effects)
 
 
+@pytest.mark.xfail(strict=True, reason="oblique inflow is first in a class, not named alone")
 def test_two_angles_are_oblique_inflow_and_no_other_propeller(tmp_path: Path, shared_data: Path) -> None:
     """One propeller with the wind along the shaft and 30 deg from it: by the recorded angle, and without."""
     folder = shared_data / "oblique" / "apc_8x45mr"
@@ -325,8 +326,7 @@ def test_two_angles_are_oblique_inflow_and_no_other_propeller(tmp_path: Path, sh
         told = [rows[0] + ",sideslip_deg", *(f"{row},{angle}" for row in rows[1:])]
         files.append(tmp_path / f"tilt{angle}.csv")
         files[-1].write_text("\n".join(told) + "\n", encoding="utf-8")
-    told = compare(*files, label="8x4.5").effects
-    assert told[0] == "oblique_inflow" and "propeller" not in told
+    assert compare(*files, label="8x4.5").effects == ("oblique_inflow",)
     bare = compare(*(folder / f"tilt_{angle:02d}deg.csv" for angle in (0, 30)), label="8x4.5")
     assert "oblique_inflow" in bare.effects and "propeller" not in bare.effects
 
@@ -597,6 +597,7 @@ def test_a_run_that_continues_another_one_is_no_change(tmp_path: Path, seed: int
     assert answer.verdict == "none" and not answer.document["ratios"]["CT"]["extrapolated"]
 
 
+@pytest.mark.xfail(strict=True, reason="one of the four pairs is insufficient; none is accused")
 def test_runs_of_uiuc_that_continue_each_other_are_no_change(shared_data: Path) -> None:
     folder = shared_data / "uiuc" / "volume-1"
     pairs = (
@@ -605,9 +606,8 @@ def test_runs_of_uiuc_that_continue_each_other_are_no_change(shared_data: Path) 
         ("ance_8.5x6_2853cm_6928", "ance_8.5x6_2854cm_6914"),
         ("apce_10x5_kt0823_6005", "apce_10x5_kt0824_6018"),
     )
-    found = [compare(folder / f"{a}.txt", folder / f"{b}.txt") for a, b in pairs]
-    assert not any(answer.effects for answer in found)
-    assert [answer.verdict for answer in found].count("none") >= len(pairs) - 1
+    for a, b in pairs:
+        assert compare(folder / f"{a}.txt", folder / f"{b}.txt").verdict == "none", a
 
 
 def test_runs_without_a_common_advance_ratio_name_nothing(tmp_path: Path) -> None:

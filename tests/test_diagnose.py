@@ -107,7 +107,7 @@ class Tube(effects.catalogue()["ground_effect"]):  # type: ignore[misc]
 
 
 class Near(Tube):
-    """Twice as much of it: a change by less than 1 % counts as none."""
+    """Twice as much of it."""
 
     def relief(self, z_over_R: np.ndarray) -> np.ndarray:
         return 2.0 * super().relief(z_over_R)
@@ -121,10 +121,14 @@ def test_a_wall_with_a_law_of_its_own_is_the_wall() -> None:
     assert answer.found.probability[UNKNOWN] < 0.01
 
 
-def test_a_reference_without_a_wall_leaves_its_distance_a_variable() -> None:
+FAINT = pytest.mark.xfail(strict=True, reason="a change below 1 % counts as none")
+
+
+@pytest.mark.parametrize("wall", [pytest.param(Tube, marks=FAINT), Near])
+def test_a_reference_without_a_wall_leaves_its_distance_a_variable(wall: type[Tube]) -> None:
     """What only the run records is what changed it."""
     given = dict(points("static")) | {"wall_distance_m": np.tile([0.07, 0.1, 0.15, 0.3, 0.8], 4)[:17]}
-    run = record.from_series(recording(case(), given, (Near(),)), case())
+    run = record.from_series(recording(case(), given, (wall(),)), case())
     free = replace(record.from_series(recording(case(), points("static"), seed=3), case()), reference=True)
     answer = chain.diagnose([run, free], [case()])
     assert answer.decision.effects == ("ground_effect",), document.text(answer)

@@ -91,7 +91,10 @@ def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
     assert found["low"] <= 0.07 <= found["high"]
 
 
-@pytest.mark.parametrize("off", [-3.0, 2.0])
+NOT_SURE = pytest.mark.xfail(strict=True, reason="the wall's law is good to 30 %: first at 0.73, not named")
+
+
+@pytest.mark.parametrize("off", [-3.0, pytest.param(2.0, marks=NOT_SURE)])
 def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) -> None:
     """The blade is turned, its lift lower and its drag higher than in the case; the test has a wall behind it, too."""
     guess, given = case(), points("grid")
@@ -108,8 +111,7 @@ def test_a_reference_finds_the_blade_whatever_the_case_says_of_it(off: float) ->
     mine = refer & (problem.channel == 0)
     np.testing.assert_allclose(problem.f0[mine], exact, atol=0.02 * exact.max())
     answer = chain.diagnose(records, [guess])
-    # its law is good to 30 %, so 0.7 to 0.96 of the probability: the first, named or not
-    assert answer.decision.leading.ids == {"ground_effect"}, answer.decision
+    assert answer.decision.effects == ("ground_effect",), answer.decision
 
 
 def test_a_blade_that_runs_away_is_said_and_not_used() -> None:
@@ -162,6 +164,7 @@ def test_a_short_log_of_step_responses_keeps_its_transients(tmp_path: Path, rows
     assert n > 0.9 * rows if kept else n < 0.1 * rows
 
 
+@pytest.mark.xfail(strict=True, reason="insufficient: the lag is not likely enough for something unknown")
 def test_a_balance_that_stays_behind_is_nothing_in_the_library() -> None:
     up = points("static")
     there_and_back = np.r_[np.arange(17), np.arange(16, -1, -1)]
@@ -172,7 +175,7 @@ def test_a_balance_that_stays_behind_is_nothing_in_the_library() -> None:
     late = {k: series[k] + 0.03 * full[k] * behind * (1.0 - (series[k] / full[k]) ** 2) for k in full}
     record = from_series(replace(series, values={**series.values, **late}), case())
     answer = chain.diagnose([record], [case()])
-    assert answer.decision.verdict in ("unknown", "insufficient")
+    assert answer.decision.verdict == "unknown"
     assert answer.found.states[0].best_rival.split(":")[0].endswith("while the load falls")
 
 
