@@ -16,7 +16,7 @@ from typing import Any
 
 from bemt.app import old_names
 from bemt.app.terminal import complain, progress
-from bemt.base.action import About, about, check_counts, did_you_mean
+from bemt.base.action import Declaration, about, check_counts, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -167,7 +167,7 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
     return parser
 
 
-def _add(parser: Parser, one: Parameter, told: About, visible: bool) -> None:
+def _add(parser: Parser, one: Parameter, told: Declaration, visible: bool) -> None:
     """Option or bare word of a parameter."""
     said = f"Do not {one.help[:1].lower()}{one.help[1:]}" if one.option.startswith("--no-") else one.help
     words = said.replace("%", "%%") if visible else argparse.SUPPRESS

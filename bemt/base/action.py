@@ -20,7 +20,8 @@ from typing import Any, ParamSpec, TypeVar
 from bemt.base.errors import EXIT_OK, Fault, InputError
 
 __all__ = [
-    "About", "Count", "Told", "about", "action", "did_you_mean", "in_words_of_the_library", "options_of", "worded",
+    "Declaration", "Count", "Told", "about", "action", "did_you_mean", "in_words_of_the_library", "options_of",
+    "worded",
 ]  # fmt: skip
 
 P = ParamSpec("P")
@@ -30,7 +31,7 @@ Count = int
 
 
 @dataclass(frozen=True)
-class About:
+class Declaration:
     """What the command line adds to a function."""
 
     command: str  # name of the command
@@ -74,15 +75,15 @@ def action(
     def declare(function: Callable[P, T]) -> Callable[P, T]:
         name = command or function.__name__.replace("_", "-")
         found = worded(function)
-        setattr(found, "about", About(name, group, example, words, common, shown))  # noqa: B010
+        setattr(found, "about", Declaration(name, group, example, words, common, shown))  # noqa: B010
         return found
 
     return declare
 
 
-def about(function: Callable[..., Any]) -> About:
+def about(function: Callable[..., Any]) -> Declaration:
     """What an action declares."""
-    found: About = getattr(function, "about")  # noqa: B009
+    found: Declaration = getattr(function, "about")  # noqa: B009
     return found
 
 
