@@ -36,6 +36,12 @@ class Explanation:
         """Whether two effects or more are at work."""
         return len(self.ids) > 1
 
+    def __or__(self, other: Explanation) -> Explanation:
+        """Both at work; where the files are in doubt nothing else is known."""
+        if self.doubt or other.doubt:
+            return DOUBT
+        return Explanation(self.ids | other.ids, self.smooth or other.smooth)
+
     def without(self, effect: str) -> Explanation:
         """The others of its effects."""
         return replace(self, ids=self.ids - {effect})
@@ -55,7 +61,8 @@ class Explanation:
 
     def __str__(self) -> str:
         """As documents write it."""
-        return "doubt" if self.doubt else "unknown" if self.smooth else "+".join(self) or "none"
+        words = [*self, *(["unknown"] if self.smooth else [])]
+        return "doubt" if self.doubt else "+".join(words) or "none"
 
 
 NONE, UNKNOWN, DOUBT = Explanation(), Explanation(smooth=True), Explanation(doubt=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
-__all__ = ["CLAIMS", "COSTS", "Costs", "Decision", "decide"]
+__all__ = ["CLAIMS", "COSTS", "Costs", "Decision", "decide", "joined", "parts"]
 
 CLAIMS = ("named", "sensor", "class")
 """Verdicts that give a cause."""
@@ -33,6 +33,9 @@ class Costs:
 
 
 COSTS = Costs()
+ONE, SECOND = 0.5, 0.1
+"""Where loads and drive are measured apart, each with a prior of its own: odds that one of them changed over those,
+since it may be the other, and over those once more where the other did, since few pairs are of both (declared) [1]."""
 # Likeliest explanations that are tried as a name, and most members of a class.
 _NAMES, _MEMBERS = 6, 6
 # Explanations below this are not counted; shares of a class from which its first member is in all of it, and may be
@@ -60,7 +63,7 @@ def expected(said: frozenset[str], named: bool, P: Mapping[Explanation, float], 
     """Expected loss of a name or of a class."""
     total = 0.0
     for truth, p in P.items():
-        if truth.ids and (said == truth.ids if named else truth.ids <= said):
+        if truth.ids and not truth.smooth and (said == truth.ids if named else truth.ids <= said):
             total += p * c.member * (len(said) - len(truth.ids))
         else:
             total += p * (c.half if truth.ids & said else c.wrong)
@@ -108,8 +111,8 @@ def decide(P: Mapping[Explanation, float], costs: Costs = COSTS) -> Decision:
         what = Explanation.of(*said)
         stand = all(i in effects.catalogue() and effects.catalogue()[i].kind == "stand" for i in said)
         why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
-        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P[what], why=why,
-                       sets=tuple((i,) for i in said))  # fmt: skip
+        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
+                       why=why, sets=tuple((i,) for i in said))  # fmt: skip
     if verdict == "class":
         inside = {k: p for k, p in listed.items() if k.ids <= set(said)}
         surest, sets = _sets(said, inside)
@@ -137,7 +140,8 @@ def _sets(
     first = max(said, key=lambda i: share[i])
     rest = tuple(i for i in said if i != first)
     total, pairs = sum(inside.values()), sum(p for k, p in inside.items() if k.pair)
-    sure = share[first] > _NEARLY_ALL * total and pairs > _ALONE * total
+    # the others are likelier beside it than in its place
+    sure = share[first] > _NEARLY_ALL * total and pairs > total - share[first]
     return first, ((first,), rest) if sure else (said,)
 
 
@@ -148,3 +152,35 @@ def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> s
     if unknown >= max(listed.values(), default=0.0):
         return f"something that is not in the library is likeliest ({unknown:.0%}), but not sure enough"
     return "several different explanations are possible"
+
+
+def parts(
+    P: Mapping[Explanation, float], Q: Mapping[Explanation, float], one: float = ONE
+) -> tuple[dict[Explanation, float], dict[Explanation, float]]:  # fmt: skip
+    """What each of two posteriors of different parts is beside the other.
+
+    >>> cause = Explanation.of("battery_sag")
+    >>> loads, drive = parts({NONE: 0.9, UNKNOWN: 0.1}, {NONE: 0.2, cause: 0.8})
+    >>> round(loads[NONE], 3), round(drive[cause], 3)
+    (0.981, 0.65)
+    """
+
+    def beside(P: Mapping[Explanation, float], same: float) -> dict[Explanation, float]:
+        weight = {True: same + one * (1.0 - same), False: one * (same + SECOND * (1.0 - same))}
+        out = {k: p * weight[k == NONE] for k, p in P.items()}
+        total = sum(out.values())
+        return {k: p / total for k, p in out.items()}
+
+    return beside(P, Q.get(NONE, 0.0)), beside(Q, P.get(NONE, 0.0))
+
+
+def joined(loads: Decision, drive: Decision) -> Decision:
+    """Answer on both parts: causes of both where both have any, else of the one that has."""
+    if loads.verdict in CLAIMS and drive.verdict in CLAIMS:
+        verdict = "class" if "class" in (loads.verdict, drive.verdict) else "named"
+        return replace(loads, verdict=verdict, effects=(*loads.effects, *drive.effects), by="both",
+                       sets=(*loads.sets, *drive.sets), probability=min(loads.probability, drive.probability),
+                       why=loads.why if loads.verdict == "class" else drive.why)  # fmt: skip
+    if drive.verdict in CLAIMS or (loads.verdict == "none" and drive.verdict != "none"):
+        return replace(drive, by="drive")
+    return loads

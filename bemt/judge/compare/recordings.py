@@ -16,10 +16,12 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.drive_laws import Judgement, judge_drive, weigh
+from bemt.judge.compare.drive_laws import SUPPLY, Judgement, Load, judge_drive, weigh
 from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.compare.stand_run import StandRun
+from bemt.judge.explanation import NONE
+from bemt.judge.loss import ONE, SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
@@ -27,8 +29,10 @@ ERROR_IN = "error in "
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _SURE = 0.012, 2.0
-# A battery or supply: voltage that was read apart by more than this at equal command, share; loads that do not matter.
-_TOLD_VOLTAGE, _FOLLOWS, _SAME_LOAD = 0.03, 0.3, 0.1
+# A battery or supply: voltage that was read apart by more than this at equal command, natural logarithm.
+_TOLD_VOLTAGE = 0.03
+# Torque follows thrust, where that alone is known, to this share of its change (declared).
+_BY_THRUST = 0.5
 NO_VERDICT = Judgement("insufficient", (), {}, {}, "not recorded in both")
 """Of what was not recorded in both."""
 _MOVED, _WIDE = 2.5, 1.4
@@ -69,15 +73,40 @@ class RunChange:
 
     @cached_property
     def drive(self) -> Judgement:
-        """Verdict on motor, controller and battery."""
+        """Verdict on motor, controller and battery, beside what follows from the load."""
         if not self.behind.channels:
             return NO_VERDICT
         if _unloaded(self.a, self.b, self.diameter_m):
             return replace(NO_VERDICT, why="the advance ratios differ, and the drive follows the load")
-        if not self.near and self.loads.verdict != "none":
-            return replace(NO_VERDICT, why="the load changed or may have changed, and the drive follows it")
-        motor = judge_drive(weigh(self.behind.channels, (self.behind.free, self.behind.steady)))
-        return _with_voltage(motor, self.ratios)
+        P = weigh(self.behind.channels, (self.behind.free, self.behind.steady), self._load)
+        if not self._by_volts:
+            return judge_drive(P)
+        # known from the files: what is left is whether something else changed as well
+        ratio = math.exp(self._by_volts)
+        said = judge_drive({k | SUPPLY: p * (1.0 if k == NONE else SECOND) for k, p in P.items()})
+        if said.effects != tuple(SUPPLY):
+            return said
+        why = f"voltage as recorded, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
+        size = {"value": ratio, "low": ratio, "high": ratio, "unit": "1"}
+        return replace(said, parameters={"battery_sag": {"ratio": size}}, why=why)
+
+    @property
+    def _by_volts(self) -> float:
+        """Voltage of B over that of A at equal command where both tell and they differ, natural logarithm, else 0."""
+        change = next((math.log(r["ratio"]) for r in self.ratios.values() if r["kind"] == "voltage"), 0.0)
+        return change if "speed" in self.behind.channels and abs(change) >= _TOLD_VOLTAGE else 0.0
+
+    @property
+    def _load(self) -> Load:
+        """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""
+        found = {r["kind"]: r for r in self.ratios.values() if r["kind"] in LOADS}
+        r = found.get("torque", found.get("thrust"))
+        if r is None:
+            return Load()
+        change, unsure = math.log(r["ratio"]), math.log(r["high68"] / r["low68"]) / 2.0
+        along = np.log([point[2] for point in r["curve"]])
+        varies = float(np.max(np.abs(along - change)))
+        return Load(change, unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change), varies)
 
     @property
     def density_ratio(self) -> float:
@@ -90,17 +119,26 @@ class RunChange:
         """What acts on the rotor, by thrust and torque."""
         return {c.name: c for c in self.channels.values() if c.name in LOADS}
 
-    @property
+    @cached_property
     def leading(self) -> Judgement:
-        """Verdict on the loads; that on the drive where the loads agree, or nearly, and the drive does not."""
-        open_ = self.loads.verdict == "none" or (self.loads.verdict == "insufficient" and self.near)
-        return self.drive if open_ and self.drive.effects else self.loads
+        """Verdict on both: loads at the measured speed, the drive at one command."""
+        if not self.drive.ranked or not self.loads.ranked:
+            return self.loads if self.loads.ranked or not self.drive.effects else self.drive
+        each = (self.loads, self.drive)
+        ranked = parts(self.loads.ranked, self.drive.ranked, 1.0 if self._by_volts else ONE)
+        decisions = [self.with_density(decide(ranked[0])), decide(ranked[1])]
+        for k, one in enumerate(each):
+            if (decisions[k].verdict, decisions[k].effects) == (one.verdict, one.effects):
+                decisions[k] = replace(decisions[k], why=one.why)
+        said = joined(*decisions)
+        P = {"model": ranked[0], "drive": ranked[1]}.get(said.by, ranked[0] | ranked[1])
+        return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters})
 
-    @property
-    def near(self) -> bool:
-        """Whether no load differs so much that the drive would follow it."""
-        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in LOADS]
-        return bool(loads) and max(loads) < _SAME_LOAD
+    def with_density(self, said: Decision) -> Decision:
+        """The recorded densities as the cause where nothing else is one."""
+        if said.verdict != "none" or not self.by_density:
+            return said
+        return replace(said, verdict="named", effects=("air_density",), why=self.by_density, sets=(("air_density",),))
 
     @property
     def apart(self) -> bool:
@@ -187,31 +225,6 @@ def _unloaded(a: StandRun, b: StandRun, diameter: float) -> bool:
         return False
     one, two = (advance(run, diameter)[np.isfinite(run.points["rpm"])] for run in (a, b))
     return bool(abs(np.median(two) - np.median(one)) > _OTHER_WIND * max(one.max(), two.max()))
-
-
-def _with_voltage(said: Judgement, ratios: Mapping[str, Mapping[str, Any]]) -> Judgement:
-    """The recorded voltages as the cause, where the speed at equal command goes with them and nothing else is left."""
-    volts, speed = (
-        next((math.log(r["ratio"]) for r in ratios.values() if r["kind"] == k), 0.0) for k in ("voltage", "speed")
-    )
-    follows = volts * speed > 0.0 and abs(speed) > _FOLLOWS * abs(volts)
-    if not volts or "battery_sag" not in said.probability:
-        return said
-    P = dict(said.probability)
-    if abs(volts) < _TOLD_VOLTAGE:  # the voltage is known, and is no change
-        P["none"] += P.pop("battery_sag")
-        return judge_drive(P)
-    if not follows:
-        return said
-    # known from the file: what is left is whether something else changed as well
-    P["battery_sag"] += P["none"]
-    P["none"] = 0.0
-    found = judge_drive(P)
-    if found.effects != ("battery_sag",):
-        return found
-    why = f"voltage as recorded, {math.expm1(volts):+.1%} at equal command; the speed goes with it"
-    size = {"value": math.exp(volts), "low": math.exp(volts), "high": math.exp(volts), "unit": "1"}
-    return replace(found, parameters={"battery_sag": {"ratio": size}}, why=why)
 
 
 def _told(run: StandRun) -> str:

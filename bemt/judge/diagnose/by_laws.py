@@ -18,6 +18,7 @@ from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
+from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.record import Record, thinned
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
@@ -35,9 +36,8 @@ if TYPE_CHECKING:
 
 MOST = 40
 """Points of a recording that are weighed; more are averaged with alike ones [1]."""
-# What a motor's losses may differ by from run to run, and beyond its law with the load, share, where electrical power
-# stands for torque.
-_BY_POWER, _EFFICIENCY = 0.03, 0.08
+# What a motor's losses may differ by beyond its law with the load, share, where electrical power stands for torque.
+_EFFICIENCY = 0.08
 # Speed at equal command of one motor, natural logarithm: battery and load change it by no more.
 _SAME_DRIVE = 0.06
 # Speed below this share of the largest: a rotor that has just set off.
@@ -81,9 +81,8 @@ def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collectio
         leading = said.leading
         solved = said.effects and leading and all(i in found.spans for i in leading)
         parameters = fitting.refined(found, fitting.fit(found, leading))[1] if solved else {}
-    if said.verdict == "none" and (why := pair.by_density):
-        said = replace(said, verdict="named", effects=("air_density",), why=why, sets=(("air_density",),))
-    elif pair.turned and said.effects == ("unit_slip",):
+    said = pair.with_density(said)
+    if pair.turned and said.effects == ("unit_slip",):
         said = replace(said, why=recordings.REVERSED)
     elif said.verdict == "insufficient" and (why := _not_comparable(pair)):
         said = replace(said, why=why)
@@ -176,7 +175,7 @@ def records_of(
         return None
     log_ratio, unsure = density_change(a, b)
     apart = [r.session.get(c, 0.0) for r in (a, b) for c in channels.values()]
-    apart += [SESSION["torque"], _BY_POWER if "electrical_power_W" in channels.values() else 0.0, unsure]
+    apart += [SESSION["torque"], unsure]
     D = diameter_m if math.isfinite(diameter_m) else _D
     # what lags on the way up and down in one of them may be a zero of the other
     shift = {c: max(r.shift.get(c, 0.0) for r in (a, b)) for c in channels.values()}
@@ -233,7 +232,8 @@ def _record(
         if shift[c]:
             zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), _BY_POWER * full)
+            unloaded = PRIORS["losses of a motor from run to run"] * full
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), unloaded)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,6 +26,7 @@ from bemt.judge.diagnose import locate as location
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.nuisance import following
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.diagnose.shared_physics import ask_reference
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
@@ -76,9 +77,9 @@ def diagnose(
 
     def chain(
         some: Sequence[tuple[Record, Case]], ids: Sequence[str] | None,
-        ratios: Callable[[Collection[str]], RunChange | None] = lambda _: None, motor: Diagnosis | None = None,
+        ratios: Callable[[Collection[str]], RunChange | None] = lambda _: None, rotor: Diagnosis | None = None,
     ) -> Diagnosis:  # fmt: skip
-        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, baseline, given, ratios, motor)
+        return _diagnose([r for r, _ in some], [c for _, c in some], ids, say, baseline, given, ratios, rotor)
 
     def tested(some: Sequence[tuple[Record, Case]]) -> bool:
         return any(not r.reference for r, _ in some)
@@ -89,13 +90,11 @@ def diagnose(
         ids = [i for i in effects.catalogue() if only is None or i in only]
         # what drives the rotor cannot be seen in the loads at the measured speed, nor loads in the speed of a motor
         drives = [i for i in ids if effects.catalogue()[i].kind == "drive"]
-        motor = chain(turns, drives) if drives and tested(turns) else None
-        if not tested(loads):
-            return motor or chain(told, only)
-        rotor = chain(loads, [i for i in ids if i not in drives], compared, motor)
-        if motor is not None and rotor.said.by == "drive":
-            return replace(motor, said=rotor.said, drive=motor, loads=rotor, absent=rotor.absent)
-        return rotor
+        rotor = chain(loads, [i for i in ids if i not in drives], compared) if tested(loads) else None
+        motor = chain(turns, drives, rotor=rotor) if drives and tested(turns) else None
+        if rotor is None or motor is None:
+            return rotor or motor or chain(told, only)
+        return _with_drive(rotor, motor)
 
 
 def _diagnose(
@@ -106,12 +105,13 @@ def _diagnose(
     baseline: str,
     given: suggestion.Given,
     ratios: Callable[[Collection[str]], RunChange | None],
-    motor: Diagnosis | None,
+    rotor: Diagnosis | None,
 ) -> Diagnosis:
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
     if question := other_rotor.finding(problem):
         problem = replace(problem, between=(question, *problem.between))
+    problem = following(problem, rotor.problem) if rotor is not None else problem
     # until the reference is asked
     problem = replace(problem, shared=problem.missing, told=frozenset(given.changed))
     candidates, absent = signatures.candidates(problem, only, lambda name: say(f"solving with {name}"))
@@ -122,14 +122,9 @@ def _diagnose(
     found = posterior.weigh(problem, candidates)
     change = ratios(absent.keys()) if any(p.record.reference for p in problem.parts) else None
     found = replace(found, probability=knowledge.combined(found, change))
-    P = found.probability
-    if not problem.free.all() and np.all(problem.channel == CHANNELS.index("rpm")):
-        # beside a reference only supply, heat, motor and controller change the speed at a pulse width
-        P = {Explanation.of(MOTOR) if k == UNKNOWN else k: p for k, p in P.items()}
-    decision = knowledge.reason(problem, loss.decide(P))
-    if decision.effects == (MOTOR,):  # that nothing listed fits is no name
-        decision = loss.decide(found.probability)
-    said = decision if motor is None else _with_drive(decision, motor.decision)
+    P = _of_motor(found)
+    decision = _decided(P, found.probability)
+    decision = knowledge.reason(problem, decision)
     shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
     best, parameters = fitting.refined(found, fitting.fit(found, shown))
     parameters = interval_scales.widened(parameters)
@@ -143,11 +138,9 @@ def _diagnose(
     where = location.locate(found, best if best.ids or not found.spans else fitting.fit(found, _solved(found)))
     say("next measurement")
     step = _next(found, decision, best, given)
-    if said.by == "both" and motor is not None:
-        decision, parameters = said, parameters | motor.parameters
     return Diagnosis(
-        found, decision, said, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
-        after, held, step, confusion.confusion(found), absent, motor, None, change,
+        found, decision, decision, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
+        after, held, step, confusion.confusion(found), absent, None, None, change,
     )  # fmt: skip
 
 
@@ -157,21 +150,32 @@ def _solved(found: posterior.Evidence) -> Explanation:
     return max(listed, key=lambda k: found.probability[k], default=NONE)
 
 
-def _with_drive(loads: loss.Decision, drive: loss.Decision) -> loss.Decision:
-    """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width.
+def _of_motor(found: posterior.Evidence) -> dict[Explanation, float]:
+    """Posterior; beside a reference only supply, heat, motor and controller change the speed at a pulse width."""
+    problem = found.problem
+    if problem.free.all() or not np.all(problem.channel == CHANNELS.index("rpm")):
+        return found.probability
+    return {Explanation.of(MOTOR) if k == UNKNOWN else k: p for k, p in found.probability.items()}
 
-    What changes the load with time loads the motor, too.
-    """
-    moves = any("time_s" in effects.catalogue()[i].along for i in loads.leading if i in effects.catalogue()
-                and effects.catalogue()[i].kind == "air")  # fmt: skip
-    if drive.verdict not in loss.CLAIMS or (moves and loads.verdict != "none"):
-        return loads
-    if loads.verdict not in loss.CLAIMS:
-        return replace(drive, by="drive")
-    if "class" in (loads.verdict, drive.verdict):  # a load that changed somehow changes the speed as well
-        return loads
-    return replace(loads, verdict="named", effects=(*loads.effects, *drive.effects), by="both",
-                   sets=(*loads.sets, *drive.sets), probability=min(loads.probability, drive.probability))  # fmt: skip
+
+def _decided(P: Mapping[Explanation, float], plain: Mapping[Explanation, float]) -> loss.Decision:
+    """Decision; that nothing listed fits is no name."""
+    decision = loss.decide(P)
+    return loss.decide(plain) if decision.effects == (MOTOR,) else decision
+
+
+def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
+    """Answer on loads and drive, measured apart: loads at the measured speed, the speed at the pulse width."""
+    P, Q = loss.parts(rotor.found.probability, _of_motor(motor.found))
+    loads, drive = loss.decide(P), _decided(Q, motor.found.probability)
+    if (loads.verdict, loads.effects) == (rotor.said.verdict, rotor.said.effects):
+        loads = replace(loads, why=rotor.said.why)
+    said = loss.joined(loads, drive)
+    if said.by == "drive":
+        return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
+    if said.by == "both":
+        return replace(rotor, decision=said, said=said, parameters=rotor.parameters | motor.parameters, drive=motor)
+    return replace(rotor, said=said, drive=motor)
 
 
 def _scores(found: posterior.Evidence, after: Array, held: Array, gp_only: Array) -> dict[str, dict[str, float]]:

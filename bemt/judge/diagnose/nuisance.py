@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.judge.compare.drive_laws import BY_LOAD
 from bemt.judge.diagnose.noise import law_of, smooth_modes
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.effects.base import Effect
@@ -29,7 +30,7 @@ PRIORS = {
     "density not recorded": 0.015, "airspeed": 0.005, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
     "jet area of a duct": 0.15,
-    "speed at a pulse width from run to run": 0.01,
+    "speed at a pulse width from run to run": 0.01, "losses of a motor from run to run": 0.03,
     "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
 """Standard deviations: shares [1], zeros of full scale [1], parameters of active effects as a share of their published
@@ -88,6 +89,9 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             zero = p.record.zero.get(key, PRIORS[f"{name} zero"] * p.full_scale.get(key, 0.0))
             tag = f" ({p.record.name})" if len(rows) > 1 else ""
             add(f"{name} zero{tag}", np.where(here & (problem.part == i), zero, 0.0))
+            if c == 1 and p.record.electrical:
+                losses = PRIORS["losses of a motor from run to run"]
+                add(f"losses of the motor{tag}", np.where(here & (problem.part == i), losses * y, 0.0), of_reading=True)
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
@@ -164,3 +168,48 @@ def _drives(problem: Problem) -> Iterator[tuple[str, dict[int, Part]]]:
 def _slope(part: Part, channel: str) -> Array:
     by_name = {"thrust_N": part.flow.dT_dV, "torque_Nm": part.flow.dQ_dV}
     return by_name.get(channel, np.zeros(len(part.record)))
+
+
+def following(problem: Problem, loads: Problem) -> Problem:
+    """Problem of a drive with what its speed follows from loads that changed, by as much as they did over the run."""
+    change = _torque_change(loads)
+    here = np.flatnonzero(problem.free & (problem.channel == CHANNELS.index("rpm")))
+    if not here.size or not change.size:
+        return problem
+    level, power, unsure = float(np.median(change)), *BY_LOAD["speed"]
+    bent = abs(power) * float(np.quantile(np.abs(change - level), 0.9)) + unsure * abs(level)
+    pulse = problem.covariates["pwm_s"][problem.point[here]]
+    x = (pulse - pulse.mean()) / max(float(np.ptp(pulse)), 1e-12)
+    follows = abs(power) + unsure
+    shapes = [np.full(here.size, follows * level), 2.0 * bent * x, bent * (8.0 * x**2 - 1.0)]
+    if "time_s" in problem.covariates and "time_s" in loads.covariates:  # what changes a load with time, the motor, too
+        t = loads.covariates["time_s"][loads.point[_torque(loads)]]
+        order = np.argsort(t, kind="stable")
+        now = np.interp(problem.covariates["time_s"][problem.point[here]], t[order], change[order] - level)
+        shapes.append(follows * now)
+    columns = np.zeros((problem.y.size, len(shapes)))
+    columns[here] = np.stack(shapes, axis=1) * problem.f0[here, None]
+    names = tuple(f"load of the motor ({k})" for k in ("level", "slope", "bend", "time")[: len(shapes)])
+    return replace(
+        problem, tangents=np.concatenate([problem.tangents, columns], axis=1), names=(*problem.names, *names),
+        own=np.concatenate([problem.own, np.zeros(len(shapes), dtype=bool)]),
+    )  # fmt: skip
+
+
+def _torque(loads: Problem) -> NDArray[np.bool_]:
+    """Readings of the test that show its torque: thrust where nothing else does, (M,)."""
+    for c in (1, 0):
+        mine = loads.free & (loads.channel == c) & (loads.y * loads.f0 > 0.0)
+        if mine.any():
+            return mine
+    return np.zeros(loads.y.size, dtype=bool)
+
+
+def _torque_change(loads: Problem) -> Array:
+    """How much more torque than before at one speed, natural logarithm: than the reference where there is one."""
+    mine = _torque(loads)
+    if not mine.any():
+        return np.zeros(0)
+    before = ~loads.free & (loads.channel == loads.channel[mine][0]) & (loads.y * loads.f0 > 0.0)
+    usual = float(np.median(np.log(loads.y[before] / loads.f0[before]))) if before.any() else 0.0
+    return np.asarray(np.log(loads.y[mine] / loads.f0[mine]) - usual)
