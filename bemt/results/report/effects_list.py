@@ -89,8 +89,7 @@ def markdown(only: Container[str] | None = None) -> str:
         "",
         'A case switches them: `model.effects_on = ["tip_loss(strength=0.9)"]`, `model.effects_off = ["swirl"]`. Each',
         "parameter has its default, its range with its source, and the value at which the effect is gone. *Seen as* is",
-        "what a diagnosis looks for. Formulas, limits and further sources are in the file,",
-        "`bemt/physics/effects/NAME.py`.",
+        "what a diagnosis looks for. Formulas, limits and further sources are in the file.",
         "",
     ]
     for kind, head in KINDS.items():
