@@ -51,17 +51,16 @@ def numbers(text: str) -> str:
 def commands(text: str) -> str:
     """Fill in the table of the commands, from their declarations."""
     from bemt.app import registry
-    from bemt.app.face import described, parameters
+    from bemt.app.face import described
     from bemt.base.action import about
 
     known = registry.homes()
     names = [name for name in registry.ORDER if name in known]
-    rows = ["| type | it does | options that people use |", "|---|---|---|"]
+    rows = ["| type | it does |", "|---|---|"]
     for name in [*names, *sorted(set(known) - set(names))]:
         function = registry.find(name)
         told, lab = about(function), "" if name in names else "lab "
-        options = [f"`{p.option}`" for p in parameters(function) if p.name in told.common and p.name not in told.words]
-        rows.append(f"| `bemt {lab}{told.example}` | {described(function)[0].rstrip('.')} | {' '.join(options)} |")
+        rows.append(f"| `bemt {lab}{told.example}` | {described(function)[0].rstrip('.')} |")
     return re.sub(r"(?<=\n)\| type \|.*?\n(?=\n)", lambda _: "\n".join(rows) + "\n", text, count=1, flags=re.S)
 
 
