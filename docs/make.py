@@ -186,7 +186,8 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[str]:
                 continue
         items.append(([key], meaning, [said]))
     for keys, meaning, brackets in items:
-        yield f"* {', '.join(f'`{k}`' for k in keys)} {meaning} [{', '.join(dict.fromkeys(brackets))}]"
+        names, limits = ", ".join(f"`{k}`" for k in keys), ", ".join(dict.fromkeys(brackets))
+        yield " ".join(filter(None, ["*", names, meaning, f"[{limits}]"]))
 
 
 def values(name: str, model: type[Table], case: bool) -> Iterator[tuple[str, str, str]]:
@@ -203,7 +204,7 @@ def values(name: str, model: type[Table], case: bool) -> Iterator[tuple[str, str
         if model is ColumnsTable:
             kind = expected(str, limits_of(model.inner(key).named()["unit"]))  # type: ignore[union-attr]
         kind = kind.removeprefix("a ").removeprefix("the ").removesuffix(" that is not empty").removeprefix("one of ")
-        kind = kind.replace("name of a file in the folder of the case", "file")
+        kind = kind.replace("whole number", "integer").replace("name of a file in the folder of the case", "file")
         kind = kind.replace("list of distinct numbers, or {start, stop, num}", "axis")
         if field.is_required():
             default = "required"
@@ -221,7 +222,9 @@ def values(name: str, model: type[Table], case: bool) -> Iterator[tuple[str, str
         unit = limits.unit if limits.unit and not re.search(rf"_{re.escape(limits.unit)}$", key) else ""
         told = [kind if kind != "number" else "", span and f"{span} {unit}".strip(), str(default)]
         told[2] = f"default {told[2]}" if told[2] and told[2] != "required" and "assumed" not in told[2] else told[2]
-        yield key, field.description or "", "; ".join(filter(None, told)) or "number"
+        meaning, known = field.description or "", {*key.split("_"), *name.split("."), "of", "the"}
+        meaning = "" if set(meaning.split()) <= known else meaning  # the key says it
+        yield key, meaning, "; ".join(filter(None, told)) or "number"
 
 
 def files() -> str:

@@ -26,10 +26,21 @@ SLOW = re.compile(r"pytest\.mark\.slow|pytestmark = .*slow")
 
 
 def promise(file: Path) -> str:
-    """First sentence of a module's docstring, without the words that all of them have."""
+    """First clause of a module's docstring, without the words that all of them have and without its subject."""
     text = " ".join((ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").split("\n\n")[0].split())
     said = re.sub(r"^(?:The )?[Pp]romises?(?:: | that | behind | of [^:]*: | to [^:]*: )", "", text)
+    subject = re.match(r"([A-Z]\w{2,})s?: ", said)
+    if subject and file.stem.removeprefix("test_").startswith(subject[1][:5].lower()):
+        said = said[subject.end() :]
+    said = re.split(r"; |\. ", said)[0].rstrip(".") + "."
     return said[:1].upper() + said[1:]
+
+
+def short(text: str) -> str:
+    """Beginning of a figure's sentence, up to a number at least."""
+    words = text.split()
+    n = max(6, next((k + 2 for k, word in enumerate(words) if word[:1].isdigit()), len(words)))
+    return f'"{" ".join(words[:n])}{" …" if n < len(words) else ""}"'
 
 
 def made() -> str:
@@ -40,7 +51,10 @@ def made() -> str:
         for number in figure.stated():
             text = text.replace("#", number, 1)
         held.setdefault(figure.report, []).append(text)
-    rows = [f"* [{report.removeprefix('reports/')}](../{report}): {'; '.join(said)}\n" for report, said in held.items()]
+    rows = [
+        f"* [{report.removeprefix('reports/')}](../{report}): {', '.join(map(short, said))}\n"
+        for report, said in held.items()
+    ]
     tests = []
     for file in sorted((ROOT / "tests").glob("test_*.py")):
         slow = " (partly slow)" if SLOW.search(file.read_text(encoding="utf-8")) else ""

@@ -370,7 +370,7 @@ def test_the_page_of_files_holds_every_key(project: Path, maker: ModuleType) -> 
         for line in text.splitlines():
             if line.startswith("#"):
                 file, head = (line[3:], "") if line.startswith("## ") else (file, line)
-            elif item := re.fullmatch(r"\* ((?:`\w+`, )*`\w+`) .*\[(.*)\]", line):
+            elif item := re.fullmatch(r"\* ((?:`\w+`, )*`\w+`) (?:.* )?\[(.*)\]", line):
                 found.setdefault(f"{file} {head}", set()).update((key, item[2]) for key in item[1].split(", "))
         return found
 
