@@ -14,7 +14,7 @@ import figures  # noqa: E402
 HEAD = """# Promises and their tests
 
 *Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise has a file that fails when it
-breaks.
+breaks; *slow*: a part of it runs only with the slow tests.
 
 ## Figures
 
@@ -57,7 +57,7 @@ def made() -> str:
     ]
     tests = []
     for file in sorted((ROOT / "tests").glob("test_*.py")):
-        slow = " (partly slow)" if SLOW.search(file.read_text(encoding="utf-8")) else ""
+        slow = " *slow*" if SLOW.search(file.read_text(encoding="utf-8")) else ""
         tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}){slow}: {promise(file)}\n")
     return HEAD + "".join(rows) + "\n## Behaviour\n\n" + "".join(tests)
 

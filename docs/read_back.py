@@ -197,9 +197,9 @@ def _started_rows() -> str:
     out = []
     for word in STARTED:
         rows = table[table.target == word]
-        worst = [f"{rows[c].abs().max():.2g} %" for c in ("thrust_off_pct", "torque_off_pct")]
-        over = f"{rows.over_pct.max():.1f} %" if word in ("jsbsim", "mujoco", "fmu") else "-"
-        out.append(f"| `{word}` | " + " | ".join([*(w.replace("nan %", "-") for w in worst), over]) + " |")
+        worst = [f"{rows[c].abs().max():.2g}" for c in ("thrust_off_pct", "torque_off_pct")]
+        over = f"{rows.over_pct.max():.1f}" if word in ("jsbsim", "mujoco", "fmu") else "-"
+        out.append(f"| `{word}` | " + " | ".join([*(w.replace("nan", "-") for w in worst), over]) + " |")
     return "\n".join(out)
 
 
@@ -245,7 +245,7 @@ def _percent(value: Any) -> str:
         value = value.get("flight")
     if value is None:
         return "-"
-    return f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" if value > 1e-3 else "< 0.001 %"
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" if value > 1e-3 else "0.001"
 
 
 def _program(word: str, kept: dict[str, Any]) -> str:
@@ -271,13 +271,8 @@ def _hub_rows(kept: dict[str, Any]) -> str:
             continue
         run = kept.get(word, {})
         if "hub_pct" in run:
-            read = run["program"] if PROGRAMS[word].loads else f"read: {run['program']}; formula of its source"
             cells = [_percent(run["hub_pct"][name]) for name in HUB]
-            rows.append(f"| `{word}` | {read} | {' | '.join(cells)} | {run['hub_points']} |")
-        else:
-            rows.append(
-                f"| `{word}` | text only: {TEXT.get(word, 'formula of its source')} | - | - | - | - | - | - | - |"
-            )
+            rows.append(f"| `{word}` | {' | '.join(cells)} | {run['hub_points']} |")
     return "\n".join(rows)
 
 
@@ -295,11 +290,11 @@ def page() -> str:
         if target.kind == "blade":
             asked = fan if word == "dfdc" else job
             error = entry(target, asked, target.write(asked))["section_error"]
-            row += " - | - |" if error is None else f" {error['cl']:.2f} | {error['cd_pct']:.0f} % |"
+            row += " - | - |" if error is None else f" {error['cl']:.2f} | {error['cd_pct']:.0f} |"
         if target.kind != "solid":
             row += " " + _program(word, kept)
         kinds[target.kind].append(row)
-    ran = "run in | thrust off | torque off | direction of rotation | date |"
+    ran = "run in | thrust off, % | torque off, % | rotation | date |"
     line = "|---|---|---|---|---|---|---|"
     by_hand = {word: f"* `{word}`, {program}, {date}: {what}." for word, (program, date, what) in SEEN.items()}
     blades = "\n".join(line for word, line in by_hand.items() if word in exports() and exports()[word].kind == "blade")
@@ -321,7 +316,7 @@ has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `
 
 ## Thrust and torque for simulators
 
-| target | represents | thrust error | torque error | {ran}
+| target | represents | thrust error, % | torque error, % | {ran}
 {line}--|--|
 {chr(10).join(kinds["loads"])}
 
@@ -339,33 +334,30 @@ at 1/120 s with the motor of the file, MuJoCo and the FMU at the speed of the li
 the library over cases and throttles, in per cent of the load at that throttle. Gazebo, PX4 SIH and ArduPilot were not
 run: these are the formulas of their sources. All rows: [throttles.csv](throttles.csv).
 
-| target | thrust off | torque off | overshoot |
+| target | thrust off, % | torque off, % | overshoot, % |
 |---|---|---|---|
 {_started_rows()}
 
-The last three have the limits of their formulas, whatever the file says:
-
-* `gazebo`: {FORMULA["gazebo"]};
-* `px4`, forward propeller: {FORMULA["px4"]};
-* `ardupilot`: {FORMULA["ardupilot"]}.
+The last three have the limits of their formulas: no Reynolds number, and in ArduPilot one fit for rest and flight.
 
 JSBSim's motor is that of the case's `[drive]`, without one as large as the rotor needs. JSBSim integrates the speed by
 explicit Euler; where light blades would overshoot, `ixx` is raised, and a note says so.
 
-Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
-`drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
+Two scripts run the exported 10x5 without a controller: [hover.py](hover.py) (MuJoCo, at the speed of `drive`) and
+[zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
 
 ## Loads across the shaft
 
 A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
-hub. The targets below carry them (`--hold hub`). Their tables run over speed and the advance ratios along and across
-the shaft. The moments are those of stiff blades and come out too large; see [Wind from any side](oblique.md).
+hub. `--hold hub` refuses targets without them; those below were run (Gazebo: its formula). Their tables run over speed
+and the advance ratios along and across the shaft. The moments are those of stiff blades and come out too large; see
+[Wind from any side](oblique.md).
 
 Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, in per cent of the
 thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
 
-| target | run in | thrust | torque | H | Y | roll | pitch | points |
-|---|---|---|---|---|---|---|---|---|
+| target | thrust | torque | H | Y | roll | pitch | points |
+|---|---|---|---|---|---|---|---|
 {_hub_rows(kept)}
 
 In JSBSim the loads act as external reactions of the aircraft file, and the shaft power stays that of axial flow.
@@ -383,7 +375,7 @@ profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt` with axis, 
 
 ## Blades for design tools
 
-| target | represents | lift coefficient off | drag coefficient off | {ran}
+| target | represents | cl off | cd off, % | {ran}
 {line}--|--|
 {chr(10).join(kinds["blade"])}
 
