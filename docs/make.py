@@ -242,8 +242,8 @@ def files() -> str:
         "Each key has its meaning, and in brackets its kind (a number if none is given), its range and, after `=`, its "
         "default. A file stands beside the one that names it; an axis is a list of numbers or `{start, stop, num}`. An "
         "unknown key is rejected with a hint, and all faults of a file are reported at once. `(assumed)`: taken if the "
-        "file does not state it, with the range that then counts as an uncertainty; `sweep --details` prints its effect "
-        "on the thrust. Fans have their own ranges; the chord shown is that of a 10 in propeller.",
+        "file does not state it, with the range that then counts as an uncertainty; `sweep --details` prints its "
+        "effect on the thrust. Fans have their own ranges; the chord shown is that of a 10 in propeller.",
         "",
     ]
     for name, (model, words) in FILES.items():
