@@ -167,6 +167,11 @@ def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table
             yield from tables(inner, f"{name}.{key}".removeprefix("."))
 
 
+KINDS = {
+    "text or a list of texts": "text(s)", "number or a list of numbers": "number(s)", "list of texts": "texts",
+    "list of numbers": "numbers", "true or false": "boolean",
+}  # fmt: skip
+"""How the page calls what a fault calls so."""
 UNITS = re.compile(r"_(?:in|mm|m)$")
 
 
@@ -204,6 +209,8 @@ def values(name: str, model: type[Table], case: bool) -> Iterator[tuple[str, str
         if model is ColumnsTable:
             kind = expected(str, limits_of(model.inner(key).named()["unit"]))  # type: ignore[union-attr]
         kind = kind.removeprefix("a ").removeprefix("the ").removesuffix(" that is not empty").removeprefix("one of ")
+        for long, short in KINDS.items():
+            kind = kind.replace(long, short)
         kind = kind.replace("whole number", "integer").replace("name of a file in the folder of the case", "file")
         kind = kind.replace("list of distinct numbers, or {start, stop, num}", "axis")
         if field.is_required():
