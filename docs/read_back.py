@@ -283,7 +283,7 @@ def page() -> str:
     kept = json.loads(KEPT.read_text(encoding="utf-8"))
     kinds: dict[str, list[str]] = {"solid": [], "loads": [], "disk": [], "blade": []}
     for word, target in exports().items():
-        row = f"| `{word}` | {target.holds} |"
+        row = f"| `{word}` | {target.holds} |" if target.kind != "solid" else f"`{word}`"
         if target.kind == "loads":
             error = entry(target, job, target.write(job))["fit_error_pct"]
             row += f" {_percent(error['thrust'])} | {_percent(error['torque'])} |"
@@ -394,9 +394,7 @@ reference Reynolds number of the first station for all (a slip of its tqcalc.f),
 
 ## Solids
 
-| target | represents |
-|---|---|
-{chr(10).join(kinds["solid"])}
+{", ".join(kinds["solid"])}: the shape; `flow` is the air around it, `openfoam` a case that finds the loads.
 
 {by_hand["openfoam"]}
 """
