@@ -272,7 +272,8 @@ def files() -> str:
                     words = "channels that can be named."
                 array = table in model.named() and get_origin(model.named()[table].annotation) is tuple
                 head = f"[[{table}]]" if array else f"[{table}]"
-                lines += [f"### `{head}`", "", words[:1].upper() + words[1:], ""] if table else []
+                told = [words[:1].upper() + words[1:], ""] if len(words.split()) > 3 else []
+                lines += [f"### `{head}`", "", *told] if table else []
                 lines += [DRIVE, ""] if model is CaseFile and table == "drive" else []
                 before = seen.setdefault("\n".join(body), head)
                 lines += [*body, ""] if before == head else [f"The keys of `{before}`.", ""]
