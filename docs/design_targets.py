@@ -70,7 +70,8 @@ def row(target: Target, d: Design, strict: Design) -> str:
 
 
 HEAD = (
-    "| target | design W | best label | its W | saved | ideal W | saved within the usual limits | limits reached then |\n"
+    "| target | design W | best label | its W | saved | ideal W | saved within the usual limits | limits reached then "
+    "|\n"
     "|---|---|---|---|---|---|---|---|\n"
 )
 
