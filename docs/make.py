@@ -112,9 +112,9 @@ FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
     "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
-    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor`:"),
-    "thrusters": (ThrustersFile, "For `bemt lab thrusters`:"),
-    "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd`:"),
+    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor` ([example](files/motor.toml))."),
+    "thrusters": (ThrustersFile, "For `bemt lab thrusters` ([example](files/thrusters.toml))."),
+    "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd` ([example](files/campaign.toml))."),
 }
 """Files on the reference page: model, and what the file is for."""
 _TAKEN = completed({"rotor": {}, "blade": {}, "drive": {}})
@@ -255,7 +255,8 @@ def files() -> str:
     ]
     for name, (model, words) in FILES.items():
         example = (DOCS / "files" / f"{name}.toml").read_text(encoding="utf-8")
-        lines += [f"## {name}.toml", "", words, "", "```toml", example.rstrip(), "```", ""]
+        lines += [f"## {name}.toml", "", words, ""]
+        lines += ["```toml", example.rstrip(), "```", ""] if name in ("case", "recording", "run") else []
         lines += [STUDY, ""] if model is RunToml else []
         if model is CaseFile:
             lines += ["Give only one of each of these:", ""]
