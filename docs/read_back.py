@@ -259,8 +259,7 @@ def _program(word: str, kept: dict[str, Any]) -> str:
         return f"{run['program']} | {' | '.join(off)} | {'kept' if run['sense_kept'] else 'LOST'} | {run['date']} |"
     held = "kept" if "rotation" in exports()[word].features else "not held"
     if word in SEEN:
-        program, date, _ = SEEN[word]
-        return f"by hand: {program} | see below | see below | {held} | {date} |"
+        return f"by hand, below | - | - | {held} | {SEEN[word][1]} |"
     return f"text only: {TEXT.get(word, 'formula of its source')} | - | - | {held} | - |"
 
 
@@ -322,10 +321,8 @@ has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `
 
 The errors are those of the model class, from static to zero thrust. With one or three numbers for all speeds they
 include the change of the coefficients from 2,500 to 10,000 rev/min: give `--rpm` near the speed you fly. A single
-constant (`gazebo`) is right at rest and off by the whole thrust in flight.
-
-Tables cover each speed up to 1.2 times the airspeed at which the greatest speed has no thrust, and descent down to
-twice the induced speed at rest; beyond, programs hold the last value.
+constant (`gazebo`) is right at rest and off by the whole thrust in flight. Beyond the tables programs hold the last
+value.
 
 ### From rest, at the program's own step
 
@@ -348,10 +345,9 @@ Two scripts run the exported 10x5 without a controller: [hover.py](hover.py) (Mu
 
 ## Loads across the shaft
 
-A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
-hub. `--hold hub` refuses targets without them; those below were run (Gazebo: its formula). Their tables run over speed
-and the advance ratios along and across the shaft. The moments are those of stiff blades and come out too large; see
-[Wind from any side](oblique.md).
+A wind at an angle to the shaft adds a force H in the plane of the disk, a side force Y, and moments of the hub. `--hold
+hub` refuses targets without them; those below were run (Gazebo: its formula). The moments are those of stiff blades and
+come out too large; see [Wind from any side](oblique.md).
 
 Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, in per cent of the
 thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
@@ -360,7 +356,7 @@ thrust at rest, its torque, and thrust times radius; "-": the target has no such
 |---|---|---|---|---|---|---|---|
 {_hub_rows(kept)}
 
-In JSBSim the loads act as external reactions of the aircraft file, and the shaft power stays that of axial flow.
+In JSBSim the shaft power stays that of axial flow.
 
 ## Disks for flow solvers
 
