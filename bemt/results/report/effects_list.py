@@ -127,7 +127,9 @@ def _wrapped(text: str, indent: str = "") -> list[str]:
 def _short(text: str) -> str:
     """First sentences of a text."""
     said: list[str] = []
-    for sentence in re.split(r"(?<=[a-z0-9)`%]\.) (?=[A-Z`])", " ".join(text.split())):
+    for sentence in re.split(
+        r"(?<=[a-z0-9)`%]\.)(?<! eq\.)(?<!Trans\.)(?<!Aeronaut\.) (?=[A-Z`])", " ".join(text.split())
+    ):
         if said and len(" ".join([*said, sentence]).split()) > SHORT:
             break
         said.append(sentence)
