@@ -260,7 +260,7 @@ def files() -> str:
         lines += [STUDY, ""] if model is RunToml else []
         if model is CaseFile:
             lines += ["Give only one of each of these:", ""]
-            lines += [f"* `[{table}]` {', '.join(keys)}" for table, keys, _ in GROUPS] + [""]
+            lines += [f"* `[{table}]` {', '.join(keys)}" for table, keys, _ in GROUPS] + ["", "At the top:", ""]
         seen: dict[str, str] = {}
         for table, inner in tables(model):
             body = list(rows(table, inner, model is CaseFile))
