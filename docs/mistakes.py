@@ -58,12 +58,12 @@ def answer(name: str) -> str:
     if all(word in said or not said for word in words):
         shown = said
     else:  # the answer runs over several lines
-        hits = [i for i, line in enumerate(lines) if any(word in line for word in words)]
-        shown = " ".join(lines[i] for i in hits[:3])
+        hits = [line for line in lines if any(word in line for word in words)]
+        shown = " ".join([line for line in hits if line.startswith("!")] or hits[:3])
     shown = re.sub(r"(expected one of (?:[\w./-]+, ){3})(?:[\w./-]+, )+[\w./-]+", r"\1...", shown)
     assert code in (0, 2)
     fine = " (0)" if code == 0 else ""
-    return f"* **{name}**, `{typed[0]}`{fine}: {shown}"
+    return f"* **{name}**, `{typed[0]}`{fine}: {' '.join(shown.split())}"
 
 
 def main() -> None:
