@@ -51,17 +51,16 @@ def numbers(text: str) -> str:
 def commands(text: str) -> str:
     """Fill in the table of the commands, from their declarations."""
     from bemt.app import registry
-    from bemt.app.face import described, parameters
+    from bemt.app.face import described
     from bemt.base.action import about
 
     known = registry.homes()
     names = [name for name in registry.ORDER if name in known]
-    rows = ["| type | it does | options that people use |", "|---|---|---|"]
+    rows = ["| type | it does |", "|---|---|"]
     for name in [*names, *sorted(set(known) - set(names))]:
         function = registry.find(name)
         told, lab = about(function), "" if name in names else "lab "
-        options = [f"`{p.option}`" for p in parameters(function) if p.name in told.common and p.name not in told.words]
-        rows.append(f"| `bemt {lab}{told.example}` | {described(function)[0].rstrip('.')} | {' '.join(options)} |")
+        rows.append(f"| `bemt {lab}{told.example}` | {described(function)[0].rstrip('.')} |")
     return re.sub(r"(?<=\n)\| type \|.*?\n(?=\n)", lambda _: "\n".join(rows) + "\n", text, count=1, flags=re.S)
 
 
@@ -113,9 +112,9 @@ FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
     "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
-    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor`:"),
-    "thrusters": (ThrustersFile, "For `bemt lab thrusters`:"),
-    "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd`:"),
+    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor` ([example](files/motor.toml))."),
+    "thrusters": (ThrustersFile, "For `bemt lab thrusters` ([example](files/thrusters.toml))."),
+    "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd` ([example](files/campaign.toml))."),
 }
 """Files on the reference page: model, and what the file is for."""
 _TAKEN = completed({"rotor": {}, "blade": {}, "drive": {}})
@@ -133,30 +132,24 @@ vehicle.rotors = 4
 `drive`, `sweep`, `report` and `export` take the greatest speed and thrust from it, at the charge `soc`. An unknown of
 the drive is declared like any other: `[[assumptions]]` with `key = "drive.battery.resistance_mohm"`."""
 
-STUDY = """One condition on two grids or more is a study: `bemt import COARSE MEDIUM FINE --out study.toml` writes it,
-and every command takes it as a run. The three are run.toml files that state their `cells`, or exports with `--setup
-cells=0.5e6,1.7e6,5.8e6`, one number a file. A table whose rows differ in a column of cells is a study without
-more.
+STUDY = """One condition on two grids or more is a study: `bemt import COARSE MEDIUM FINE --out study.toml` writes it
+(with `--setup cells=0.5e6,1.7e6,5.8e6` if the files do not state their cells), and every command takes it as a run. A
+table with a column of cells that varies is a study, too.
 
 ```toml
 [[grids]]
 files = ["coarse.toml"]
 
 [[grids]]
-files = ["medium.toml"]
-
-[[grids]]
 files = ["fine.toml"]
 ```
 
 The value is that of the finest grid. Its uncertainty is GCI / 1.15 with the observed order of the finest three
-(Celik 2008; Roache 1994: factor 1.25, with two grids 3 and order 2), and takes the place of the floor that a run
-without a study has. Where the values oscillate, diverge or give an order outside 0.5 to 3, three times their
-spread over 1.15 is taken, and a note says so. 7.05, 7.42 and 7.57 N on 0.5, 1.7 and 5.8 million cells give order
-2.22, 7.671 N at cell size 0 and an uncertainty of 1.5 %.
+(Celik 2008; Roache 1994: factor 1.25, with two grids 3 and order 2). Where the values oscillate, diverge or give an
+order outside 0.5 to 3, it is three times their spread over 1.15, and a note says so. 7.05, 7.42 and 7.57 N on 0.5, 1.7
+and 5.8 million cells give order 2.22 and an uncertainty of 1.5 %.
 
-A heading means the same here as in a table of a bench: `V [m s^-1]`, `U`, `Velocity` are the airspeed, `T [N]` and
-`Q [N m]` thrust and torque, `J` the advance ratio. A column that varies and became none of them is named."""
+Headings mean the same as in a table of a bench: `V [m s^-1]`, `U` and `Velocity` are the airspeed."""
 
 
 def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table]]]:
@@ -174,21 +167,52 @@ def tables(model: type[Table], name: str = "") -> Iterator[tuple[str, type[Table
             yield from tables(inner, f"{name}.{key}".removeprefix("."))
 
 
+KINDS = {
+    "text or a list of texts": "text(s)", "number or a list of numbers": "number(s)", "list of texts": "texts",
+    "list of numbers": "numbers", "true or false": "boolean",
+}  # fmt: skip
+"""How the page calls what a fault calls so."""
+UNITS = re.compile(r"_(?:in|mm|m)$")
+
+
 def rows(name: str, model: type[Table], case: bool) -> Iterator[str]:
-    """An item for every value of a table: meaning, and in brackets kind, range and default, as far as they say more."""
+    """An item for every value of a table: meaning, and in brackets kind, range and default, as far as they say more.
+
+    Keys of one length in several units share an item, and so do neighbours with the same meaning and limits.
+    """
+    items: list[tuple[list[str], str, list[str]]] = []
+    for key, meaning, said in values(name, model, case):
+        if items:
+            keys, before, brackets = items[-1]
+            stem = UNITS.sub("", key)
+            if meaning == before and (said == brackets[-1] or (stem != key and stem == UNITS.sub("", keys[-1]))):
+                keys.append(key)
+                brackets.append(said)
+                continue
+        items.append(([key], meaning, [said]))
+    for keys, meaning, brackets in items:
+        names, limits = ", ".join(f"`{k}`" for k in keys), ", ".join(dict.fromkeys(brackets))
+        yield " ".join(filter(None, ["*", names, meaning, f"[{limits}]"]))
+
+
+def values(name: str, model: type[Table], case: bool) -> Iterator[tuple[str, str, str]]:
+    """Key, meaning and limits of every value of a table."""
     taken = _TAKEN if case else {}
     for part in name.split(".") if name else ():
         taken = taken.get(part, {})
-    notes = {item["key"]: f", {item['low']:g} to {item['high']:g}" for item in _TAKEN["assumptions"]}
+    notes = {item["key"]: f", {item['low']:g}…{item['high']:g}" for item in _TAKEN["assumptions"]}
     for key, field in model.named().items():
         if model.inner(key) is not None and model is not ColumnsTable:
             continue
         limits, default = limits_of(field), field.default
         kind = expected(field.annotation, replace(limits, low=FieldLimits.low, high=FieldLimits.high, unit=""))
         if model is ColumnsTable:
-            kind = "unit " + expected(str, limits_of(model.inner(key).named()["unit"]))  # type: ignore[union-attr]
-        kind = kind.removeprefix("a ").removeprefix("the ").removesuffix(" that is not empty")
-        kind = kind.replace("name of a file in the folder of the case", "file beside the case")
+            kind = expected(str, limits_of(model.inner(key).named()["unit"]))  # type: ignore[union-attr]
+        kind = kind.removeprefix("a ").removeprefix("the ").removesuffix(" that is not empty").removeprefix("one of ")
+        for long, short in KINDS.items():
+            kind = kind.replace(long, short)
+        kind = kind.replace("whole number", "integer").replace("name of a file in the folder of the case", "file")
+        kind = kind.replace("list of distinct numbers, or {start, stop, num}", "axis")
         if field.is_required():
             default = "required"
         elif key in taken and default in (None, 0.0, "propeller"):
@@ -196,17 +220,23 @@ def rows(name: str, model: type[Table], case: bool) -> Iterator[str]:
         elif default is None or default == ():
             default = ""
         elif isinstance(default, tuple):
-            default = ", ".join(f"{v:g}" for v in default)
+            many = len(default) > 4
+            default = (
+                f"{default[0]:g}…{default[-1]:g} in {len(default)} values"
+                if many
+                else ", ".join(map("{:g}".format, default))
+            )
         span = (
-            f"{limits.low:.6g} to {limits.high:.6g}"
+            f"{limits.low:.6g}…{limits.high:.6g}"
             if limits.low > FieldLimits.low and limits.high < FieldLimits.high
             else (f"{limits.low:g} or more" if limits.low > FieldLimits.low else "")
         )
         unit = limits.unit if limits.unit and not re.search(rf"_{re.escape(limits.unit)}$", key) else ""
         told = [kind if kind != "number" else "", span and f"{span} {unit}".strip(), str(default)]
-        told[2] = f"default {told[2]}" if told[2] and told[2] != "required" and "assumed" not in told[2] else told[2]
-        said = "; ".join(filter(None, told)) or "number"
-        yield f"* `{key}` {field.description or ''} [{said}]"
+        told[2] = f"={told[2]}" if told[2] and told[2] != "required" and "assumed" not in told[2] else told[2]
+        meaning, known = field.description or "", {*key.split("_"), *name.split("."), "of", "the"}
+        meaning = "" if set(meaning.split()) <= known else meaning  # the key says it
+        yield key, meaning, "; ".join(filter(None, told)) or "number"
 
 
 def files() -> str:
@@ -216,20 +246,22 @@ def files() -> str:
         "",
         "Every key of the files that the commands read. Generated by `python docs/make.py`; do not edit.",
         "",
-        "Each key has its meaning, and in brackets its kind, unless it is a number, its range and its default. "
-        "Key names include the unit. An unknown key is rejected with a hint, and all faults of a file are "
-        "reported at once. `(assumed)`: used if the file does not state hub, chord, section or air, with the range "
-        "that then counts as an uncertainty; `sweep --details` prints its effect on the thrust. Fans have their own "
-        "ranges; the chord shown is that of a 10 in propeller.",
+        "Each key has its meaning, and in brackets its kind (a number if none is given), its range and, after `=`, its "
+        "default. A file stands beside the one that names it; an axis is a list of numbers or `{start, stop, num}`. An "
+        "unknown key is rejected with a hint, and all faults of a file are reported at once. `(assumed)`: taken if the "
+        "file does not state it, with the range that then counts as an uncertainty; `sweep --details` prints its "
+        "effect on the thrust. Fans have their own ranges; the chord shown is that of a 10 in propeller.",
         "",
     ]
     for name, (model, words) in FILES.items():
         example = (DOCS / "files" / f"{name}.toml").read_text(encoding="utf-8")
-        lines += [f"## {name}.toml", "", words, "", "```toml", example.rstrip(), "```", ""]
+        lines += [f"## {name}.toml", "", words, ""]
+        lines += ["```toml", example.rstrip(), "```", ""] if name in ("case", "recording", "run") else []
         lines += [STUDY, ""] if model is RunToml else []
         if model is CaseFile:
             lines += ["Give only one of each of these:", ""]
-            lines += [f"* `[{table}]` {', '.join(keys)}" for table, keys, _ in GROUPS] + [""]
+            lines += [f"* `[{table}]` {', '.join(keys)}" for table, keys, _ in GROUPS] + ["", "At the top:", ""]
+        seen: dict[str, str] = {}
         for table, inner in tables(model):
             body = list(rows(table, inner, model is CaseFile))
             if body:
@@ -241,9 +273,11 @@ def files() -> str:
                     words = "channels that can be named."
                 array = table in model.named() and get_origin(model.named()[table].annotation) is tuple
                 head = f"[[{table}]]" if array else f"[{table}]"
-                lines += [f"### `{head}`", "", words[:1].upper() + words[1:], ""] if table else []
+                told = [words[:1].upper() + words[1:], ""] if len(words.split()) > 3 else []
+                lines += [f"### `{head}`", "", *told] if table else []
                 lines += [DRIVE, ""] if model is CaseFile and table == "drive" else []
-                lines += [*body, ""]
+                before = seen.setdefault("\n".join(body), head)
+                lines += [*body, ""] if before == head else [f"The keys of `{before}`.", ""]
     return "\n".join(lines)
 
 

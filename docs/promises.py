@@ -13,40 +13,53 @@ import figures  # noqa: E402
 
 HEAD = """# Promises and their tests
 
-*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise leads to the file that
-fails when it breaks.
+*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise has a file that fails when it
+breaks; *slow*: a part of it runs only with the slow tests.
 
 ## Figures
 
-Every figure of the README and of [what to believe](believe.md), with the committed report that holds it.
+Figures of the README and of [what to believe](believe.md), by the committed report that holds them.
 [`tests/test_figures.py`](../tests/test_figures.py) compares them, and fails where a figure has no report.
 
-| figure | report |
-|---|---|
 """
 SLOW = re.compile(r"pytest\.mark\.slow|pytestmark = .*slow")
 
 
 def promise(file: Path) -> str:
-    """First sentence of a module's docstring, without the words that all of them have."""
+    """First clause of a module's docstring, without the words that all of them have and without its subject."""
     text = " ".join((ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").split("\n\n")[0].split())
     said = re.sub(r"^(?:The )?[Pp]romises?(?:: | that | behind | of [^:]*: | to [^:]*: )", "", text)
-    return (said[:1].upper() + said[1:]).replace("|", r"\|")
+    subject = re.match(r"([A-Z]\w{2,})s?: ", said)
+    if subject and file.stem.removeprefix("test_").startswith(subject[1][:5].lower()):
+        said = said[subject.end() :]
+    said = re.split(r"; |\. ", said)[0].rstrip(".") + "."
+    return said[:1].upper() + said[1:]
+
+
+def short(text: str) -> str:
+    """Beginning of a figure's sentence, up to a number at least."""
+    words = text.split()
+    n = max(6, next((k + 2 for k, word in enumerate(words) if word[:1].isdigit()), len(words)))
+    return f'"{" ".join(words[:n])}{" …" if n < len(words) else ""}"'
 
 
 def made() -> str:
     """The page."""
-    rows = []
+    held: dict[str, list[str]] = {}
     for figure in figures.FIGURES:
         text = figure.sentence
         for number in figure.stated():
             text = text.replace("#", number, 1)
-        rows.append(f"| {text} | [{Path(figure.report).name}](../{figure.report}) |\n")
+        held.setdefault(figure.report, []).append(text)
+    rows = [
+        f"* [{report.removeprefix('reports/')}](../{report}): {', '.join(map(short, said))}\n"
+        for report, said in held.items()
+    ]
     tests = []
     for file in sorted((ROOT / "tests").glob("test_*.py")):
-        slow = ", part of it slow" if SLOW.search(file.read_text(encoding="utf-8")) else ""
-        tests.append(f"| {promise(file)} | [{file.name}](../tests/{file.name}){slow} |\n")
-    return HEAD + "".join(rows) + "\n## Behaviour\n\n| promise | test |\n|---|---|\n" + "".join(tests)
+        slow = " *slow*" if SLOW.search(file.read_text(encoding="utf-8")) else ""
+        tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}){slow}: {promise(file)}\n")
+    return HEAD + "".join(rows) + "\n## Behaviour\n\n" + "".join(tests)
 
 
 if __name__ == "__main__":

@@ -192,40 +192,38 @@ FORMULA = {
 
 
 def _started_rows() -> str:
-    """Worst of five throttles per case and target."""
+    """Worst of all cases and throttles, by target."""
     table = pd.read_csv(STARTED_CSV)
     out = []
-    for case, rows in table.groupby("case", sort=False):
-        cells = []
-        for word in STARTED:
-            one = rows[rows.target == word]
-            worst = [f"{one[c].abs().max():.2g}" for c in ("thrust_off_pct", "torque_off_pct")]
-            over = f"{one.over_pct.max():.1f}" if word in ("jsbsim", "mujoco", "fmu") else ""
-            cells.append(" / ".join([w.replace("nan", "-") for w in worst] + ([over] if over else [])))
-        out.append(f"| {case} | " + " | ".join(cells) + " |")
+    for word in STARTED:
+        rows = table[table.target == word]
+        worst = [f"{rows[c].abs().max():.2g}" for c in ("thrust_off_pct", "torque_off_pct")]
+        over = f"{rows.over_pct.max():.1f}" if word in ("jsbsim", "mujoco", "fmu") else "-"
+        out.append(f"| `{word}` | " + " | ".join([*(w.replace("nan", "-") for w in worst), over]) + " |")
     return "\n".join(out)
 
 
-def _qprop_rows() -> str:
-    """Differences of QPROP's equations."""
-    return "\n".join(
-        f"| {name} | {rpm:.0f} | {V:.1f} | {T:+.1f} % | {Q:+.1f} % |"
-        for name, rpm, V, T, Q in qprop_equations.compared()
-    )
+def _qprop() -> str:
+    """Differences of QPROP's equations, at rest and in flight."""
+    rows = list(qprop_equations.compared())
+    said = []
+    for when, some in (("at rest", [r for r in rows if r[2] == 0.0]), ("in flight", [r for r in rows if r[2] > 0.0])):
+        spans = [f"{load} {min(r[k] for r in some):+.1f} to {max(r[k] for r in some):+.1f} %"
+                 for k, load in ((3, "thrust"), (4, "torque"))]  # fmt: skip
+        said.append(f"{when} {' and '.join(spans)}")
+    return "; ".join(said)
 
 
 SEEN = {
     "dfdc": ("DFDC 0.70, built from its source", "2026-11-26", "`ds30`: thrust +8 to +14 %, torque +23 to +28 % of "
              "BEMT's, because the file has neither stator nor tip gap, and its sections are parabolas; like for like, "
-             "see [Ducts](duct.md). A file of 30 stations converges in 16 "
-             "iterations; with 40 or 60 it is NaN"),
+             "see [Ducts](duct.md). Use 30 stations: with 40 or 60 it is NaN"),
     "openfoam": ("OpenFOAM 1912 of Debian", "2026-11-23", "10x5, 10,000 rev/min, at rest, level 5: Allrun ends with "
                  "11.4 N and 0.205 N m; BEMT 13.5 N and 0.200 N m; the grid is the coarsest and shows no convergence"),
-    "qprop": ("its own equations (docs/qprop_equations.py)", "2026-11-26", "the four propellers of `cases/`, table "
-              "below; QPROP 1.22, built from its source, agreed within +9 to -1 %"),
+    "qprop": ("its own equations (docs/qprop_equations.py)", "2026-11-26", "the four propellers of `cases/`, "
+              "numbers below; QPROP 1.22, built from its source, agreed within +9 to -1 %"),
     "xrotor": ("XROTOR 7.55, built from its source", "2026-11-26", "10x5: thrust and torque within +3.9 to -0.5 % of "
-               "BEMT's; with an earlier fit of the sections torque was +5 to +16 %, and at one speed XROTOR settled on "
-               "a stalled root"),
+               "BEMT's"),
 }  # fmt: skip
 """Runs by hand, of programs that neither Debian nor PyPI has, or that take long: program, date, what it said."""
 
@@ -247,7 +245,7 @@ def _percent(value: Any) -> str:
         value = value.get("flight")
     if value is None:
         return "-"
-    return f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" if value > 1e-3 else "< 0.001 %"
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" if value > 1e-3 else "0.001"
 
 
 def _program(word: str, kept: dict[str, Any]) -> str:
@@ -261,8 +259,7 @@ def _program(word: str, kept: dict[str, Any]) -> str:
         return f"{run['program']} | {' | '.join(off)} | {'kept' if run['sense_kept'] else 'LOST'} | {run['date']} |"
     held = "kept" if "rotation" in exports()[word].features else "not held"
     if word in SEEN:
-        program, date, _ = SEEN[word]
-        return f"by hand: {program} | see below | see below | {held} | {date} |"
+        return f"by hand, below | - | - | {held} | {SEEN[word][1]} |"
     return f"text only: {TEXT.get(word, 'formula of its source')} | - | - | {held} | - |"
 
 
@@ -273,13 +270,8 @@ def _hub_rows(kept: dict[str, Any]) -> str:
             continue
         run = kept.get(word, {})
         if "hub_pct" in run:
-            read = run["program"] if PROGRAMS[word].loads else f"read: {run['program']}; formula of its source"
             cells = [_percent(run["hub_pct"][name]) for name in HUB]
-            rows.append(f"| `{word}` | {read} | {' | '.join(cells)} | {run['hub_points']} |")
-        else:
-            rows.append(
-                f"| `{word}` | text only: {TEXT.get(word, 'formula of its source')} | - | - | - | - | - | - | - |"
-            )
+            rows.append(f"| `{word}` | {' | '.join(cells)} | {run['hub_points']} |")
     return "\n".join(rows)
 
 
@@ -290,18 +282,18 @@ def page() -> str:
     kept = json.loads(KEPT.read_text(encoding="utf-8"))
     kinds: dict[str, list[str]] = {"solid": [], "loads": [], "disk": [], "blade": []}
     for word, target in exports().items():
-        row = f"| `{word}` | {target.holds} |"
+        row = f"| `{word}` | {target.holds} |" if target.kind != "solid" else f"`{word}`"
         if target.kind == "loads":
             error = entry(target, job, target.write(job))["fit_error_pct"]
             row += f" {_percent(error['thrust'])} | {_percent(error['torque'])} |"
         if target.kind == "blade":
             asked = fan if word == "dfdc" else job
             error = entry(target, asked, target.write(asked))["section_error"]
-            row += " - | - |" if error is None else f" {error['cl']:.2f} | {error['cd_pct']:.0f} % |"
+            row += " - | - |" if error is None else f" {error['cl']:.2f} | {error['cd_pct']:.0f} |"
         if target.kind != "solid":
             row += " " + _program(word, kept)
         kinds[target.kind].append(row)
-    ran = "run in | thrust off | torque off | direction of rotation | date |"
+    ran = "run in | thrust off, % | torque off, % | rotation | date |"
     line = "|---|---|---|---|---|---|---|"
     by_hand = {word: f"* `{word}`, {program}, {date}: {what}." for word, (program, date, what) in SEEN.items()}
     blades = "\n".join(line for word, line in by_hand.items() if word in exports() and exports()[word].kind == "blade")
@@ -311,78 +303,60 @@ Generated by `python docs/read_back.py`; do not edit.
 
     bemt export CASE --out DIR --format TARGET [TARGET ...]
 
-This writes each simulator model, disk and blade into a folder of its own, such as `DIR/jsbsim`. Solids are files in
-DIR, and `openfoam` makes DIR the case: `cd DIR && ./Allrun`. `DIR/manifest.json` says what each target can represent,
-the fit error, the band of the prediction, conventions, the direction of rotation, and the valid range. With `--hold
-reynolds` (or torque, airspeed, windmill, mach, density, rest, duct, sections, rotation, hub) a target that cannot
-represent it is refused; the others are written and the exit code is 2. Another format into the same folder keeps what
-is there; the manifest lists both, and the terminal names formats that were written from another state of the case.
+Each simulator model, disk and blade gets a folder of its own, such as `DIR/jsbsim`. Solids are files in DIR, and
+`openfoam` makes DIR the case: `cd DIR && ./Allrun`. `DIR/manifest.json` says what each target can represent, the fit
+error, the band of the prediction, conventions, the direction of rotation, and the valid range. `--hold reynolds` (or
+torque, airspeed, windmill, mach, density, rest, duct, sections, rotation, hub) refuses targets that cannot represent
+it; the others are written and the exit code is 2.
 
 "Run in" says which program took the file, at the same operating points as BEMT, once right- and once left-handed.
-"Off" is the greatest difference to BEMT, in per cent of the greatest load at the same speed: it holds the error of the
-model class and that of the file. Where it says "text only", no program has read the file. All rows are for the 10x5 in
-`cases/` up to 10,000 rev/min; `dfdc` uses the fan `ds30`.
+"Off" is the greatest difference to BEMT, in per cent of the greatest load at the same speed. "Text only": no program
+has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 
 ## Thrust and torque for simulators
 
-| target | represents | thrust error | torque error | {ran}
+| target | represents | thrust error, % | torque error, % | {ran}
 {line}--|--|
 {chr(10).join(kinds["loads"])}
 
-The errors of the model class are from static to zero thrust, at points that are no nodes of the table. The programs
-with a table were also run in descent and as a windmill. For targets with one or three numbers for all speeds, the error
-includes the change of the coefficients from 2,500 to 10,000 rev/min (Reynolds number): give `--rpm` near the speed you
-fly. A single constant (`gazebo`) is right in static operation and off by the whole thrust in flight. That is a limit of
-the model, not of the fit.
-
-Tables end where simulated aircraft rarely fly, because programs hold the last value: each speed is covered up to 1.2
-times the airspeed at which the greatest speed has no thrust (J up to 4.8 times that of zero thrust), and an open rotor
-in descent down to twice its induced speed at rest. The coefficients hold the Reynolds numbers of the case's air; a
-note in the manifest says what three quarters of that density would change.
+The errors are those of the model class, from static to zero thrust. With one or three numbers for all speeds they
+include the change of the coefficients from 2,500 to 10,000 rev/min: give `--rpm` near the speed you fly. A single
+constant (`gazebo`) is right at rest and off by the whole thrust in flight. Beyond the tables programs hold the last
+value.
 
 ### From rest, at the program's own step
 
 Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim
-with its own step of 1/120 s and the motor of the file, MuJoCo and the FMU with their own steps at the speed that the
-library's drive has at that throttle. Greatest difference to the library of thrust / torque, in per cent of the load at
-that throttle; the third number is the overshoot [%]. Gazebo, PX4 SIH and ArduPilot were not run: these are the formulas
-of their sources on the files that were written. All rows: [throttles.csv](throttles.csv).
+at 1/120 s with the motor of the file, MuJoCo and the FMU at the speed of the library's drive. Greatest difference to
+the library over cases and throttles, in per cent of the load at that throttle. Gazebo, PX4 SIH and ArduPilot were not
+run: these are the formulas of their sources. All rows: [throttles.csv](throttles.csv).
 
-| case | jsbsim | mujoco | fmu | gazebo | px4 | ardupilot |
-|---|---|---|---|---|---|---|
+| target | thrust off, % | torque off, % | overshoot, % |
+|---|---|---|---|
 {_started_rows()}
 
-The last three have the limits of their formulas, whatever the file says:
+The last three have the limits of their formulas: no Reynolds number, and in ArduPilot one fit for rest and flight.
 
-* `gazebo`: {FORMULA["gazebo"]};
-* `px4`, forward propeller: {FORMULA["px4"]};
-* `ardupilot`: {FORMULA["ardupilot"]}.
+JSBSim's motor is that of the case's `[drive]`, without one as large as the rotor needs. JSBSim integrates the speed by
+explicit Euler; where light blades would overshoot, `ixx` is raised, and a note says so.
 
-JSBSim's motor is a `<brushless_dc_motor>`: that of the case's `[drive]`, with the battery's resistance and the current
-limit taken off the throttle by the system file; without a `[drive]` one as large as the rotor needs. JSBSim integrates
-the speed by explicit Euler. Where the blades are so light that its own step would overshoot, `ixx` is raised, and a
-note says from what and up to which step the file holds. Tables reach the speed that the case states and the one that
-its motor reaches; where these differ a note says so.
-
-Two scripts run the exported 10x5 in a simulator without a controller: [hover.py](hover.py) (MuJoCo, at the speed that
-`drive` predicts) and [zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
+Two scripts run the exported 10x5 without a controller: [hover.py](hover.py) (MuJoCo, at the speed of `drive`) and
+[zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
 
 ## Loads across the shaft
 
-A wind at an angle to the shaft adds a force H in the plane of the disk, downstream, a side force Y, and moments of the
-hub. Seven targets carry them (`--hold hub`); the others say in their notes that they do not. Tables run over speed and
-the advance ratios along and across the shaft; their angle is atan2 of the two. `table` also writes them as a CSV with
-the angle between wind and shaft. RotorPy and Gazebo have one number for each load that they know. The moments are those
-of stiff blades and come out too large; see [Wind from any side](oblique.md).
+A wind at an angle to the shaft adds a force H in the plane of the disk, a side force Y, and moments of the hub. `--hold
+hub` refuses targets without them; those below were run (Gazebo: its formula). The moments are those of stiff blades and
+come out too large; see [Wind from any side](oblique.md).
 
-Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, wind from any side, in
-per cent of the thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
+Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, in per cent of the
+thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
 
-| target | run in | thrust | torque | H | Y | roll | pitch | points |
-|---|---|---|---|---|---|---|---|---|
+| target | thrust | torque | H | Y | roll | pitch | points |
+|---|---|---|---|---|---|---|---|
 {_hub_rows(kept)}
 
-In JSBSim the loads act as external reactions of the aircraft file, and the shaft power stays that of axial flow.
+In JSBSim the shaft power stays that of axial flow.
 
 ## Disks for flow solvers
 
@@ -390,40 +364,33 @@ In JSBSim the loads act as external reactions of the aircraft file, and the shaf
 {line}
 {chr(10).join(kinds["disk"])}
 
-`fan`, `rotor-disk` and `su2-disk` prescribe the load from BEMT. The other two solve the inflow themselves. `fan` is a
-radial profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt`, which says axis, direction and units.
-OpenFOAM's `rotorDisk` with ordinary section tables is wrong for propellers: lift acts along the axis, and the torque
-lacks cl sin(phi). See [reports/disk](../reports/disk/README.md) for the run.
+`fan`, `rotor-disk` and `su2-disk` prescribe the load from BEMT; `flow360` solves the inflow itself. `fan` is a radial
+profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt` with axis, direction and units. OpenFOAM's
+`rotorDisk` with ordinary section tables is wrong for propellers: the torque lacks cl sin(phi)
+([reports/disk](../reports/disk/README.md)).
 
 ## Blades for design tools
 
-| target | represents | lift coefficient off | drag coefficient off | {ran}
+| target | represents | cl off | cd off, % | {ran}
 {line}--|--|
 {chr(10).join(kinds["blade"])}
 
 "Off" in the section columns is the greatest error of the fitted section between the stalls; C81 holds the tables
-themselves at its operating point and has no Reynolds number dependence. These programs have wake models of their own,
-so their loads are not those of BEMT. Runs by hand:
+themselves, at one Reynolds number per station. These programs have wake models of their own, so their loads are not
+those of BEMT. Runs by hand:
 
 {blades}
 
-The exported files in QPROP's equations, beside BEMT at the same point:
+The exported files in QPROP's equations, beside BEMT:
+{_qprop()}.
+At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it. QPROP takes the
+reference Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
-| case | rev/min | m/s | thrust off | torque off |
-|---|---|---|---|---|
-{_qprop_rows()}
-
-At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it: thrust is high
-where the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference
-Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
-
-`bemt lab stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
+`bemt lab stations FILE` turns an XROTOR, QPROP or DFDC file into a case.
 
 ## Solids
 
-| target | represents |
-|---|---|
-{chr(10).join(kinds["solid"])}
+{", ".join(kinds["solid"])}: the shape; `flow` is the air around it, `openfoam` a case that finds the loads.
 
 {by_hand["openfoam"]}
 """

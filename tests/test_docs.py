@@ -370,8 +370,8 @@ def test_the_page_of_files_holds_every_key(project: Path, maker: ModuleType) -> 
         for line in text.splitlines():
             if line.startswith("#"):
                 file, head = (line[3:], "") if line.startswith("## ") else (file, line)
-            elif item := re.fullmatch(r"\* (`\w+`) .*\[(.*)\]", line):
-                found.setdefault(f"{file} {head}", set()).add((item[1], item[2]))
+            elif item := re.fullmatch(r"\* ((?:`\w+`, )*`\w+`) (?:.* )?\[(.*)\]", line):
+                found.setdefault(f"{file} {head}", set()).update((key, item[2]) for key in item[1].split(", "))
         return found
 
     written = keys((project / "docs" / "reference_files.md").read_text(encoding="utf-8"))

@@ -1,7 +1,8 @@
 """Ducted rotors beside what was measured or computed of them: ``python reports/studies/duct_fans.py``.
 
-Prints the tables of docs/duct.md and draws docs/img/duct.png. The folder of the recordings is named by the variable
-``BEMT_DATA``. Sources and faults of the recordings: tests/test_duct.py, which builds the same fans.
+Prints the tables of which docs/duct.md shows the ends and draws docs/img/duct.png. The folder of the recordings is
+named by the variable ``BEMT_DATA``. Sources and faults of the recordings: tests/test_duct.py, which builds the same
+fans.
 """
 
 from __future__ import annotations

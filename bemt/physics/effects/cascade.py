@@ -32,11 +32,12 @@ class Cascade(Effect):
 
     Notes
     -----
-    A row turns the flow at most to its own exit angle. Isolated sections do not know that: at solidity 1 they turn it
-    50 % too far. ``form = "potential"``: slope and zero-lift angle of the row of the blade's own sections, thick and
-    cambered (:func:`bemt.physics.sections.row.row_shift`), over those of the isolated section. The table is read at the
-    angle where the isolated section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift). Drag and
-    stall move with the lift. A blade without section shapes uses one with the zero-lift angle of the table. ``form =
+    A row turns the flow at most to its own exit angle (potential flow of the row; losses: Carter 1950, Lieblein 1959,
+    Howell 1945, not checked). Isolated sections turn it 50 % too far at solidity 1. ``form = "potential"``: slope and
+    zero-lift angle of the row of the blade's own sections, thick and cambered
+    (:func:`bemt.physics.sections.row.row_shift`), over those of the isolated section. The table is read at the angle
+    where the isolated section carries the same share of its lift, alpha_0 + K (alpha - alpha_0 - shift). Drag and stall
+    move with the lift. A blade without section shapes uses one with the zero-lift angle of the table. ``form =
     "carter"``: Weinig's slope of flat plates; the zero-lift angle makes a circular arc at zero incidence leave with
     Carter's deviation, m theta sqrt(s/c) with m = 0.23 + 0.1 beta_2 / 50 deg (Carter 1950, ARC R&M 2804; as quoted in
     Cohen, Rogers and Saravanamuttoo, Gas Turbine Theory, sec. 5.9; not checked), in rows of solidity above 0.6, faded

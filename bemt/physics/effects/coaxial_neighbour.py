@@ -25,15 +25,15 @@ class CoaxialNeighbour(Effect):
 
     Notes
     -----
-    The wake is that of a coaxial pair (:mod:`bemt.physics.wake`), of a rotor with uniform load and blades like this
-    one's. A rotor downstream meets the faster stream inside the wake and its upwash outside, one upstream the suction
-    of the other (:func:`bemt.physics.vortex_cylinder.ahead`). The solver knows one onset speed: that at which thrust is
-    the mean over both parts of the disk, by momentum theory and blades whose thrust falls linearly with the flow
-    through the disk, as in the closed form of Leishman and Ananthan (2008, J. AHS 53(1), not checked; here with the
-    solver's slope). ``load`` is the neighbour's thrust over that of this rotor alone; its induced speed follows from
-    momentum theory, of a neighbour downstream in the wake of this rotor. Where ``second_rotor_rad_s`` is recorded,
-    ``load`` holds at equal speeds, and the neighbour's thrust goes with the square of its own. Swirl is neglected:
-    which way the neighbour turns is not known.
+    The wake is that of a coaxial pair of uniform load (:mod:`bemt.physics.wake`; closed form as in Leishman and
+    Ananthan 2008, J. AHS 53(1), not checked). The neighbour has blades like this one's. A rotor downstream meets the
+    faster stream inside the wake and its upwash outside, one upstream the suction of the other
+    (:func:`bemt.physics.vortex_cylinder.ahead`). The solver knows one onset speed: that at which thrust is the mean
+    over both parts of the disk, by momentum theory and blades whose thrust falls linearly with the flow through the
+    disk, here with the solver's slope. ``load`` is the neighbour's thrust over that of this rotor alone; its induced
+    speed follows from momentum theory, of a neighbour downstream in the wake of this rotor. Where
+    ``second_rotor_rad_s`` is recorded, ``load`` holds at equal speeds, and the neighbour's thrust goes with the square
+    of its own. Swirl is neglected: which way the neighbour turns is not known.
     """
 
     side: str = "upstream"

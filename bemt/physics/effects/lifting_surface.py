@@ -24,15 +24,16 @@ class LiftingSurface(Effect):
 
     Notes
     -----
-    Blade elements see one downwash for the whole chord, that of a lifting line. Near the tip it grows along the chord,
-    which costs lift: on wings 2 pi / sqrt(1 + (2/AR)^2) for 2 pi (Helmbold 1942, Jahrbuch der deutschen
-    Luftfahrtforschung I:111), on marine screws the camber and angle corrections of Morgan, Silovic and Denny (1968),
-    Trans. SNAME 76 (neither checked against the paper). Along the blade it depends only on the distance to the tip in
-    chords: a vortex lattice on helicoids of advance 0.05 to 0.25 R per radian, 2 to 4 blades, c/R 0.1 to 0.33, over a
-    lifting line with the same wake gives one curve, which the closed form meets within 0.01 to 0.07 (our own
-    computation; a part of it is a test). At given wake and angle thrust falls by 5 % (c/R 0.1) to 11 % (c/R 0.33). Mach
-    number enters as in the rule of Goethert (1940): d times sqrt(1 - M^2), M held at 0.95. Drag follows the smaller
-    angle. Full below 20 deg, zero beyond 40 deg. Not applied at a duct wall, which mirrors the tip.
+    Near the tip the downwash grows along the chord, which costs lift (Helmbold 1942; Morgan, Silovic and Denny 1968;
+    neither checked against the paper). Blade elements see one downwash for the whole chord, that of a lifting line. The
+    loss is on wings 2 pi / sqrt(1 + (2/AR)^2) for 2 pi (Helmbold 1942, Jahrbuch der deutschen Luftfahrtforschung
+    I:111), on marine screws the camber and angle corrections of Morgan, Silovic and Denny (1968), Trans. SNAME 76.
+    Along the blade it depends only on the distance to the tip in chords: a vortex lattice on helicoids of advance 0.05
+    to 0.25 R per radian, 2 to 4 blades, c/R 0.1 to 0.33, over a lifting line with the same wake gives one curve, which
+    the closed form meets within 0.01 to 0.07 (our own computation; a part of it is a test). At given wake and angle
+    thrust falls by 5 % (c/R 0.1) to 11 % (c/R 0.33). Mach number enters as in the rule of Goethert (1940): d times
+    sqrt(1 - M^2), M held at 0.95. Drag follows the smaller angle. Full below 20 deg, zero beyond 40 deg. Not applied at
+    a duct wall, which mirrors the tip.
 
     Off by default: rotors with known sections and Re above 1e5 agree better with measurements (Caradonna and Tung at 8
     and 12 deg +16 to +26 % becomes +5 to +13 %, 28 in propeller +5.4 to +0.9 %), small propellers, for which the

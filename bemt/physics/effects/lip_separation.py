@@ -16,11 +16,12 @@ class LipSeparation(Effect):
 
     Notes
     -----
-    The suction of the lip carries the duct's thrust, so its limit is expressed as duct thrust over the largest duct
-    thrust of the recording. Beyond ``onset`` a share of it is lost in proportion, up to ``loss`` at the largest. Small
-    lip radii (below 6 % of the diameter) separate early and lose up to half of the thrust: Martin and Tung (2004), 60th
-    AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked). Proportion and hysteresis are
-    declared: once separated, the flow reattaches below onset (1 - hysteresis), visible only if the recording has time.
+    The suction of the lip carries the duct's thrust, so its limit is a share of the largest duct thrust of the
+    recording (Martin and Tung 2004; Pereira 2008, ch. 4; not checked). Beyond ``onset`` a share of it is lost in
+    proportion, up to ``loss`` at the largest. Small lip radii (below 6 % of the diameter) separate early and lose up to
+    half of the thrust: Martin and Tung (2004), 60th AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not
+    checked). Proportion and hysteresis are declared: once separated, the flow reattaches below onset (1 - hysteresis),
+    visible only if the recording has time.
 
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,
     and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not checked).
@@ -45,7 +46,7 @@ class LipSeparation(Effect):
         "hysteresis"
     )
     parameters = (
-        Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest value of what ``by`` asks", 4),
+        Parameter("onset", "1", 0.005, 0.95, "declared; share of the largest value of what `by` asks", 4),
         Parameter("loss", "1", 0.0, 1.0, "share of the duct's thrust, Martin and Tung 2004", 3, 0.0),
         Parameter("hysteresis", "1", 0.0, 0.3, "declared", 2),
         Parameter("width", "1", 0.0, 4.0, "declared; a lip stalls at once or bit by bit", 2),

@@ -15,10 +15,11 @@ class Recirculation(Effect):
 
     Notes
     -----
-    First-order growth from the start of each run, ``before_s`` before its first point, v the induced speed of the
-    baseline; ventilated by airspeed as 1 / (1 + (V/v)^2). Small rotors in closed rooms change within seconds of the
-    start: Stephenson, Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and ranges are
-    declared. Needs time: permanent recirculation cannot be distinguished from lower thrust.
+    First-order growth from the start of each run, ventilated by airspeed (declared; Stephenson, Weitsman and Zawodny
+    2019 measured it). The run starts ``before_s`` before its first point; airspeed acts as 1 / (1 + (V/v)^2) with the
+    induced speed v of the baseline. Small rotors in closed rooms change within seconds of the start: Stephenson,
+    Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and ranges are declared. Needs time:
+    permanent recirculation cannot be distinguished from lower thrust.
     """
 
     k: float = 0.05

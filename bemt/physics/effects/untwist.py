@@ -15,10 +15,10 @@ class Untwist(Effect):
 
     Notes
     -----
-    Centrifugal ("propeller") moment, which turns sections towards flat pitch, and aerodynamic moment of cambered
-    sections (nose down) both grow as the square of the speed; lift ahead of the elastic axis turns the nose up.
-    Flexible propellers do both: Sodja, Drazumeric, Kosel and Marzocca (2014), J. Aircraft 51:117 (not checked); shape
-    and proportion to rho Omega^2 are declared. Positive: nose down (untwist). Parameters refer to the point with the
+    Centrifugal and aerodynamic moments twist a flexible blade as the square of the speed (Sodja, Drazumeric, Kosel and
+    Marzocca 2014, J. Aircraft 51:117, not checked); shape and proportion to rho Omega^2 are declared. The centrifugal
+    ("propeller") moment turns sections towards flat pitch, that of cambered sections the nose down, lift ahead of the
+    elastic axis the nose up. Positive: nose down (untwist). Parameters refer to the point with the
     largest rho Omega^2 of a recording; see :meth:`share`; without a recording they apply directly.
     """
 
