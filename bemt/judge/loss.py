@@ -33,9 +33,9 @@ class Costs:
 
 
 COSTS = Costs()
-ONE, SECOND = 0.5, 0.1
+SECOND = 0.1
 """Where loads and drive are measured apart, each with a prior of its own: odds that one of them changed over those,
-since it may be the other, and over those once more where the other did, since few pairs are of both (declared) [1]."""
+where the other did; few pairs are of both (declared) [1]."""
 # Likeliest explanations that are tried as a name, and most members of a class.
 _NAMES, _MEMBERS = 6, 6
 # Explanations below this are not counted; shares of a class from which its first member is in all of it, and may be
@@ -155,32 +155,34 @@ def _open(none: float, unknown: float, listed: Mapping[Explanation, float]) -> s
 
 
 def parts(
-    P: Mapping[Explanation, float], Q: Mapping[Explanation, float], one: float = ONE
+    P: Mapping[Explanation, float], Q: Mapping[Explanation, float]
 ) -> tuple[dict[Explanation, float], dict[Explanation, float]]:  # fmt: skip
     """What each of two posteriors of different parts is beside the other.
 
     >>> cause = Explanation.of("battery_sag")
     >>> loads, drive = parts({NONE: 0.9, UNKNOWN: 0.1}, {NONE: 0.2, cause: 0.8})
     >>> round(loads[NONE], 3), round(drive[cause], 3)
-    (0.981, 0.65)
+    (0.97, 0.784)
     """
 
     def beside(P: Mapping[Explanation, float], same: float) -> dict[Explanation, float]:
-        weight = {True: same + one * (1.0 - same), False: one * (same + SECOND * (1.0 - same))}
-        out = {k: p * weight[k == NONE] for k, p in P.items()}
+        out = {k: p if k == NONE else p * (same + SECOND * (1.0 - same)) for k, p in P.items()}
         total = sum(out.values())
         return {k: p / total for k, p in out.items()}
 
     return beside(P, Q.get(NONE, 0.0)), beside(Q, P.get(NONE, 0.0))
 
 
-def joined(loads: Decision, drive: Decision) -> Decision:
-    """Answer on both parts: causes of both where both have any, else of the one that has."""
+def joined(loads: Decision, drive: Decision, same: float, costs: Costs = COSTS) -> Decision:
+    """Answer on both parts: causes of both where both have any, else of the one that has; ``same``: loads unchanged."""
     if loads.verdict in CLAIMS and drive.verdict in CLAIMS:
         verdict = "class" if "class" in (loads.verdict, drive.verdict) else "named"
         return replace(loads, verdict=verdict, effects=(*loads.effects, *drive.effects), by="both",
                        sets=(*loads.sets, *drive.sets), probability=min(loads.probability, drive.probability),
                        why=loads.why if loads.verdict == "class" else drive.why)  # fmt: skip
-    if drive.verdict in CLAIMS or (loads.verdict == "none" and drive.verdict != "none"):
+    if loads.verdict == "none" and drive.verdict != "none":
+        return replace(drive, by="drive")
+    # the drive's cause is half of an answer if a load changed as well
+    if drive.verdict in CLAIMS and loads.verdict not in CLAIMS and costs.half * (1.0 - same) < costs.silent:
         return replace(drive, by="drive")
     return loads

@@ -21,7 +21,7 @@ from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, de
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.compare.stand_run import StandRun
 from bemt.judge.explanation import NONE
-from bemt.judge.loss import ONE, SECOND, Decision, decide, joined, parts
+from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
@@ -125,12 +125,12 @@ class RunChange:
         if not self.drive.ranked or not self.loads.ranked:
             return self.loads if self.loads.ranked or not self.drive.effects else self.drive
         each = (self.loads, self.drive)
-        ranked = parts(self.loads.ranked, self.drive.ranked, 1.0 if self._by_volts else ONE)
+        ranked = parts(self.loads.ranked, self.drive.ranked)
         decisions = [self.with_density(decide(ranked[0])), decide(ranked[1])]
         for k, one in enumerate(each):
             if (decisions[k].verdict, decisions[k].effects) == (one.verdict, one.effects):
                 decisions[k] = replace(decisions[k], why=one.why)
-        said = joined(*decisions)
+        said = joined(*decisions, ranked[0].get(NONE, 0.0))
         P = {"model": ranked[0], "drive": ranked[1]}.get(said.by, ranked[0] | ranked[1])
         return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters})
 

@@ -87,7 +87,7 @@ def diagnose(
     with posterior.one_thread():
         if not turns:
             return chain(told, only, compared)
-        ids = [i for i in effects.catalogue() if only is None or i in only]
+        ids = [i for i, cls in effects.catalogue().items() if (cls.diagnosed if only is None else i in only)]
         # what drives the rotor cannot be seen in the loads at the measured speed, nor loads in the speed of a motor
         drives = [i for i in ids if effects.catalogue()[i].kind == "drive"]
         rotor = chain(loads, [i for i in ids if i not in drives], compared) if tested(loads) else None
@@ -170,7 +170,7 @@ def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     loads, drive = loss.decide(P), _decided(Q, motor.found.probability)
     if (loads.verdict, loads.effects) == (rotor.said.verdict, rotor.said.effects):
         loads = replace(loads, why=rotor.said.why)
-    said = loss.joined(loads, drive)
+    said = loss.joined(loads, drive, P.get(NONE, 0.0))
     if said.by == "drive":
         return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
     if said.by == "both":

@@ -89,7 +89,7 @@ class Law:
 def columns(problem: Problem, candidate: Candidate, setting: int, modes: Array) -> tuple[int, Array]:
     """How many modes there are; modes times the signature, and what else the law leaves open."""
     signature = candidate.signatures[:, setting]
-    more = [signature[:, None] * modes, candidate.other_laws(setting)]
+    more = [signature[:, None] * modes, candidate.other_laws(setting), candidate.within(setting)]
     if effects.catalogue()[candidate.id].torque_open:
         more.append(_torque_share(problem, signature)[:, None])
     return modes.shape[1], np.concatenate(more, axis=1)

@@ -199,7 +199,7 @@ def following(problem: Problem, loads: Problem) -> Problem:
 def _torque(loads: Problem) -> NDArray[np.bool_]:
     """Readings of the test that show its torque: thrust where nothing else does, (M,)."""
     for c in (1, 0):
-        mine = loads.free & (loads.channel == c) & (loads.y * loads.f0 > 0.0)
+        mine = np.asarray(loads.free & (loads.channel == c) & (loads.y * loads.f0 > 0.0))
         if mine.any():
             return mine
     return np.zeros(loads.y.size, dtype=bool)

@@ -180,8 +180,15 @@ def unrepeatable(problem: Problem) -> dict[str, float]:
 
 
 def impossible(problem: Problem) -> tuple[str, ...]:
-    """What recordings show that cannot be so."""
-    return tuple(f for f in problem.findings if _ERROR in f)
+    """What recordings show that cannot be so; what a reference shows as well is no change from it."""
+    wrong = [p.record.findings for p in problem.parts if p.record.reference]
+    shared = {_kind(f) for found in wrong for f in found if _ERROR in f}
+    return tuple(f for f in problem.findings if _ERROR in f and _kind(f) not in shared)
+
+
+def _kind(finding: str) -> str:
+    """Kind and channel of what cannot be so, without its file and its numbers."""
+    return finding.partition(_ERROR)[2].partition(":")[0]
 
 
 def exact_faults(problem: Problem) -> Iterator[tuple[str, Finding]]:

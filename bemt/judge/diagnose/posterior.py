@@ -255,7 +255,8 @@ def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
         state.forms[name] = law.at(r - S[:, span.start + best])
         counts = bank.seen[span]
         state.log_z[Explanation.of(name)] = none + (float(log_sum(total[counts])) if counts.any() else _SHUT)
-        state.small[name] = none + (float(log_sum(total[~counts])) if not counts.all() else _SHUT)
+        # the error of a law is a share of what it changes
+        state.small[name] = none + (float(log_sum(gain[span][~counts])) if not counts.all() else _SHUT)
         state.best[name] = best
     return state
 

@@ -49,7 +49,7 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
         if i in on and not cls.evident:
             return PRESENT if not shown else BOTH if i in everywhere else ELSE
         # between two recordings the change is often one that was made and is known
-        rest = EVIDENT if cls.evident and not problem.by_laws else 1.0
+        rest = EVIDENT if cls.evident and not shown else 1.0
         return LEFT_OUT if i in usual and (not shown or i in problem.shared) else rest
 
     return {i: weight(i) for i in ids}

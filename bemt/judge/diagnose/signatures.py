@@ -6,6 +6,7 @@ fixed set of vectors, for the recording and for hundreds of bootstrapped nulls a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -40,6 +41,7 @@ class Candidate:
     # Gives what the signature of an effect may be off by because of its law, (M, D) [units of the readings]
     directions: Callable[[Effect], Array] | None = None
     _other: dict[int, Array] = field(default_factory=dict, repr=False)
+    _cells: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @property
     def kind(self) -> str:
@@ -48,7 +50,7 @@ class Candidate:
 
     def seen_as(self, signatures: Array) -> Candidate:
         """The same settings, of which other signatures (M, G) are known [units of the readings]."""
-        return replace(self, signatures=signatures, _other={})
+        return replace(self, signatures=signatures, _other={}, _cells={})
 
     def only(self, keep: NDArray[np.bool_]) -> Candidate | None:
         """Candidate with some of its settings; None without any."""
@@ -70,6 +72,25 @@ class Candidate:
             columns = self.directions(effect_of(self.id, self.settings[g]))
             self._other[g] = columns[:, np.any(columns != 0.0, axis=0)]
         return self._other[g]
+
+    def within(self, g: int) -> Array:
+        """What readings differ by within the cell of a setting, one column a parameter, (M, D) [units of the readings].
+
+        A setting stands for all values nearer to it than to its neighbours: alike beforehand, their standard deviation
+        is the width of the cell over the root of 12.
+        """
+        if g not in self._cells:
+            cls, here, columns = effects.catalogue()[self.id], self.settings[g], []
+            for name in (n for n, v in here.items() if isinstance(v, float) and n not in cls.discrete):
+                line = [k for k, s in enumerate(self.settings) if name in s and {**s, name: here[name]} == here]
+                line.sort(key=lambda k: self.settings[k][name])
+                at = line.index(g)
+                low, high = line[max(at - 1, 0)], line[min(at + 1, len(line) - 1)]
+                cells = (low != g) + (high != g)  # an end has one neighbour
+                if cells:
+                    columns.append((self.signatures[:, high] - self.signatures[:, low]) / (cells * math.sqrt(12.0)))
+            self._cells[g] = np.stack(columns, axis=1) if columns else np.zeros((self.signatures.shape[0], 0))
+        return self._cells[g]
 
     @property
     def middle(self) -> int:
