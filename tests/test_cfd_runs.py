@@ -512,6 +512,16 @@ def test_one_point_stands_beside_bemt_on_one_screen(
     assert not {"verdict", "effects"} & found.keys()
 
 
+def test_diagnose_takes_exports_with_what_they_do_not_say(
+    put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(project / "cases" / "ds30")
+    assert main(["diagnose", *ds30(put), *DS30, "--case", case, "--json"]) == 0
+    (point,) = json.loads(capsys.readouterr().out)["points"]
+    assert point["loads"]["thrust_N"]["cfd"] == pytest.approx(23.5, rel=1e-3)
+    assert point["loads"]["torque_Nm"]["cfd"] == pytest.approx(0.285, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_the_fan_of_the_thesis_goes_the_whole_road(
     put: Callable[..., Path], project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

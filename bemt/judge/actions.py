@@ -37,7 +37,8 @@ def diagnose(
     only: Sequence[str] = (), ruled_out: Sequence[str] = (), changed: Sequence[str] = (), off: Sequence[str] = (),
     baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
     rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
-    along: Path | None = None, out: Path | None = None, figures: bool = True,
+    unit: Mapping[str, str] = {}, column: Mapping[str, str] = {}, sign: Mapping[str, str] = {},  # noqa: B006
+    zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None, figures: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Answer | OnePoint:  # fmt: skip
     """Say which physics or stand fault explains why a recording differs from the model.
@@ -70,6 +71,10 @@ def diagnose(
         Airspeed for files without one: one for all, or one per file; from the case by default. [m/s]
     repeatability_pct : float, optional
         What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
+    unit, column, sign : mapping
+        Runs of CFD: what their exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
+    zones : sequence of str
+        Runs of CFD: zones whose loads count.
     along : path, optional
         Blade loads (radial.csv of a campaign), compared with the first case.
     out : path, optional
@@ -101,11 +106,13 @@ def diagnose(
     'none'
     """
     from bemt.judge.diagnose.ask import diagnosed
+    from bemt.judge.import_files import words
 
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
         baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
         repeatability_pct=repeatability_pct, along=along, out=out, figures=figures, progress=progress,
+        run={"unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
 
 

@@ -199,6 +199,15 @@ def document(
     return {"schema": SCHEMA, "files": files, "runs": runs, "to_do": to_do}
 
 
+def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
+    """CFD run of exports, together, with what they do not say; the files themselves where nothing is stated."""
+    if not any(v is not None and v != [] for v in run.values()):
+        return list(files)
+    from bemt.data.recordings.cfd_options import run_from
+
+    return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
+
+
 def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list[dict[str, Any]], str | None]:
     """CFD runs among the paths, as plain values; what exports need to become one."""
     found, to_do = runs_of(names, run, insist)

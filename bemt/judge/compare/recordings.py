@@ -130,7 +130,7 @@ class RunChange:
         for k, one in enumerate(each):
             if (decisions[k].verdict, decisions[k].effects) == (one.verdict, one.effects):
                 decisions[k] = replace(decisions[k], why=one.why)
-        said = joined(*decisions, ranked[0].get(NONE, 0.0))
+        said = joined(decisions[0], decisions[1], ranked[0].get(NONE, 0.0))
         P = {"model": ranked[0], "drive": ranked[1]}.get(said.by, ranked[0] | ranked[1])
         return Judgement.of(said, P, {**self.loads.parameters, **self.drive.parameters})
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.face import as_html
 from bemt.base.given import path_text
 from bemt.data.recordings.cfd_study import together
-from bemt.data.recordings.load import import_file
+from bemt.data.recordings.load import as_stated, import_file
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
 from bemt.judge.diagnose import folder
@@ -162,6 +162,7 @@ def diagnosed(
     recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
     repeatability_pct: float | None, along: Any, out: Any, figures: bool, progress: Callable[[str], None] | None,
+    run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
     only = [only] if isinstance(only, str) else list(only)
@@ -171,7 +172,9 @@ def diagnosed(
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
-    cases, records = load_all(files, given, known, off, only, before=lambda found: folder.check(target, found),
+    speed = {"rpm": speeds[0]} if len(speeds) == 1 and any(run.values()) else {}
+    stated = as_stated(files, {**run, **speed})
+    cases, records = load_all(stated, given, known, off, only, before=lambda found: folder.check(target, found),
                               rpm=speeds, airspeed_m_s=winds, ruled_out=[*ruled_out, *changed],
                               reference_case=theirs)  # fmt: skip
     if repeatability_pct is not None:
@@ -187,7 +190,8 @@ def diagnosed(
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
         # one point cannot be diagnosed: it is shown beside the model
-        seen = files[0] if len(files) == 1 else together([import_file(f) for f in files])  # grids of one condition
+        # grids of one condition
+        seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
         found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []}
         return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))

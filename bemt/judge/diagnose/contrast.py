@@ -175,22 +175,13 @@ def compare(
     return Contrast(found, doc)
 
 
-def _as_stated(file: str, run: Mapping[str, Any]) -> str | Dataset:
-    """CFD run of exports with what they do not say; the file itself where nothing is stated."""
-    if not any(v is not None and v != [] for v in run.values()):
-        return file
-    from bemt.data.recordings.cfd_options import run_from
-    from bemt.data.recordings.load import runs_of
-
-    return runs_of([file], run_from([file], **run), insist=True)[0][0]
-
-
 def compared(
     a: str, b: str | None, case: Any, *, label: str | None, diameter_m: float | None, rows_a: Sequence[str],
     rows_b: Sequence[str], air_a: str | None, air_b: str | None, out: str | None, figures: bool,
     progress: Callable[[str], None] | None, run: Mapping[str, Any] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
+    from bemt.data.recordings.load import as_stated
     from bemt.judge.compare import one_run, two_grids, two_runs
 
     found: Contrast | Told
@@ -198,7 +189,7 @@ def compared(
         if case is None:
             hint = "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
-        document = one_run.compare_run(_as_stated(a, run or {}), case, progress)
+        document = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
         found = Told(document, one_run.text(document), one_run.text(document, details=True))
     elif (grids := two_grids.compare_grids(a, b, rows_a, rows_b)) is not None:
         found = Told(grids, two_grids.text(grids))
