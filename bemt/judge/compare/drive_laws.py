@@ -21,16 +21,19 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
+from bemt.judge.diagnose.prior import DRIVE
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
-_PRIOR = {NONE: 0.5, UNKNOWN: 0.1}
+_PRIOR = {NONE: DRIVE["none"], UNKNOWN: DRIVE["unknown"]}
 SUPPLY = Explanation.of("battery_sag")
 """Another voltage of battery or supply."""
 # What a recorded voltage does at one command and at one speed, powers of its ratio with their standard deviations: the
 # speed is K_v (V - I R), and a controller at part throttle loses more the higher the voltage (declared).
 _BY_VOLTS = {"speed": (0.85, 0.15), "electrical": (0.0, 0.5)}
+TOLD_VOLTAGE = 0.03
+"""Voltages of battery or supply that were read apart by more than this at equal command are a cause, ln [1]."""
 BY_LOAD = {"speed": (-0.13, 0.09), "electrical": (1.0, 0.25)}
 """How speed at one command and power at one speed follow the torque, as powers with their standard deviations: at
 voltage V and a drop I R of 5 to 40 % of the rest dn/n = -c/(1 + 2 c) dQ/Q with c = I R/(V - I R); losses go with the

@@ -16,7 +16,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
-from bemt.judge.compare.drive_laws import SUPPLY, Judgement, Load, judge_drive, weigh
+from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
 from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
 from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.compare.stand_run import StandRun
@@ -29,8 +29,6 @@ ERROR_IN = "error in "
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
 _TOLD_DENSITY, _SURE = 0.012, 2.0
-# A battery or supply: voltage that was read apart by more than this at equal command, natural logarithm.
-_TOLD_VOLTAGE = 0.03
 # Torque follows thrust, where that alone is known, to this share of its change (declared).
 _BY_THRUST = 0.5
 NO_VERDICT = Judgement("insufficient", (), {}, {}, "not recorded in both")
@@ -94,7 +92,7 @@ class RunChange:
     def _by_volts(self) -> float:
         """Voltage of B over that of A at equal command where both tell and they differ, natural logarithm, else 0."""
         change = next((math.log(r["ratio"]) for r in self.ratios.values() if r["kind"] == "voltage"), 0.0)
-        return change if "speed" in self.behind.channels and abs(change) >= _TOLD_VOLTAGE else 0.0
+        return change if "speed" in self.behind.channels and abs(change) >= TOLD_VOLTAGE else 0.0
 
     @property
     def _load(self) -> Load:

@@ -25,7 +25,9 @@ from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
 from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
 from bemt.judge.compare.stand_run import StandRun
 
-_BEND, _ZERO, _STEEP = 0.7, 0.0015, 0.15
+BEND = 0.7
+"""Slow bend of what a run differs by from others, over its level [1]."""
+_ZERO, _STEEP = 0.0015, 0.15
 _LENGTH_SPEED, _LENGTH_ADVANCE = 0.5, 0.35
 _SHARES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.1)
 _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
@@ -73,7 +75,7 @@ def covariance(c: MatchedChannel, s: Scatter) -> Array:
     wide = 100.0 + steep * np.outer(z[:, 0], z[:, 0]) + 4.0 * np.outer(z[:, 1], z[:, 1])
     wide += 4.0 * np.outer(z[:, 1] ** 2, z[:, 1] ** 2)
     # the level is the stand's, set up once per recording; half of its variance goes with the single run
-    level = c.session**2 * (0.7 * side + 0.3 * same + _BEND**2 * same * K)
+    level = c.session**2 * (0.7 * side + 0.3 * same + BEND**2 * same * K)
     shift = c.floor * (_ZERO if c.shift is None else np.maximum(c.shift, _ZERO))
     zero = same * np.outer(shift, shift) if c.name in LOADS else 0.0
     spread = s.share**2 + (s.floor * c.floor) ** 2 + c.u**2

@@ -106,7 +106,7 @@ class Diagnosis:
     def prior(self) -> dict[Explanation, float]:
         """Probability of every explanation before a reading was looked at [1]."""
         weights = prior.prior_weights(self.problem, list(self.found.spans))
-        return {k: float(np.exp(v)) for k, v in prior.log_priors(weights).items()}
+        return {k: float(np.exp(v)) for k, v in prior.log_priors(weights, of=prior.kinds(self.problem)).items()}
 
     @property
     def explanations(self) -> tuple[Candidate, ...]:

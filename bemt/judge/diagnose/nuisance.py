@@ -6,6 +6,7 @@ fitting them first would absorb the physics.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.compare.drive_laws import BY_LOAD
+from bemt.judge.compare.drive_laws import BY_LOAD, TOLD_VOLTAGE
+from bemt.judge.compare.matched import SESSION
+from bemt.judge.compare.smooth_change import BEND
 from bemt.judge.diagnose.noise import law_of, smooth_modes
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.effects.base import Effect
@@ -30,7 +33,7 @@ PRIORS = {
     "density not recorded": 0.015, "airspeed": 0.005, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
     "jet area of a duct": 0.15,
-    "speed at a pulse width from run to run": 0.01, "losses of a motor from run to run": 0.03,
+    "losses of a motor from run to run": 0.03,
     "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
 """Standard deviations: shares [1], zeros of full scale [1], parameters of active effects as a share of their published
@@ -122,13 +125,21 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
         at_pulse = np.zeros_like(y)
         turning = np.isin(problem.part, list(drives)) & (channel == CHANNELS.index("rpm"))
         every = np.concatenate([p.record.extra.get("pwm_s", np.zeros(len(p.record))) for p in problem.parts])
-        at_pulse[turning] = (every[problem.point[turning]] - middle) / span
+        at_pulse[turning] = 2.0 * (every[problem.point[turning]] - middle) / span
         for k in range(PULSE_POWERS):
             add(f"pulse width^{k}{tag}", np.where(turning, 0.05 * at_pulse**k * top, 0.0))
         for i, part in drives.items():
             if part.drive is not None and not part.record.reference:
-                varies = PRIORS["speed at a pulse width from run to run"]
-                add(f"supply of the run{tag}", np.where(turning & (problem.part == i), varies * f0, 0.0))
+                # two runs differ, and as little as a battery empties alike, their speeds bend against each other
+                varies = math.sqrt(2.0) * SESSION["speed"] * f0
+                x = at_pulse
+                mine = turning & (problem.part == i)
+                for word, shape in (("", 1.0), (" (slope)", BEND * x), (" (bend)", BEND * (2.0 * x**2 - 1.0))):
+                    add(f"supply of the run{tag}{word}", np.where(mine, varies * shape, 0.0))
+                follows = np.concatenate(
+                    [_by_volts(p) if p is part else np.zeros(len(p.record)) for p in problem.parts]
+                )
+                add(f"voltage as recorded{tag}", np.where(mine, follows[problem.point] * f0, 0.0))
     for wake in {p.model.duct.wake_ratio for p in problem.parts if p.model.duct is not None}:
         wider = DuctEffect(wake_ratio=(1.0 + PRIORS["jet area of a duct"]) * wake)
         add("jet area of a duct", everywhere(wider) - f0, own=True)
@@ -153,6 +164,14 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
     return matrix, tuple(names), np.array(solver, dtype=bool), offset
+
+
+def _by_volts(part: Part) -> Array:
+    """What the speed at a pulse width follows from the voltage as recorded, as far as that is no cause yet, (P,) ln."""
+    extra = part.flow.extra
+    if not {"voltage_V", "usual_voltage_V"} <= extra.keys():
+        return np.zeros(len(part.record))
+    return np.clip(np.nan_to_num(np.log(extra["voltage_V"] / extra["usual_voltage_V"])), -TOLD_VOLTAGE, TOLD_VOLTAGE)
 
 
 def _drives(problem: Problem) -> Iterator[tuple[str, dict[int, Part]]]:
@@ -210,6 +229,10 @@ def _torque_change(loads: Problem) -> Array:
     mine = _torque(loads)
     if not mine.any():
         return np.zeros(0)
-    before = ~loads.free & (loads.channel == loads.channel[mine][0]) & (loads.y * loads.f0 > 0.0)
-    usual = float(np.median(np.log(loads.y[before] / loads.f0[before]))) if before.any() else 0.0
-    return np.asarray(np.log(loads.y[mine] / loads.f0[mine]) - usual)
+    off, rpm = np.zeros(loads.y.size), loads.covariates["rpm"][loads.point]
+    valid = loads.y * loads.f0 > 0.0
+    off[valid] = np.log(loads.y[valid] / loads.f0[valid])
+    before = valid & ~loads.free & (loads.channel == loads.channel[mine][0])
+    order = np.argsort(rpm[before], kind="stable")
+    usual = np.interp(rpm[mine], rpm[before][order], off[before][order]) if before.any() else 0.0
+    return np.asarray(off[mine] - usual)

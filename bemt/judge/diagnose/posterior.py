@@ -145,7 +145,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         if pairs:
             _pairs(bank, state)
         states.append(state)
-    before = prior.log_priors(prior.prior_weights(problem, list(bank.spans)), pairs)
+    before = prior.log_priors(prior.prior_weights(problem, list(bank.spans)), pairs, prior.kinds(problem))
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
     probability = _posterior(states, before, rough)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects.duct import DuctEffect
@@ -14,10 +15,12 @@ from bemt.physics.effects.duct import DuctEffect
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
 
-__all__ = ["ALWAYS", "LEFT_OUT", "PRIOR", "log_priors", "present", "prior_weights"]
+__all__ = ["ALWAYS", "DRIVE", "LEFT_OUT", "PRIOR", "kinds", "log_priors", "present", "prior_weights"]
 
 PRIOR = {"none": 0.4, "single": 0.45, "pair": 0.1, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
+DRIVE = {"none": 0.7, "single": 0.2, "pair": 0.05, "unknown": 0.05}
+"""The same of what drives the rotor, which is judged beside the loads: a cause is half as likely (declared). [1]"""
 LEFT_OUT, PRESENT = 10.0, 0.01
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
 parameters, beside 1 for all others, where no reference shows the rotor [1]."""
@@ -74,14 +77,21 @@ def present(problem: Problem) -> set[str]:
     return set.intersection(*({e.id for e in p.baseline} | d for p, d in zip(problem.parts, ducts, strict=True)))
 
 
-def log_priors(weights: dict[str, float], pairs: bool = True) -> dict[Explanation, float]:
-    """Logarithm of the prior probability of every explanation."""
+def kinds(problem: Problem) -> Mapping[str, float]:
+    """Prior of the kinds of explanation: a drive shows in the speed alone."""
+    return DRIVE if np.all(problem.channel == CHANNELS.index("rpm")) else PRIOR
+
+
+def log_priors(
+    weights: dict[str, float], pairs: bool = True, of: Mapping[str, float] = PRIOR
+) -> dict[Explanation, float]:  # fmt: skip
+    """Logarithm of the prior probability of every explanation; `of`: of their kinds."""
     total = sum(weights.values()) or 1.0
-    out = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
-    out |= {Explanation.of(i): PRIOR["single"] * w / total for i, w in weights.items()}
+    out = {NONE: of["none"], UNKNOWN: of["unknown"]}
+    out |= {Explanation.of(i): of["single"] * w / total for i, w in weights.items()}
     if pairs:
         names = list(weights)
         both = {Explanation.of(a, b): weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
         total = sum(both.values()) or 1.0
-        out |= {k: PRIOR["pair"] * w / total for k, w in both.items()}
+        out |= {k: of["pair"] * w / total for k, w in both.items()}
     return {k: float(np.log(v)) for k, v in out.items()}
