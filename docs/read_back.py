@@ -309,9 +309,9 @@ error, the band of the prediction, conventions, the direction of rotation, and t
 torque, airspeed, windmill, mach, density, rest, duct, sections, rotation, hub) refuses targets that cannot represent
 it; the others are written and the exit code is 2.
 
-"Run in" says which program took the file, at the same operating points as BEMT, once right- and once left-handed.
-"Off" is the greatest difference to BEMT, in per cent of the greatest load at the same speed. "Text only": no program
-has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `dfdc` uses the fan `ds30`.
+"Run in": the program that took the file, right- and left-handed. "Off": the greatest difference to BEMT, in per cent
+of the greatest load at that speed. "Text only": no program has read the file. All rows are for the 10x5 in `cases/` up
+to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 
 ## Thrust and torque for simulators
 
@@ -339,7 +339,7 @@ controller: [hover.py](hover.py) (MuJoCo) and [zero_thrust.py](zero_thrust.py) (
 
 ## Loads across the shaft
 
-[Wind at an angle to the shaft](oblique.md) adds a force H, a side force Y, and moments of the hub, those of stiff blades.
+[Wind at an angle to the shaft](oblique.md) adds a force H, a side force Y, and moments of the hub (stiff blades).
 Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, in per cent of the
 thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
 
@@ -366,9 +366,8 @@ profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt` with axis, 
 {line}--|--|
 {chr(10).join(kinds["blade"])}
 
-"Off" in the section columns is the greatest error of the fitted section between the stalls; C81 holds the tables
-themselves, at one Reynolds number per station. These programs have wake models of their own, so their loads are not
-those of BEMT. Runs by hand:
+"Off" of sections is the greatest error of the fit between the stalls; C81 holds the tables themselves. These programs
+have wake models of their own, so their loads are not those of BEMT. Runs by hand:
 
 {blades}
 
