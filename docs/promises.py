@@ -13,7 +13,7 @@ import figures  # noqa: E402
 
 HEAD = """# Promises and their tests
 
-*Made by `docs/promises.py`.* A promise that breaks fails its test; *slow*: partly among the slow tests.
+*Made by `docs/promises.py`.* A promise that breaks fails its test.
 
 ## Figures
 
@@ -21,7 +21,6 @@ The report that holds each figure of the README and of [what to believe](believe
 [`tests/test_figures.py`](../tests/test_figures.py) compares them all.
 
 """
-SLOW = re.compile(r"pytest\.mark\.slow|pytestmark = .*slow")
 
 
 def promise(file: Path) -> str:
@@ -56,8 +55,7 @@ def made() -> str:
         rows.append(f"* [{report.removeprefix('reports/')}](../{report}): {short(said[0])}{more}\n")
     tests = []
     for file in sorted((ROOT / "tests").glob("test_*.py")):
-        slow = " *slow*" if SLOW.search(file.read_text(encoding="utf-8")) else ""
-        tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}){slow}: {promise(file)}\n")
+        tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}): {promise(file)}\n")
     return HEAD + "".join(rows) + "\n## Behaviour\n\n" + "".join(tests)
 
 
