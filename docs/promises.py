@@ -13,16 +13,14 @@ import figures  # noqa: E402
 
 HEAD = """# Promises and their tests
 
-*Made by `docs/promises.py` from the tests and from `docs/figures.py`.* Each promise has a file that fails when it
-breaks; *slow*: a part of it runs only with the slow tests.
+*Made by `docs/promises.py`.* A promise that breaks fails its test.
 
 ## Figures
 
-Figures of the README and of [what to believe](believe.md), by the committed report that holds them.
-[`tests/test_figures.py`](../tests/test_figures.py) compares them, and fails where a figure has no report.
+The report that holds each figure of the README and of [what to believe](believe.md), the first of each quoted;
+[`tests/test_figures.py`](../tests/test_figures.py) compares them all.
 
 """
-SLOW = re.compile(r"pytest\.mark\.slow|pytestmark = .*slow")
 
 
 def promise(file: Path) -> str:
@@ -51,14 +49,13 @@ def made() -> str:
         for number in figure.stated():
             text = text.replace("#", number, 1)
         held.setdefault(figure.report, []).append(text)
-    rows = [
-        f"* [{report.removeprefix('reports/')}](../{report}): {', '.join(map(short, said))}\n"
-        for report, said in held.items()
-    ]
+    rows = []
+    for report, said in held.items():
+        more = f" and {len(said) - 1} more" if len(said) > 1 else ""
+        rows.append(f"* [{report.removeprefix('reports/')}](../{report}): {short(said[0])}{more}\n")
     tests = []
     for file in sorted((ROOT / "tests").glob("test_*.py")):
-        slow = " *slow*" if SLOW.search(file.read_text(encoding="utf-8")) else ""
-        tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}){slow}: {promise(file)}\n")
+        tests.append(f"* [{file.stem.removeprefix('test_')}](../tests/{file.name}): {promise(file)}\n")
     return HEAD + "".join(rows) + "\n## Behaviour\n\n" + "".join(tests)
 
 

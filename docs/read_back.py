@@ -309,9 +309,9 @@ error, the band of the prediction, conventions, the direction of rotation, and t
 torque, airspeed, windmill, mach, density, rest, duct, sections, rotation, hub) refuses targets that cannot represent
 it; the others are written and the exit code is 2.
 
-"Run in" says which program took the file, at the same operating points as BEMT, once right- and once left-handed.
-"Off" is the greatest difference to BEMT, in per cent of the greatest load at the same speed. "Text only": no program
-has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `dfdc` uses the fan `ds30`.
+"Run in": the program that took the file, right- and left-handed. "Off": the greatest difference to BEMT, in per cent
+of the greatest load at that speed. "Text only": no program has read the file. All rows are for the 10x5 in `cases/` up
+to 10,000 rev/min; `dfdc` uses the fan `ds30`.
 
 ## Thrust and torque for simulators
 
@@ -319,36 +319,27 @@ has read the file. All rows are for the 10x5 in `cases/` up to 10,000 rev/min; `
 {line}--|--|
 {chr(10).join(kinds["loads"])}
 
-The errors are those of the model class, from static to zero thrust. With one or three numbers for all speeds they
-include the change of the coefficients from 2,500 to 10,000 rev/min: give `--rpm` near the speed you fly. A single
-constant (`gazebo`) is right at rest and off by the whole thrust in flight. Beyond the tables programs hold the last
-value.
+The errors are those of the model class, from static to zero thrust. Targets of one or three numbers err with speed,
+too: give `--rpm` near the speed you fly. A single constant (`gazebo`) is right at rest and off by the whole thrust in
+flight. Beyond the tables programs hold the last value.
 
 ### From rest, at the program's own step
 
-Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files: JSBSim
-at 1/120 s with the motor of the file, MuJoCo and the FMU at the speed of the library's drive. Greatest difference to
-the library over cases and throttles, in per cent of the load at that throttle. Gazebo, PX4 SIH and ArduPilot were not
-run: these are the formulas of their sources. All rows: [throttles.csv](throttles.csv).
+Five throttles (20 to 100 %) of every shipped case and of three labels, from rest, as a user starts the files. Greatest
+difference to the library, in per cent of the load at that throttle ([all rows](throttles.csv)). Gazebo, PX4 SIH and
+ArduPilot were not run: these are the formulas of their sources.
 
 | target | thrust off, % | torque off, % | overshoot, % |
 |---|---|---|---|
 {_started_rows()}
 
-The last three have the limits of their formulas: no Reynolds number, and in ArduPilot one fit for rest and flight.
-
-JSBSim's motor is that of the case's `[drive]`, without one as large as the rotor needs. JSBSim integrates the speed by
-explicit Euler; where light blades would overshoot, `ixx` is raised, and a note says so.
-
-Two scripts run the exported 10x5 without a controller: [hover.py](hover.py) (MuJoCo, at the speed of `drive`) and
-[zero_thrust.py](zero_thrust.py) (JSBSim, at the airspeed where BEMT predicts zero thrust).
+JSBSim's motor is that of the case's `[drive]`, without one as large as the rotor needs; where light blades would
+overshoot its explicit Euler, `ixx` is raised, and a note says so. Two scripts run the exported 10x5 without a
+controller: [hover.py](hover.py) (MuJoCo) and [zero_thrust.py](zero_thrust.py) (JSBSim).
 
 ## Loads across the shaft
 
-A wind at an angle to the shaft adds a force H in the plane of the disk, a side force Y, and moments of the hub. `--hold
-hub` refuses targets without them; those below were run (Gazebo: its formula). The moments are those of stiff blades and
-come out too large; see [Wind from any side](oblique.md).
-
+[Wind at an angle to the shaft](oblique.md) adds a force H, a side force Y, and moments of the hub (stiff blades).
 Greatest difference to BEMT's oblique solve, right- and left-handed, 10 to 110 deg to the shaft, in per cent of the
 thrust at rest, its torque, and thrust times radius; "-": the target has no such load.
 
@@ -375,16 +366,14 @@ profile for Fluent, the same as a table for STAR-CCM+, and `fan.txt` with axis, 
 {line}--|--|
 {chr(10).join(kinds["blade"])}
 
-"Off" in the section columns is the greatest error of the fitted section between the stalls; C81 holds the tables
-themselves, at one Reynolds number per station. These programs have wake models of their own, so their loads are not
-those of BEMT. Runs by hand:
+"Off" of sections is the greatest error of the fit between the stalls; C81 holds the tables themselves. These programs
+have wake models of their own, so their loads are not those of BEMT. Runs by hand:
 
 {blades}
 
 The exported files in QPROP's equations, beside BEMT:
 {_qprop()}.
-At rest QPROP's lift goes on straight to its largest value, where the section's own bends before it. QPROP takes the
-reference Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
+QPROP takes the reference Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one.
 
 `bemt lab stations FILE` turns an XROTOR, QPROP or DFDC file into a case.
 

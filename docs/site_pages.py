@@ -48,13 +48,11 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
     "How to": (
         "choose.md",
         "design.md",
-        "printing.md",
         "notebooks/*",
         "flight_logs.md",
         "exports.md",
         "adding.md",
         "scaling.md",
-        "trust.md",
     ),
     "Python": tuple(API),
     "Commands and files": ("command_line.md", "commands.md", "reference_*", "mistakes.md", "nomenclature.md"),

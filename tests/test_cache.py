@@ -1,4 +1,4 @@
-"""Section tables from the cache are those that were made, whatever happened to the folder meanwhile."""
+"""Cached section tables are those that were made, whatever happened meanwhile."""
 
 from __future__ import annotations
 

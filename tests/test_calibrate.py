@@ -1,4 +1,4 @@
-"""Calibration: planted constants come back, propellers (not rows) are the evidence, nothing is dropped silently."""
+"""Calibration: planted constants come back, propellers are the evidence, nothing is dropped."""
 
 from __future__ import annotations
 

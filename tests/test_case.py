@@ -1,4 +1,4 @@
-"""Promise: a case file is checked whole before anything runs, and every fault has its exact message."""
+"""Promise: a case file is checked whole, each fault has its message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of CFD campaigns: strict files, whole records, a run that goes on where it was stopped."""
+"""The promise of CFD campaigns: strict files, whole records, a run that resumes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of CFD: whole revolutions by time, order and index of grids, and what a set-up leaves unknown."""
+"""Numbers of CFD: whole revolutions, grid order and index, what stays unknown."""
 
 from __future__ import annotations
 

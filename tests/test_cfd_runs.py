@@ -1,4 +1,4 @@
-"""The promise of a CFD run: whatever program wrote its files, they become one recording that every command takes."""
+"""The promise of a CFD run: files of any program become one recording."""
 # ruff: noqa: E501 - samples as they look in files
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A heading means the same in every reader, and one condition on several grids is one point with the u of its grids."""
+"""Headings mean the same everywhere, several grids are one point with u."""
 
 from __future__ import annotations
 

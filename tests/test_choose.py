@@ -1,4 +1,4 @@
-"""Promises of ``choose``: agrees with ``drive``, ranks by what it states, refuses what cannot be."""
+"""Promises of ``choose``: agrees with ``drive``, ranks as stated, refuses what cannot be."""
 
 from __future__ import annotations
 

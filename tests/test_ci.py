@@ -1,4 +1,4 @@
-"""The promise of the check: a run that skips without leave, fails, or passes too few tests is not green."""
+"""The promise of the check: skips without leave, failures or missing tests are not green."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Promise: the command line answers fast, keeps stdout for results, and its exit code says what happened."""
+"""Promise: the command line answers fast, results on stdout, honest exit codes."""
 
 from __future__ import annotations
 

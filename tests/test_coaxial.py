@@ -1,4 +1,4 @@
-"""Promise: two rotors on one axis keep the limits of momentum theory, and a case of them says what it does not know."""
+"""Promise: two rotors on one axis keep the limits of theory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of `compare`: ratios with intervals that hold, causes by how they scale, and no cause where none is."""
+"""The promise of `compare`: ratios with true intervals, causes by scaling, none invented."""
 
 from __future__ import annotations
 

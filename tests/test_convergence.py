@@ -1,4 +1,4 @@
-"""The promise of convergence: the error of thrust and torque falls with the square of the station count.
+"""The promise of convergence: the error falls with the square of the station count.
 
 ``order`` compares successive doublings: e(n) - e(2n) over e(2n) - e(4n), no reference solution needed.
 """

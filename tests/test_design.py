@@ -1,4 +1,4 @@
-"""Promises of ``design``: the thrust with less power, limits kept, a case that sweeps, odd requests refused."""
+"""Promises of ``design``: less power, limits kept, a case that sweeps, refusals."""
 
 from __future__ import annotations
 

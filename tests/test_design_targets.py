@@ -1,4 +1,4 @@
-"""The promise of docs/design.md: ten targets, none with more power than the best label, and the table is current."""
+"""The promise of docs/design.md: ten targets, none with more power than the best label."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Promises behind ``design``: minimum induced loss as published, circulation of least loss, gradients, stress."""
+"""Promises behind ``design``: published minimum loss, circulation, gradients, stress."""
 
 from __future__ import annotations
 

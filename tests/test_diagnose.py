@@ -1,4 +1,4 @@
-"""The promise of `diagnose`: it names what was left out where the plan shows it, and nothing where it does not."""
+"""The promise of `diagnose`: it names what the plan shows, and nothing else."""
 
 from __future__ import annotations
 

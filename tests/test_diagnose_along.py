@@ -1,4 +1,4 @@
-"""Loads along the blade say where a rotor parts from its recording, and which effect brings it back."""
+"""Loads along the blade name the effect that brings them back."""
 
 from __future__ import annotations
 

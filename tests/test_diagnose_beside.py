@@ -1,4 +1,4 @@
-"""`diagnose --reference`: where the case leaves it open, how the loads changed from the reference answers."""
+"""`diagnose --reference`: the change of loads answers what the case leaves open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`diagnose` on this project's own CFD, its label hidden: what one campaign has and its neighbour has not.
+"""`diagnose` on our own CFD, its label hidden.
 
 CFD and BEMT differ in any case.  The runs without the cause are given as reference: that difference is theirs, and only
 what the cause adds is to be explained.  Slow: a minute.

@@ -1,4 +1,4 @@
-"""With a reference the drive is measured against the reference's speed over pulse width, not against its own."""
+"""With a reference the drive is measured against the reference's speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise, gains and sessions of a recording come from the recording."""
+"""Noise, gains and sessions come from the recording."""
 
 from __future__ import annotations
 

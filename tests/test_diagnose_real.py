@@ -1,4 +1,4 @@
-"""`diagnose` on real recordings whose cause is known and left out of the model, or that show none.
+"""`diagnose` on real recordings with a known cause, or none.
 
 The measured data are not part of the project; everything here skips without them.  Slow: minutes.
 """

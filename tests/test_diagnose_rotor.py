@@ -1,4 +1,4 @@
-"""Loads that cannot be those of the case's rotor are a question, not missing physics."""
+"""Loads of another rotor are a question, not missing physics."""
 
 from __future__ import annotations
 

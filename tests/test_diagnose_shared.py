@@ -1,4 +1,4 @@
-"""Physics that the case leaves out: a reference has it as well, unless what made the reference can switch it off."""
+"""Physics that the case leaves out, a reference has as well."""
 
 from __future__ import annotations
 

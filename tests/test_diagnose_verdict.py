@@ -1,4 +1,4 @@
-"""What is said for given probabilities, and the scores that a name must pass."""
+"""What given probabilities say, and the scores that names must pass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the documents: commands that run as printed, docstrings that agree with the code and name units."""
+"""The promise of the documents: commands run as printed, docstrings agree with the code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of one rotor, one answer: every door gives the same value, band and words for one case and one point."""
+"""The promise of one rotor, one answer: every door gives the same value, band and words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bench map: monotone, exact on made drives, inverse of itself, exported as CSV, JSON and C that agree, real trips."""
+"""Bench map: monotone, exact on made drives, invertible, exported alike."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drives and thrusters: closed forms, energy, limits, real maps and steps, commands met where they can be."""
+"""Drives and thrusters: closed forms, energy, limits, real maps and steps."""
 
 from __future__ import annotations
 

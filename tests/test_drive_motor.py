@@ -1,4 +1,4 @@
-"""Motor constant: conventions, waveforms, three methods, systematic errors that are named when there and only then."""
+"""Motor constant: conventions, waveforms, three methods, systematic errors named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ducts: one mass flow, jets that potential theory gives, and published ducted rotors.
+"""Ducts: one mass flow, jets of potential theory, published rotors.
 
 Sources
 -------

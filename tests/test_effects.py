@@ -1,4 +1,4 @@
-"""Effects: one file each, found by scanning, documented, listed, and gone without trace when off."""
+"""Effects: one file each, documented, listed, without trace when off."""
 
 from __future__ import annotations
 

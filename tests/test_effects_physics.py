@@ -1,4 +1,4 @@
-"""What effects do: published forms at their known limits, right signs, nothing invented."""
+"""What effects do: published forms, known limits, right signs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""K1/K2 model: published values, invariants, the defect of the printed equation, flags."""
+"""K1/K2 model: published values, invariants, the printed equation's defect, flags."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Exports: what is written is what the solver says, within the stated error, whole, or it is refused."""
+"""Exports: what is written is what the solver says, or refused."""
 
 from __future__ import annotations
 

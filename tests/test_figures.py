@@ -1,4 +1,4 @@
-"""Every figure of README.md and docs/believe.md stands in the committed report that holds it."""
+"""Every stated figure is in the committed report that holds it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of typed files: every wrong value and every unknown key is refused at its place, all at once."""
+"""The promise of typed files: wrong values and unknown keys are refused at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the first picture: a recording beside a case is counted, and drawn, inside its prediction band."""
+"""The promise of the first picture: a recording is drawn and counted inside its band."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the flight logs: constants come back, healthy flights are not accused, damaged files are refused."""
+"""The promise of the flight logs: constants come back, healthy flights are not accused."""
 
 from __future__ import annotations
 

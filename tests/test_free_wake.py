@@ -1,4 +1,4 @@
-"""The promise of the induced flow: momentum in annuli gives the loads of a free wake, 3 % in flight and 8 % at rest.
+"""The promise of the induced flow: loads of a free wake, 3 to 8 %.
 
 Bound vortices on each blade, trailing vortices that start at its trailing edge and go where the flow takes them,
 Biot-Savart on straight segments, section lift 2 pi: nothing of it is the solver's.  It settles after ten turns and then

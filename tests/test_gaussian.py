@@ -1,4 +1,4 @@
-"""The Gaussian room against closed forms: densities, conditionals, evidence, restricted likelihood and limits."""
+"""The Gaussian room against closed forms and limits."""
 
 from __future__ import annotations
 

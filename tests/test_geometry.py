@@ -1,4 +1,4 @@
-"""Sections, blades, rotors and ducts: what their names and files say, published shapes, bad input refused whole."""
+"""Sections, blades, rotors and ducts: as named and published, bad input refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes and CAD solids: closed or a reason, volumes of the sections, shapes that come back."""
+"""Meshes and CAD solids: closed, right volumes, shapes that come back."""
 
 from __future__ import annotations
 

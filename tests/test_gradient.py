@@ -1,4 +1,4 @@
-"""The promise of the derivatives: those of whole solves, station by station, in an open rotor and in a duct."""
+"""The promise of the derivatives: those of whole solves, open rotors and ducts."""
 
 from __future__ import annotations
 

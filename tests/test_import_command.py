@@ -1,4 +1,4 @@
-"""The promise of ``bemt import``: one schema for every format, honest means, nothing joined or guessed."""
+"""The promise of ``bemt import``: one schema for every format, nothing joined or guessed."""
 # ruff: noqa: E501 - samples as they look in files
 
 from __future__ import annotations

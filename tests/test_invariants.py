@@ -1,4 +1,4 @@
-"""The promise of the invariants: what must not matter does not matter, most of it to the last bit."""
+"""The promise of the invariants: what must not matter does not, to the last bit."""
 
 from __future__ import annotations
 

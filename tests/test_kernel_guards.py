@@ -1,4 +1,4 @@
-"""The promise of the terms: slopes are derivatives, tables are read between their nodes, published curves are held.
+"""The promise of the terms: slopes are derivatives, published curves are held.
 
 Each of these was once changed by hand without another test noticing; tests/mutants.py has the changes.
 """

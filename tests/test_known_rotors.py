@@ -1,4 +1,4 @@
-"""Promises of known rotors: by name, by one reading, by class, and the motor that turns them."""
+"""Promises of known rotors: by name, one reading, class, and motor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the rooms: imports go up the flow of data, the core is pure, heavy libraries come when needed.
+"""The promise of the rooms: imports go up the flow of data, the core is pure.
 
 The rules are the tables below; `violations` reads source text and knows nothing of the tree, so that planted faults
 can prove that every rule bites.

@@ -1,4 +1,4 @@
-"""The promise of `import bemt`: a library of plain things in and out, loaded when it is used."""
+"""The promise of `import bemt`: plain things in and out, loaded when used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the lifting-surface effect: its closed form is what a vortex lattice says, and it acts as derived.
+"""The promise of the lifting-surface effect: its closed form is what a vortex lattice says.
 
 The lattice knows neither blade elements nor the effect: horseshoe vortices of each blade on a helicoid of given
 advance, Biot-Savart on straight segments, no flow through the blade.  The lifting line has the same wake.

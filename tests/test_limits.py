@@ -1,4 +1,4 @@
-"""The promise of the limits: where theory has a closed answer, the solver gives that answer, in any fluid."""
+"""The promise of the limits: the solver gives theory's closed answers, in any fluid."""
 
 from __future__ import annotations
 

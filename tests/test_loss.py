@@ -1,4 +1,4 @@
-"""The decision: what is said has the least expected loss, for any posterior."""
+"""The decision: what is said has the least expected loss."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise to a newcomer: every usual mistake is answered with place and remedy, and the right exit code."""
+"""The promise to a newcomer: every usual mistake is answered with place and remedy."""
 
 from __future__ import annotations
 

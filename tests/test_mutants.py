@@ -1,4 +1,4 @@
-"""Sixty small wrong changes are noticed: tests/mutants.py has them, and says which survive."""
+"""Sixty small wrong changes are noticed; tests/mutants.py has them, and says which survive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every verdict says what to do next and what to type then, and blames no physics for what a real rotor differs by."""
+"""Every verdict says what to do and type next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wind from any side: limits, continuity, balances, convergence over the azimuth, measured rotors."""
+"""Wind from any side: limits, continuity, balances, convergence, measured rotors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One file, one answer: every door that compares a recording with its reference says the same."""
+"""One file, one answer, at every door that compares recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the OpenFOAM writer: dictionaries that parse and agree, right factor and sign, a run."""
+"""The promise of the OpenFOAM writer: dictionaries parse and agree, right factors, a run."""
 
 from __future__ import annotations
 

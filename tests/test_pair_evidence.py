@@ -1,4 +1,4 @@
-"""Two effects are summed like one: every two settings with the error of both laws, against the whole covariance."""
+"""Two effects are summed like one, against the whole covariance."""
 
 from __future__ import annotations
 

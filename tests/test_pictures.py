@@ -1,4 +1,4 @@
-"""Promise: pictures are drawn in another process, whole or not at all, small, and from OpenFOAM results too."""
+"""Promise: pictures are drawn whole or not at all, and small."""
 
 from __future__ import annotations
 

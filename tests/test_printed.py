@@ -1,4 +1,4 @@
-"""The promise of a printable rotor: nowhere thinner than asked, one closed body, its blade still that of the case."""
+"""The promise of a printable rotor: thick enough, one closed body, the case's blade."""
 
 from __future__ import annotations
 

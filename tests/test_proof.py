@@ -1,4 +1,4 @@
-"""The proof: truths that stand on their own, a key fixed before the diagnosis, items that do not tell their cause."""
+"""The proof: independent truths, a sealed key, items that hide their cause."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""BEMT against published tables: each table headed by its source, its faults and what we claim.
+"""BEMT against published tables, each with source and faults.
 
 The bounds are what the physics reaches without any fit to the table; where a bound is wide, the text says why.
 """

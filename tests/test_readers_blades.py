@@ -1,4 +1,4 @@
-"""The promise of the readers of design tools: their blades become cases that solve, or all faults are told."""
+"""The promise of the readers of design tools: blades become cases that solve, or faults are told."""
 
 from __future__ import annotations
 

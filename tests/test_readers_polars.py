@@ -1,4 +1,4 @@
-"""Each polar importer gives back what a file says, continues it to +-180 deg, and refuses what it cannot trust."""
+"""Polars come back as filed, continue to +-180 deg, or are refused."""
 
 from __future__ import annotations
 

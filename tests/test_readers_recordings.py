@@ -1,4 +1,4 @@
-"""Recordings of stands: each file is read whole, or refused with the reason; nothing vanishes in silence."""
+"""Recordings of stands: read whole, or refused with the reason; nothing vanishes in silence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the real pairs: a manifest of what differs and where that is documented, and no copy of the data."""
+"""The promise of the real pairs: a manifest of what differs, no copy of the data."""
 
 from __future__ import annotations
 

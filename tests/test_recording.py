@@ -1,4 +1,4 @@
-"""recording.toml: what a table does not say is said once, strictly, and every fault is found at once."""
+"""recording.toml: said once, strictly, every fault found at once."""
 
 from __future__ import annotations
 

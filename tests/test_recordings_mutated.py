@@ -1,4 +1,4 @@
-"""Ten thousand injured recordings: read, checked and reduced, or refused with the reason; never a traceback.
+"""Ten thousand injured recordings: read and reduced, or refused; never a traceback.
 
 And never a silent drop: every line below the heading is a row, every row is in one point or in what was dropped.
 """

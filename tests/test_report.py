@@ -1,4 +1,4 @@
-"""Promise: one file that loads nothing, shows every case with honest words, and lets nothing of the data act."""
+"""Promise: one file, honest words, nothing of the data acts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reproduction of the source thesis: every number, a status that follows from the digits, findings by search."""
+"""Reproduction of the source thesis: every number, its status by its digits."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Blades in a row turn the flow as rows do: exact theory, measured cascades, single sections where far apart.
+"""Blades in a row turn the flow as measured cascades do.
 
 Sources
 -------

@@ -1,4 +1,4 @@
-"""Sanity before physics: each planted fault is found, named and explained; a clean recording is left in peace."""
+"""Sanity before physics: each planted fault is found and named; a clean recording is left in peace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section rule against the rules that it might have been: what volume 1 can choose, and what it cannot."""
+"""The section rule against others: what volume 1 can choose."""
 
 from __future__ import annotations
 

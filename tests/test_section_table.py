@@ -1,4 +1,4 @@
-"""The shipped table of NACA four-digit sections: NeuralFoil's own answers, to the error that it states."""
+"""The shipped NACA table: NeuralFoil's own answers, within its stated error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Section tables: read as stored, NeuralFoil's own where it is sound, on to +-180 degrees without a jump."""
+"""Section tables: read as stored, on to +-180 degrees without jump."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the solver: it solves the stated equations, says what it could not do, and is used as documented."""
+"""The promise of the solver: it solves the stated equations and says what failed."""
 
 from __future__ import annotations
 

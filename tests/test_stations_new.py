@@ -1,4 +1,4 @@
-"""``new NAME`` with stations as people write them: one blade, in thirty dialects, through one vocabulary."""
+"""``new NAME``: one blade, thirty dialects of stations, one vocabulary."""
 
 from __future__ import annotations
 

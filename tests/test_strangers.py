@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""Tables, labels and blades as strangers write them: each is read right, or refused with a hint that leads there."""
+"""Tables, labels and blades of strangers: read right, or refused helpfully."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep puts every source side by side, survives a kill, stores whole results, and one bad case stops no other."""
+"""A sweep compares every source, survives a kill, isolates bad cases."""
 
 from __future__ import annotations
 

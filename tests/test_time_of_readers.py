@@ -1,4 +1,4 @@
-"""The time of a reader goes with the size of its file: every fixture is doubled twice, in each of five ways."""
+"""A reader's time goes with its file's size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The promise of the tools: each can be taken away, the rest runs on with the same numbers and says what is missing."""
+"""The promise of the tools: each can be taken away, the rest runs on unchanged."""
 
 from __future__ import annotations
 

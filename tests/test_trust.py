@@ -1,4 +1,4 @@
-"""What somebody else's case, checkout or texts may do: be read. docs/trust.md says the same in words."""
+"""What somebody else's case, checkout or texts may do: be read. docs/believe.md says the same in words."""
 
 from __future__ import annotations
 

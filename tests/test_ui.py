@@ -1,4 +1,4 @@
-"""The promise of `bemt ui`: one page on this machine that answers, reads a recording and judges it, in a browser."""
+"""The promise of `bemt ui`: one page that answers, reads and judges, in a browser."""
 
 from __future__ import annotations
 

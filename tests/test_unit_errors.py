@@ -1,4 +1,4 @@
-"""The list of unit errors and miscounted speeds: exact, both ways, each once; every user takes its view of it."""
+"""The list of unit errors: exact, both ways, each once; every user takes its view of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``bemt validate``: the statistics on a folder whose answer is known, and the declared rule on real propellers."""
+"""``bemt validate``: statistics with known answers, the declared rule on real propellers."""
 
 from __future__ import annotations
 

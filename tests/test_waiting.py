@@ -1,4 +1,4 @@
-"""What is kept between calls is never stale, never without bound, and changes no number; so with large batches."""
+"""What is kept between calls is never stale or unbounded; so with large batches."""
 
 from __future__ import annotations
 

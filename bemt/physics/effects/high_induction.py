@@ -13,10 +13,9 @@ class HighInduction(Effect):
 
     Notes
     -----
-    From the vortex-ring state to the windmill state of a rotor in descent the disk follows the induced velocity
-    measured on helicopter rotors, Leishman (2006), Principles of Helicopter Aerodynamics, sec. 2.14.3 (book not
-    checked; :func:`bemt.physics.bem.residual.mass_flow`), and so does its mirror image, a propeller that brakes in wind
-    from the front. Never acts in normal propeller operation.
+    In descent the disk follows the induced velocity measured on helicopter rotors, Leishman (2006), Principles of
+    Helicopter Aerodynamics, sec. 2.14.3 (book not checked). So does its mirror image, a propeller that brakes in wind
+    from the front (:func:`bemt.physics.bem.residual.mass_flow`).
     """
 
     id = "high_induction"

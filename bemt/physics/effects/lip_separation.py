@@ -16,11 +16,11 @@ class LipSeparation(Effect):
 
     Notes
     -----
-    The suction of the lip carries the duct's thrust, so its limit is a share of the largest duct thrust of the
-    recording (Martin and Tung 2004; Pereira 2008, ch. 4; not checked). Beyond ``onset`` a share of it is lost in
-    proportion, up to ``loss`` at the largest. Small lip radii (below 6 % of the diameter) separate early and lose up to
-    half of the thrust: Martin and Tung (2004), 60th AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not
-    checked). Proportion and hysteresis are declared: once separated, the flow reattaches below onset (1 - hysteresis),
+    The suction of the lip is limited to a share of the largest duct thrust of the recording (Martin and Tung 2004;
+    Pereira 2008, ch. 4; not checked). Beyond ``onset`` a share of it is lost in proportion, up to ``loss`` at the
+    largest. Small lip radii (below 6 % of the diameter) separate early and lose up to half of the thrust: Martin and
+    Tung (2004), 60th AHS Forum; Pereira (2008), PhD thesis Univ. of Maryland, ch. 4 (not checked). Proportion and
+    hysteresis are declared: once separated, the flow reattaches below onset (1 - hysteresis),
     visible only if the recording has time.
 
     A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,

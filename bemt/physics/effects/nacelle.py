@@ -15,9 +15,9 @@ class Nacelle(Effect):
 
     Notes
     -----
-    Half-body of radius a, or hub radius where ``body_over_R`` is smaller: a source of flux pi a^2 V one radius behind
-    the disk slows the axial flow there by V deficit (1 + (r/a)^2)^-1.5, deficit 1/4 on the axis (Rankine 1871; Katz and
-    Plotkin 2001, Low-Speed Aerodynamics, sec. 3.10; not checked), evaluated at each station. The balance reads the drag
+    A half-body of radius a slows the axial flow by V deficit (1 + (r/a)^2)^-1.5 (Rankine 1871; Katz and Plotkin 2001,
+    Low-Speed Aerodynamics, sec. 3.10; not checked). It is a source of flux pi a^2 V one radius behind the disk, deficit
+    1/4 on the axis; a is the hub radius where ``body_over_R`` is smaller. The balance reads the drag
     cd 1/2 rho W^2 pi a^2; 0.1 a spinner to 1.2 a bluff motor (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not checked). W
     = V + wash v: a body behind the disk stands in the slipstream, whose induced speed is v at the disk and 2 v in the
     far wake (Glauert 1935, ch. VII). A rotor without hub uses a = R/10. Motors, balances and fairings are often wider

@@ -59,7 +59,7 @@ def export(
     min_thickness_mm : float, optional
         Refuse a blade whose sections are thinner; a printed blade is made so, whatever the nozzle. [mm]
     printable : bool
-        One solid for a printer: thick enough, round tip, hub with a bore (docs/printing.md).
+        One solid for a printer: thick enough, round tip, hub with a bore (docs/design.md).
     nozzle_mm : float, optional
         Nozzle of the printer, 0.4 by default; the least thickness is two of its lines. [mm]
     adapter : str, optional
