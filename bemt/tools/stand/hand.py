@@ -13,12 +13,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bemt.base.tables import write_atomic
 from bemt.judge.proof.items import recording_text
 from bemt.judge.proof.loop import Hand, Points
 from bemt.judge.proof.rows import Entry
 from bemt.tools.stand.guard import Limits
-from bemt.tools.stand.verbs import Row, Stand
+from bemt.tools.stand.verbs import Stand
 
+Rows = Sequence[Mapping[str, float]]
 _LAPSE = 300.0  # Of a simulated stand that nobody watches
 _LOADS = ("thrust_N", "torque_Nm")
 _READ = ("airspeed_m_s", "voltage_V")  # Channels of the wire that go into a recording, beside speed and loads
@@ -27,9 +29,7 @@ _READ = ("airspeed_m_s", "voltage_V")  # Channels of the wire that go into a rec
 class Person(Protocol):
     """Who stands at the stand."""
 
-    def set_up(
-        self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int
-    ) -> Sequence[Mapping[str, float]]:  # fmt: skip
+    def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
         """Prepare a run (``again``, ``run``, ``reference``); its rows, none where it cannot be."""
         ...
 
@@ -49,21 +49,21 @@ class Person(Protocol):
 class Wired:
     """Hand of a stand behind a wire (:class:`bemt.judge.proof.loop.Hand`)."""
 
-    def __init__(self, stand: Stand, person: Person, told: Callable[[Mapping[str, float], Row], None] | None = None):
-        self.stand, self.person, self.told = stand, person, told
-        self.seconds = 0.0  # Time of the stand so far [s]
+    def __init__(self, stand: Stand, person: Person, may: Callable[[str, Rows], bool] | None = None, keep: str = ""):
+        self.stand, self.person, self.may, self.keep = stand, person, may, keep
+        self.made: list[tuple[str, str]] = []  # Kind and text of every run, in order
 
     def reference(self) -> str:
         """Make the points of the recording without the causes that can be taken away."""
-        return self._measured(self.person.set_up("reference", [], (), 0))
+        return self._measured("reference", self.person.set_up("reference", [], (), 0))
 
     def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
         """Make the last of the runs that were asked for."""
-        return self._measured(self.person.set_up("run", runs, mended, day))
+        return self._measured("run", self.person.set_up("run", runs, mended, day))
 
     def again(self, mended: Sequence[str], day: int) -> str:
         """Make the points of the recording once more."""
-        return self._measured(self.person.set_up("again", [], mended, day))
+        return self._measured("again", self.person.set_up("again", [], mended, day))
 
     def there(self, name: str) -> bool:
         """Look whether a cause is at work."""
@@ -73,14 +73,14 @@ class Wired:
         """Put causes right; those that were there."""
         return self.person.mend(names)
 
-    def _measured(self, rows: Sequence[Mapping[str, float]]) -> str:
+    def _measured(self, kind: str, rows: Rows) -> str:
         """Recording of the rows of a run: means, and the scatter of a sample as their uncertainty."""
         out: list[dict[str, float]] = []
+        if not rows or (self.may is not None and not self.may(kind, rows)):
+            return ""
         for row in rows:
-            known = {"time_s": math.nan, **self.person.place(row)}
+            known = {"time_s": math.nan, **self.stand.meanwhile(lambda row=row: self.person.place(row))}
             read = self.stand.at_speed(row["rpm"])
-            if self.told:
-                self.told(row, read)
             mine: dict[str, float] = {"run": row.get("run", 0), "rpm": read.mean["rpm"]}
             mine["airspeed_m_s"] = row.get("airspeed_m_s", 0.0)
             mine |= {n: read.mean[n] for n in (*_LOADS, *_READ) if n in read.mean}
@@ -91,7 +91,10 @@ class Wired:
         self.stand.stop()
         if len(out) < 2:
             return ""
-        return recording_text({n: np.array([r[n] for r in out]) for n in out[0]})
+        self.made.append((kind, recording_text({n: np.array([r[n] for r in out]) for n in out[0]})))
+        if self.keep:
+            write_atomic(Path(self.keep) / f"{len(self.made)}_{kind}.csv", self.made[-1][1])
+        return self.made[-1][1]
 
 
 class Simulated:

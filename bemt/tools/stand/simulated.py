@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import needs
-from bemt.tools.stand.truth import Truth
+from bemt.judge.proof.live import Truth
 
 _WATCH_S, _SEND_S = 0.02, 0.01
 

@@ -11,15 +11,17 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 from bemt.base.errors import Fault, InputError
 from bemt.tools.stand.drivers import connect
 from bemt.tools.stand.guard import Limits
 
+T = TypeVar("T")
 _POLL_S, _START_S = 0.02, 10.0
 # A reading of the speed is steady when it moves by less than this share while a row is read; that near to what was
 # asked for is near enough; attempts
@@ -131,6 +133,14 @@ class Stand:
             if left <= 0.0:
                 return
             time.sleep(min(left, _POLL_S))
+
+    def meanwhile(self, do: Callable[[], T]) -> T:
+        """Do something else, and keep the beat."""
+        with ThreadPoolExecutor(1) as pool:
+            doing = pool.submit(do)
+            while not doing.done():
+                self._wait(_POLL_S)
+            return doing.result()
 
     def pulse(self, pulse_us: float) -> None:
         """Set the pulse width and wait until it has come and the speed is steady. [us]"""

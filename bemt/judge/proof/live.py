@@ -43,42 +43,41 @@ class Truth:
 
     def set_up(self, kind: str, runs: Sequence[Sequence[Mapping[str, float]]], mended: Sequence[str], day: int) -> Any:
         """Prepare a run as somebody at the stand does; its rows, those that the rotor can do. Faults stay as they are."""
+        plan, draw = self.bench.rows, (4 if kind == "reference" else 3, day)
+        if kind == "run":
+            for points in runs:
+                plan = extended(plan, points)
+            own, draw = slice(plan.rpm.size - len(runs[-1]), None), (2, len(runs), day)  # type: ignore[assignment]
+            plan = _part(plan, own)
+        ducted = self.bench.rig.duct is not None
+        taken = [c for c in self._hidden(()).causes if c.removable] if kind == "reference" else []
+        h = self._hidden([*mended, *(c.id for c in taken)])
+        world, stand = h.world, h.stand
+        for cause in taken:
+            ducted = ducted and cause.without.ducted is not False
+            world, stand = applied(world, stand, cause.without)
+            world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
+        rotor = self.bench.rig.rotor if ducted else replace(self.bench.rig.rotor, wall=float("nan"))
+        duct = self.bench.rig.duct if ducted else None
+        real = loads(rotor, world, plan, duct, None)
         with self.lock:
-            plan, draw = self.bench.rows, (3, day)
-            if kind == "run":
-                for points in runs:
-                    plan = extended(plan, points)
-                own, draw = slice(plan.rpm.size - len(runs[-1]), None), (2, len(runs), day)
-                plan = _part(plan, own)
-            ducted = self.bench.rig.duct is not None
-            taken = [c for c in self._hidden(()).causes if c.removable] if kind == "reference" else []
-            h = self._hidden([*mended, *(c.id for c in taken)])
-            world, stand = h.world, h.stand
-            for cause in taken:
-                draw, ducted = (4, day), ducted and cause.without.ducted is not False
-                world, stand = applied(world, stand, cause.without)
-                world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
-            self.rotor = self.bench.rig.rotor if ducted else replace(self.bench.rig.rotor, wall=float("nan"))
-            self.duct = self.bench.rig.duct if ducted else None
-            self.world, self.stand, self.plan = world, stand, plan
-            self.seed, self.k, self.solved = (self.entry.seed, *draw), 0, (0.0, 0.0, 0.0)
-            real = loads(self.rotor, world, plan, self.duct, None)
-            self.real, self.rows, self.cells = real, plan.rpm.copy(), None
-            hall = np.random.default_rng((*self.seed, 5)).standard_normal(plan.rpm.size + 1)
-            told = bool(self.entry.air_known) or any("pressure_Pa" in p for p in (runs or [[]])[-1])
-            out = []
-            for k in np.flatnonzero(np.isfinite(real.thrust) & np.isfinite(real.torque)):
-                row = {"k": int(k), "run": int(plan.run[k]), "rpm": float(plan.rpm[k]), "time_s": float(plan.time[k]),
-                       "airspeed_m_s": float(plan.airspeed[k]),
-                       "temperature_C": float(plan.temperature_C[k] + 0.1 * hall[k])}  # fmt: skip
-                if told and "air_density" not in self.entry.causes:
-                    row["pressure_Pa"] = float(plan.pressure_Pa[k] + 30.0 * hall[-1])
-                if np.isfinite(plan.wall[k]):
-                    row["wall_distance_m"] = float(plan.wall[k])
-                if self.bench.plan == "gap":
-                    row["tip_gap_mm"] = 1e3 * float(plan.gap[k])
-                out.append(row)
-            return out
+            self.rotor, self.duct, self.world, self.stand, self.plan, self.real = rotor, duct, world, stand, plan, real
+            self.seed, self.k, self.solved, self.cells = (self.entry.seed, *draw), 0, (0.0, 0.0, 0.0), None
+        hall = np.random.default_rng((*self.seed, 5)).standard_normal(plan.rpm.size + 1)
+        told = bool(self.entry.air_known) or any("pressure_Pa" in p for p in (runs or [[]])[-1])
+        out = []
+        for k in np.flatnonzero(np.isfinite(real.thrust) & np.isfinite(real.torque)):
+            row = {"k": int(k), "run": int(plan.run[k]), "rpm": float(plan.rpm[k]), "time_s": float(plan.time[k]),
+                   "airspeed_m_s": float(plan.airspeed[k]),
+                   "temperature_C": float(plan.temperature_C[k] + 0.1 * hall[k])}  # fmt: skip
+            if told and "air_density" not in self.entry.causes:
+                row["pressure_Pa"] = float(plan.pressure_Pa[k] + 30.0 * hall[-1])
+            if np.isfinite(plan.wall[k]):
+                row["wall_distance_m"] = float(plan.wall[k])
+            if self.bench.plan == "gap":
+                row["tip_gap_mm"] = 1e3 * float(plan.gap[k])
+            out.append(row)
+        return out
 
     def place(self, k: int) -> None:
         """Bring wind, wall, gap and air to those of a row."""
@@ -155,7 +154,7 @@ class Truth:
         if not (settled and np.isfinite(T + Q)) or self.rpm <= 0.02 * self.bench.rig.top_rpm:
             T, Q = (float(v[k]) * (self.rpm / float(plan.rpm[k])) ** 2 for v in (self.real.thrust, self.real.torque))
         self.solved = (self.rpm, T, Q)
-        thrust, torque, rpm = self.real.thrust.copy(), self.real.torque.copy(), self.rows.copy()
+        thrust, torque, rpm = self.real.thrust.copy(), self.real.torque.copy(), plan.rpm.copy()
         thrust[k], torque[k], rpm[k] = T, Q, self.rpm
         quiet = np.nan_to_num(thrust), np.nan_to_num(torque)
         rng = np.random.default_rng(self.seed)
