@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from bemt.judge.proof.items import Bench, Hidden, hidden
 from bemt.judge.proof.causes import applied
+from bemt.judge.proof.items import Bench, Hidden, hidden
 from bemt.judge.proof.rigs import extended
 from bemt.judge.proof.rows import Entry
 from bemt.judge.proof.stand import full_scales, record
 from bemt.judge.proof.truth_world import Conditions, TrueLoads, loads
 
-STOP_US, CUT_OFF_S = 1000.0, 0.3
+STOP_US, CUT_OFF_S = 1000.0, 0.25
 _LAG_S = 0.15  # Motor and rotor, first order
 _TOP, _CURVE = 1.4, 0.85  # Speed at full command over the top of the range, and its growth with the command
 _SETTLED = 1e-3
@@ -29,7 +29,9 @@ class Truth:
 
     def __init__(self, bench: Bench, entry: Entry, lapse: float = 1.0) -> None:
         self.bench, self.entry, self.lapse = bench, entry, lapse
+        self.patience = CUT_OFF_S if lapse == 1.0 else 20.0 * CUT_OFF_S
         self.lock = threading.RLock()
+        self.cells: dict[str, float] | None = None  # As read at the last settled speed
         self.us, self.changed, self.client, self.cut = STOP_US, time.monotonic(), 0.0, False
         self.rpm, self.then, self.broken = 0.0, time.monotonic(), ""
         self.noise = np.random.default_rng()
@@ -42,12 +44,13 @@ class Truth:
         return hidden(self.bench, e.causes, e.strengths, e.seed, e.set, mended)
 
     def set_up(self, kind: str, runs: Sequence[Sequence[Mapping[str, float]]], mended: Sequence[str], day: int) -> Any:
-        """Prepare a run as somebody at the stand does; its rows, those that the rotor can do. Faults stay as they are."""
-        plan, draw = self.bench.rows, (4 if kind == "reference" else 3, day)
+        """Prepare a run as somebody at the stand does; its rows, those that the rotor can do."""
+        plan = self.bench.rows
+        draw: tuple[int, ...] = (4 if kind == "reference" else 3, day)
         if kind == "run":
             for points in runs:
                 plan = extended(plan, points)
-            own, draw = slice(plan.rpm.size - len(runs[-1]), None), (2, len(runs), day)  # type: ignore[assignment]
+            own, draw = slice(plan.rpm.size - len(runs[-1]), None), (2, len(runs), day)
             plan = _part(plan, own)
         ducted = self.bench.rig.duct is not None
         taken = [c for c in self._hidden(()).causes if c.removable] if kind == "reference" else []
@@ -99,7 +102,7 @@ class Truth:
     def watch(self) -> None:
         """Cut off where no client is heard: the stand's own watchdog."""
         with self.lock:
-            if self.us > STOP_US and time.monotonic() - self.client > CUT_OFF_S:
+            if self.us > STOP_US and time.monotonic() - self.client > self.patience:
                 self.cut_off()
 
     def cut_off(self) -> None:

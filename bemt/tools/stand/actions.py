@@ -94,6 +94,7 @@ def stand(
         ...
     bemt.base.errors.InputError: yes: got a real stand; expected on="simulated". Runs of a real stand are confirmed.
     """
+    import shutil
     from pathlib import Path as File
 
     from bemt.base.errors import Fault, InputError
@@ -116,7 +117,13 @@ def stand(
         raise InputError(faults)
     given = {"largest_us": largest_us, "ramp_us_s": ramp_us_s, "current_A": current_A, "pressure_hPa": pressure_hPa,
              "vibration_m_s2": vibration_m_s2, "temperature_C": temperature_C}  # fmt: skip
-    return sit(
-        rotor_of(case), on, address, line, given, top_rpm=top_rpm, wind_m_s=wind_m_s, runs=runs, faults=fault,
-        seed=seed, lapse=lapse if on == "simulated" else 1.0, yes=yes, out=folder, say=progress or (lambda text: None),
-    )  # fmt: skip
+    try:
+        return sit(
+            rotor_of(case), on, address, line, given, top_rpm=top_rpm, wind_m_s=wind_m_s, runs=runs, faults=fault,
+            seed=seed, lapse=lapse if on == "simulated" else 1.0, yes=yes, out=folder,
+            say=progress or (lambda text: None),
+        )  # fmt: skip
+    except InputError:
+        if not list(folder.glob("1_*.csv")):  # nothing was measured: nothing stays
+            shutil.rmtree(folder, ignore_errors=True)
+        raise

@@ -1,4 +1,4 @@
-"""The guard: a process of its own that owns the wire. Whatever happens to the one that gives orders, it stops the motor.
+"""The guard: a process of its own that owns the wire. Whatever happens to the one that gives orders, the motor stops.
 
 ``python -m bemt.tools.stand.guard`` reads a line of JSON, the :class:`Limits` and the wire, then orders, a line each:
 ``{"go": pulse width}``, ``{"beat": 1}``, ``{"stop": reason}``. It answers with rows, ``{"us": .., "row": {..}}``, and
@@ -21,9 +21,9 @@ from typing import Any
 
 from bemt.base.document import Documented
 from bemt.base.errors import InputError
+from bemt.tools.stand import drivers
 from bemt.tools.stand.drivers import Wire, connect
 
-_BEAT_S, _ROW_S = 0.25, 0.3  # silence that stops: of the orders, of the stand
 _QUIET_S = 0.1  # A command is written again after that
 _LINGER_S = 0.3  # The stop value is written for so long before the end
 _WATCHED = ("thrust_N", "torque_Nm", "rpm", "current_A", "vibration_m_s2")
@@ -39,6 +39,7 @@ class Limits(Documented):
     rpm: float = math.inf
     stop_us: float = 1000.0
     tick_s: float = 0.01
+    patience_s: float = 0.25  # Silence that stops: of the orders, of the stand [s]
 
     def broken(self, row: dict[str, float]) -> str:
         """What a row says against going on; "" if nothing.
@@ -104,9 +105,9 @@ class Guard:
         turning = max(self.us, self.target) > self.limits.stop_us
         if why := self.limits.broken(self.row):
             self.stop(why)
-        elif turning and now - self.fresh > _ROW_S:
+        elif turning and now - self.fresh > self.limits.patience_s:
             self.stop(f"no row from the stand for {now - self.fresh:.2f} s")
-        elif turning and now - self.beat > _BEAT_S:
+        elif turning and now - self.beat > self.limits.patience_s:
             self.stop(f"no heartbeat for {now - self.beat:.2f} s")
         before, step = self.us, self.limits.ramp_us_s * (now - self.then)
         self.us, self.then = min(self.target, self.us + step), now  # down goes at once
@@ -136,12 +137,14 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the one that gives orders
     given = json.loads(sys.stdin.readline())
     os.set_blocking(1, False)
+    limits = Limits.from_document(given["limits"])
+    drivers.PATIENCE_S = limits.patience_s
     try:
         wire = connect(given["driver"], given["address"], given["line"])
     except InputError as error:
         _tell(refused=[vars(f) for f in error.faults])
         return
-    guard = Guard(wire, Limits.from_document(given["limits"]))
+    guard = Guard(wire, limits)
     signal.signal(signal.SIGTERM, lambda *_: guard.stop("terminated"))
     orders: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
     threading.Thread(target=_orders, args=(orders,), daemon=True).start()

@@ -8,6 +8,8 @@ import math
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,7 +23,8 @@ from bemt.tools.stand.guard import Limits
 from bemt.tools.stand.verbs import Stand
 
 Rows = Sequence[Mapping[str, float]]
-_LAPSE = 300.0  # Of a simulated stand that nobody watches
+# Of a simulated stand that nobody watches
+_LAPSE, _LIMITS = 300.0, Limits(2000.0, 500.0, current_A=5e3, vibration_m_s2=50.0)
 _LOADS = ("thrust_N", "torque_Nm")
 _READ = ("airspeed_m_s", "voltage_V")  # Channels of the wire that go into a recording, beside speed and loads
 
@@ -79,7 +82,7 @@ class Wired:
         if not rows or (self.may is not None and not self.may(kind, rows)):
             return ""
         for row in rows:
-            known = {"time_s": math.nan, **self.stand.meanwhile(lambda row=row: self.person.place(row))}
+            known = {"time_s": math.nan, **self.stand.meanwhile(partial(self.person.place, row))}
             read = self.stand.at_speed(row["rpm"])
             mine: dict[str, float] = {"run": row.get("run", 0), "rpm": read.mean["rpm"]}
             mine["airspeed_m_s"] = row.get("airspeed_m_s", 0.0)
@@ -140,9 +143,10 @@ class Simulated:
 
     def close(self) -> None:
         """End the process."""
-        assert self.process.stdin is not None
+        assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.close()
         self.process.wait(5.0)
+        self.process.stdout.close()
 
 
 def wire_of_the_simulated() -> str:
@@ -152,9 +156,11 @@ def wire_of_the_simulated() -> str:
     return "flightstand" if importlib.util.find_spec("FlightStand") else "rcbenchmark"
 
 
-def limits_of_the_simulated(lapse: float) -> Limits:
-    """Limits of a simulated stand, its time run faster."""
-    return Limits(2000.0, 500.0 * lapse, current_A=5e3, vibration_m_s2=50.0, tick_s=0.01 if lapse < 10.0 else 0.002)
+def lapsed(limits: Limits, lapse: float) -> Limits:
+    """Limits of a simulated stand whose time runs faster; that much less depends on how busy the machine is."""
+    if lapse == 1.0:
+        return limits
+    return replace(limits, ramp_us_s=limits.ramp_us_s * lapse, tick_s=0.002, patience_s=5.0)
 
 
 @contextlib.contextmanager
@@ -162,7 +168,7 @@ def wired(out: Path, entry: Entry) -> Iterator[Hand]:
     """Hand on the simulated stand of an item of a proof: in another process, behind the wire of a real one."""
     person = Simulated(out, entry.folder, wire_of_the_simulated(), _LAPSE)
     try:
-        with Stand(person.wire, person.address, "", limits_of_the_simulated(_LAPSE), 0.5, 10) as stand:
+        with Stand(person.wire, person.address, "", lapsed(_LIMITS, _LAPSE), 0.5, 10) as stand:
             yield Wired(stand, person)
     finally:
         person.close()

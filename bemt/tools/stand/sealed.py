@@ -1,4 +1,4 @@
-"""What a simulated stand has wrong: an item of a proof, or a fault of one's own case, sealed before anything is asked."""
+"""What a simulated stand has wrong: an item of a proof, or a fault of one's own case, sealed before it is asked."""
 
 from __future__ import annotations
 
@@ -91,8 +91,6 @@ def rows_of(points: Sequence[Mapping[str, float]]) -> Conditions:
     """Conditions of points, in their order."""
     n = len(points)
     rpm, V = (np.array([float(p[k]) for p in points]) for k in ("rpm", "airspeed_m_s"))
-    T, p = (np.array([float(q.get(k, usual)) for q in points])
-            for k, usual in (("temperature_C", 20.0), ("pressure_Pa", 101325.0)))  # fmt: skip
-    still = np.full(n, np.nan)
+    T, p, still = np.full(n, 20.0), np.full(n, 101325.0), np.full(n, np.nan)
     run = np.array([int(q.get("run", 0)) for q in points])
-    return Conditions(rpm, V, T, p, 12.0 * np.arange(n), np.full(n, 600.0), still, still, run)
+    return Conditions(rpm, V, T, p, np.linspace(0.0, 12.0 * (n - 1), n), np.full(n, 600.0), still, still, run)

@@ -23,13 +23,14 @@ from bemt.judge.proof.loop import A_RUN, Course, Points, follow
 from bemt.physics import effects
 from bemt.tools.stand import sealed, story
 from bemt.tools.stand.guard import Limits
-from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, wire_of_the_simulated
+from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, lapsed, wire_of_the_simulated
 from bemt.tools.stand.verbs import Stand, Stopped
 
 if TYPE_CHECKING:
     from bemt.rotors.propeller import Propeller
 
 SCHEMA = "bemt.stand/1"
+_ABOVE = 1.1  # Speed at which the motor is stopped, over the top of the range [1]
 _UP, _WINDS = 10, 5  # Speeds of a plan at rest, and winds of one in a tunnel
 _USUAL = {"largest_us": 2000.0, "ramp_us_s": 500.0, "current_A": math.inf, "vibration_m_s2": math.inf}
 _ASKED = {
@@ -83,7 +84,8 @@ def ask(question: str) -> str:
     """Ask at the terminal."""
     if not sys.stdin.isatty():
         raise InputError(Fault("", "yes", "no terminal", f"somebody who answers: {question}", "Runs are confirmed"))
-    print(question, end=" ", file=sys.stderr, flush=True)
+    sys.stderr.write(f"{question} ")
+    sys.stderr.flush()
     return sys.stdin.readline().strip()
 
 
@@ -139,8 +141,8 @@ def plan_of(top_rpm: float, wind_m_s: float) -> list[dict[str, float]]:
     if not wind_m_s:
         up = np.linspace(0.35, 1.0, _UP) * top_rpm
         return [{"rpm": float(n), "airspeed_m_s": 0.0, "run": 0} for n in (*up, *up[-2::-1])]
-    return [{"rpm": float(n), "airspeed_m_s": float(V), "run": k} for k, V in
-            enumerate(np.linspace(0.0, wind_m_s, _WINDS)) for n in np.linspace(0.4, 1.0, _UP // 2) * top_rpm]  # fmt: skip
+    speeds, winds = np.linspace(0.4, 1.0, _UP // 2) * top_rpm, np.linspace(0.0, wind_m_s, _WINDS)
+    return [{"rpm": float(n), "airspeed_m_s": float(V), "run": k} for k, V in enumerate(winds) for n in speeds]
 
 
 def sit(
@@ -163,8 +165,9 @@ def sit(
     def may(kind: str, rows: Rows) -> bool:
         speeds, winds = ([r[n] for r in rows] for n in ("rpm", "airspeed_m_s"))
         what = {"again": "the recording", "run": "the run asked for", "reference": "a reference"}[kind]
-        tell(f"run: {what}, {len(rows)} points, {min(speeds):.0f} to {max(speeds):.0f} rev/min, wind {min(winds):.1f} to "
-             f"{max(winds):.1f} m/s, about {minutes('run', len(rows)):.0f} min")  # fmt: skip
+        wind = f", wind {min(winds):.1f} to {max(winds):.1f} m/s" if max(winds) else ", at rest"
+        tell(f"run: {what}, {len(rows)} points, {min(speeds):.0f} to {max(speeds):.0f} rev/min{wind}, about "
+             f"{minutes('run', len(rows)):.0f} min")  # fmt: skip
         return yes or ask("Enter to run, s to skip.") != "s"
 
     def told(course: Course) -> None:
@@ -187,7 +190,8 @@ def sit(
         person: Person
         if on == "simulated":
             key = out / "sealed"
-            digest = sealed.seal_case(key, rotor.case, points, top, faults, secrets.randbits(40) if seed is None else seed)
+            own = secrets.randbits(40) if seed is None else seed
+            digest = sealed.seal_case(key, rotor.case, points, top, faults, own)
             tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
             person = one = Simulated(key, "0000", wire_of_the_simulated(), lapse)
             held.callback(one.close)
@@ -231,14 +235,15 @@ def _limits(
     drive = rotor.case.file.drive
     stated = {n: v for n, v in given.items() if v is not None and n in _USUAL}
     if drive is not None and drive.esc is not None:
-        stated = {"largest_us": drive.esc.pulse_max_us, "current_A": drive.esc.current_limit_A} | stated
-    known = {n: v for n, v in stated.items() if v is not None}
+        limit = {} if drive.esc.current_limit_A is None else {"current_A": drive.esc.current_limit_A}
+        stated = {"largest_us": drive.esc.pulse_max_us, **limit, **stated}
     for name in ("largest_us", "ramp_us_s", "current_A") if on != "simulated" else ():
-        known.setdefault(name, asked_number(name)) if name not in known else None
-    found = {**_USUAL, **known}
-    found["ramp_us_s"] *= lapse
-    limits = Limits(**found, rpm=1.1 * top_rpm if top_rpm else math.inf, tick_s=0.01 if lapse < 10.0 else 0.002)
+        if name not in stated:
+            stated[name] = asked_number(name)
+    found = {**_USUAL, **stated}
+    top = top_rpm or (math.inf if on == "simulated" else rotor.case.rpm)
+    limits = Limits(**found, rpm=_ABOVE * top)
     if not limits.stop_us < limits.largest_us <= 2500.0 or limits.ramp_us_s <= 0.0:
         got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
         raise InputError(Fault("", "largest_us, ramp_us_s", got, "1000 to 2500 us and a rise above 0"))
-    return limits
+    return lapsed(limits, lapse)

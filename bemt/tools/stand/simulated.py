@@ -19,7 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import needs
+from bemt.base.units import UNITS
 from bemt.judge.proof.live import Truth
+from bemt.tools.stand.sealed import bench_of
 
 _WATCH_S, _SEND_S = 0.02, 0.01
 
@@ -28,8 +30,9 @@ def _flightstand(truth: Truth) -> str:
     """Serve the core's calls that the client makes."""
     needs("FlightStand", "stand")
     grpc, fs, calls = (needs(m, "stand") for m in ("grpc", "flight_stand_api_v1_pb2", "flight_stand_api_v1_pb2_grpc"))
-    kinds = {"thrust_N": (fs.FORCE_FZ, 1.0), "torque_Nm": (fs.TORQUE_MZ, 1.0), "current_A": (fs.CURRENT_HALL_CURRENT, 1.0),
-             "rpm": (fs.ROTATION_SPEED_FREQUENCY, 0.10471975511965977), "airspeed_m_s": (fs.AIRSPEED_DIFFERENTIAL_PRESSURE, 1.0),
+    kinds = {"thrust_N": (fs.FORCE_FZ, 1.0), "torque_Nm": (fs.TORQUE_MZ, 1.0),
+             "current_A": (fs.CURRENT_HALL_CURRENT, 1.0), "rpm": (fs.ROTATION_SPEED_FREQUENCY, UNITS["rpm"].factor),
+             "airspeed_m_s": (fs.AIRSPEED_DIFFERENTIAL_PRESSURE, 1.0),
              "vibration_m_s2": (fs.ACCELEROMETER_VIBRATION_LEVEL, 1.0)}  # fmt: skip
 
     class Core(calls.FlightStandServicer):  # type: ignore[name-defined,misc]
@@ -86,9 +89,9 @@ def _rcbenchmark(truth: Truth) -> str:
         other = free.getsockname()
     here = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     here.bind(("127.0.0.1", 0))
-    names = {"thrust_N": ("thrust", "kgf", 1.0 / 9.80665), "torque_Nm": ("torque", "N·m", 1.0), "current_A": ("current", "A", 1.0),
-             "rpm": ("motorOpticalSpeed", "RPM", 1.0), "vibration_m_s2": ("vibration", "g", 1.0 / 9.80665),
-             "airspeed_m_s": ("airspeed", "m/s", 1.0)}  # fmt: skip
+    names = {"thrust_N": ("thrust", "kgf", 1.0 / UNITS["kgf"].factor), "torque_Nm": ("torque", "N·m", 1.0),
+             "current_A": ("current", "A", 1.0), "rpm": ("motorOpticalSpeed", "RPM", 1.0),
+             "vibration_m_s2": ("vibration", "m/s²", 1.0), "airspeed_m_s": ("airspeed", "m/s", 1.0)}  # fmt: skip
 
     def listen() -> None:
         while True:
@@ -99,8 +102,8 @@ def _rcbenchmark(truth: Truth) -> str:
         here.sendto(b"Hi from RCbenchmark script!", other)
         while True:
             if truth.broken != "silent":
-                told = {theirs: {"workingValue": truth_row[n] * f, "workingUnit": unit, "displayUnit": "?"}
-                        for truth_row in [truth.sample()] for n, (theirs, unit, f) in names.items() if n in truth_row}  # fmt: skip
+                row = ((names[n], v) for n, v in truth.sample().items())
+                told = {theirs: {"workingValue": v * f, "workingUnit": unit} for (theirs, unit, f), v in row}
                 here.sendto(json.dumps(told).replace("NaN", "null").encode(), other)
             time.sleep(_SEND_S)
 
@@ -126,9 +129,9 @@ def _serial(truth: Truth) -> str:
     def send() -> None:
         while True:
             r = truth.sample()
-            row = f"{1e3 * time.monotonic():.1f},{r['thrust_N'] / 0.00980665:.5g},{1e3 * r['torque_Nm']:.6g},{r['rpm']:.6g}"
+            row = (1e3 * time.monotonic(), r["thrust_N"] / UNITS["gf"].factor, 1e3 * r["torque_Nm"], r["rpm"])
             if truth.broken != "silent":
-                os.write(ours, f"{row},{r['current_A']:.5g}\n".encode())
+                os.write(ours, (",".join(f"{v:.7g}" for v in (*row, r["current_A"])) + "\n").encode())
             time.sleep(_SEND_S)
 
     for one in (listen, send):
@@ -156,13 +159,16 @@ def _by_hand(truth: Truth, said: dict[str, Any]) -> Any:
             truth.broken = said["what"]
 
 
+def _say(**said: Any) -> None:
+    sys.stdout.write(json.dumps(said) + "\n")
+    sys.stdout.flush()
+
+
 def main() -> None:
     """Serve one item of a sealed key until the lines end."""
-    from bemt.tools.stand.sealed import bench_of
-
     key, item, wire, *more = sys.argv[1:]
     truth = Truth(*bench_of(Path(key), item), float(more[0]) if more else 1.0)
-    print(json.dumps({"address": _WIRES[wire](truth)}), flush=True)
+    _say(address=_WIRES[wire](truth))
 
     def watch() -> None:
         while True:
@@ -171,7 +177,7 @@ def main() -> None:
 
     threading.Thread(target=watch, daemon=True).start()
     for line in sys.stdin:
-        print(json.dumps({"done": _by_hand(truth, json.loads(line))}), flush=True)
+        _say(done=_by_hand(truth, json.loads(line)))
     os._exit(0)  # threads of servers
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.canvas import CYCLE, GREY, blank, frame, png
+from bemt.base.canvas import CYCLE, GREY, STYLE, blank, frame, png
 from bemt.base.page import render
 from bemt.base.tables import write_atomic
 from bemt.judge.proof.loop import Course
@@ -38,21 +38,25 @@ def write(
 
 def drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
     """Loads over those of the model, run by run, beside the probabilities after each answer."""
+    import matplotlib
+
     made = made[:4]
-    figure, axes = blank(3.0 + 0.2 * _MOST, 1, 3)
+    with matplotlib.rc_context(STYLE):
+        return _drawn(rotor, course, made)
+
+
+def _drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
+    figure, axes = blank(3.0, 1, 3)
     for k, (kind, text) in enumerate(made):
         rows = np.genfromtxt(text.splitlines(), delimiter=",", names=True)
-        air = {n: float(np.median(rows[m])) * f for n, m, f in (("temperature_C", "temperature_C", 1.0),
-               ("pressure_hPa", "pressure_Pa", 0.01)) if m in rows.dtype.names}  # fmt: skip
-        model = rotor.with_(**air) if False else rotor  # air as in the case
-        points = model.solve(rpm=rows["rpm"], airspeed_m_s=rows["airspeed_m_s"], bands=False)
+        points = rotor.solve(rpm=rows["rpm"], airspeed_m_s=rows["airspeed_m_s"], bands=False)
         for ax, name in zip(axes[0], ("thrust_N", "torque_Nm"), strict=False):
             share = 100.0 * (rows[name] / np.asarray(getattr(points, name)) - 1.0)
             u = 100.0 * rows[f"u_{name}"] / np.asarray(getattr(points, name))
             ax.errorbar(rows["rpm"], share, u, fmt="o", ms=3, lw=0.8, color=CYCLE[k], label=f"{k + 1} {_KINDS[kind]}")
     for ax, what in zip(axes[0], ("thrust", "torque"), strict=False):
         ax.axhline(0.0, color=GREY, lw=0.8)
-        ax.set(xlabel="speed [rev/min]", title=f"{what} less the model's [%]")
+        ax.set(xlabel="speed [rev/min]", title=f"{what} off the model [%]")
         frame(ax)
     axes[0, 0].legend()
     ax = axes[0, 2]
@@ -60,8 +64,9 @@ def drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> 
     names = list(dict.fromkeys(n for one in said for n in sorted(one, key=lambda n: -one[n])[:3]))[:_MOST]
     for k, one in enumerate(said):
         at = np.arange(len(names)) + 0.8 * (k + 0.5) / len(said) - 0.4
-        ax.barh(at, [one.get(n, 0.0) for n in names], 0.7 / len(said), color=CYCLE[k % len(CYCLE)], label=f"answer {k + 1}")
-    ax.set(yticks=np.arange(len(names)), yticklabels=names, xlim=(0.0, 1.0), title="probability after each answer")
+        share = [one.get(n, 0.0) for n in names]
+        ax.barh(at, share, 0.7 / len(said), color=CYCLE[k % len(CYCLE)], label=f"answer {k + 1}")
+    ax.set(yticks=np.arange(len(names)), yticklabels=names, xlim=(0.0, 1.0), title="probability")
     ax.invert_yaxis()
     ax.legend()
     frame(ax)

@@ -23,9 +23,9 @@ from bemt.tools.stand.guard import Limits
 
 T = TypeVar("T")
 _POLL_S, _START_S = 0.02, 10.0
-# A reading of the speed is steady when it moves by less than this share while a row is read; that near to what was
-# asked for is near enough; attempts
-_STEADY, _NEAR, _TRIES = 0.01, 0.01, 5
+# The speed is steady when it has moved by less than this share for that share of the longest wait; that near to what
+# was asked for is near enough; attempts
+_STEADY, _WINDOW, _NEAR, _TRIES = 0.005, 0.15, 0.01, 5
 
 
 class Stopped(Exception):
@@ -71,7 +71,8 @@ class Stand:
         self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
                                       start_new_session=True, stderr=subprocess.DEVNULL)  # fmt: skip
         self._say(driver=driver, address=address, line=line, limits=_plain(limits))
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
         atexit.register(self.close)
         until = time.monotonic() + _START_S
         while not self._rows:
@@ -153,8 +154,10 @@ class Stand:
         step = min(10.0 * limits.tick_s, 0.1)
         while time.monotonic() < until:
             self._wait(step)
-            speeds = [row.get("rpm", math.nan) for at, us, row in list(self._rows)[-5:] if us == pulse_us]
-            if len(speeds) == 5 and max(speeds) - min(speeds) <= _STEADY * max(speeds):
+            since = time.monotonic() - _WINDOW * self.settle_s
+            seen = [(row.get("rpm", math.nan), us) for at, us, row in list(self._rows) if at > since]
+            speeds = [rpm for rpm, us in seen if us == pulse_us]
+            if len(seen) == len(speeds) >= 5 and max(speeds) - min(speeds) <= _STEADY * max(speeds):
                 return
 
     def row(self) -> Row:
@@ -208,6 +211,9 @@ class Stand:
                 self.guard.stdin.close()  # the guard stops at the end of its orders
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.guard.wait(5.0)
+        self._listener.join(5.0)
+        if self.guard.stdout is not None and not self._listener.is_alive():
+            self.guard.stdout.close()
 
 
 def _plain(limits: Limits) -> dict[str, Any]:

@@ -17,7 +17,7 @@ NAMES = ("flightstand", "rcbenchmark", "serial")
 DEFAULTS = {"flightstand": "localhost:50051", "rcbenchmark": "127.0.0.1:55047:64126", "serial": "/dev/ttyUSB0@115200"}
 """Addresses where the makers' programs and most boards are."""
 PATIENCE_S = 0.25
-"""Longest wait for the other end."""
+"""Longest wait for the other end; the guard sets it."""
 
 
 class Wire(Protocol):
@@ -60,7 +60,7 @@ def connect(driver: str, address: str = "", line: str = "") -> Wire:
 
 
 def parts(address: str, pattern: str, expected: str) -> tuple[str, ...]:
-    """Parts of an address.
+    r"""Parts of an address.
 
     >>> parts("127.0.0.1:55047:64126", r"(.+):(\d+):(\d+)", "host:port:port")
     ('127.0.0.1', '55047', '64126')

@@ -12,7 +12,8 @@ import math
 from typing import Any
 
 from bemt.base.errors import needs
-from bemt.tools.stand.drivers import PATIENCE_S, parts, silent
+from bemt.tools.stand import drivers
+from bemt.tools.stand.drivers import parts, silent
 
 # Their type of an input, our channel, factor to ours. The airspeed is taken to be in m/s (SI, as they say of all).
 _INPUTS = (
@@ -35,13 +36,13 @@ class _Core:
         self.esc.output_target.active, self.esc.output_target.target_value = True, pulse_us
         request = self.core.Proto.UpdateOutputRequest(output=self.esc, mask=self.mask)
         try:
-            self.core.stub.UpdateOutput(request, timeout=PATIENCE_S)
+            self.core.stub.UpdateOutput(request, timeout=drivers.PATIENCE_S)
         except self.lost as error:
             raise OSError(f"the core did not take the command: {error.details()}") from error  # type: ignore[attr-defined]
 
     def read(self) -> dict[str, float]:
         try:
-            told = self.core.stub.ListSamples(self.core.Proto.ListSamplesRequest(), timeout=PATIENCE_S)
+            told = self.core.stub.ListSamples(self.core.Proto.ListSamplesRequest(), timeout=drivers.PATIENCE_S)
         except self.lost as error:
             raise OSError(f"the core sent no samples: {error.details()}") from error  # type: ignore[attr-defined]
         row, stamp = {}, 0.0

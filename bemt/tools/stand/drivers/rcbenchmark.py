@@ -10,6 +10,7 @@ import math
 import socket
 import time
 
+from bemt.base.errors import Fault, InputError
 from bemt.base.units import UNITS
 from bemt.tools.stand.drivers import parts, silent
 
@@ -26,8 +27,13 @@ class _Script:
     def __init__(self, host: str, there: int, here: int) -> None:
         self.to = (host, there)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("", here))
         self.socket.setblocking(False)
+        try:
+            self.socket.bind(("", here))
+        except OSError as error:
+            self.socket.close()
+            got = f"port {here}: {error.strerror}"
+            raise InputError(Fault("", "address", got, "a port that nobody has", "Is another sitting open?")) from error
         self.row: dict[str, float] = {}
 
     def write(self, pulse_us: float) -> None:
