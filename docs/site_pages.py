@@ -51,6 +51,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
         "printing.md",
         "notebooks/*",
         "flight_logs.md",
+        "stand.md",
         "exports.md",
         "adding.md",
         "scaling.md",

@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ import pytest
 import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.judge.proof import draw, loop, seal
+from bemt.judge.proof import draw, items, loop, seal
 from bemt.tools.stand import drivers, hand, sealed
 from bemt.tools.stand.drivers import rcbenchmark, serial
 from bemt.tools.stand.guard import Guard, Limits
@@ -108,13 +109,13 @@ def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
     """Turn the motor, let something happen; seconds until the output was at its stop value, and what the guard said."""
     stand.ask("break", what="")
     stand.ask("set up", kind="again", runs=[], mended=[], day=0)
-    if what == "killed":
+    if what in ("killed", "interrupted"):
         child = subprocess.Popen([sys.executable, "-c", HEAD, stand.wire, stand.address])
         until = time.monotonic() + 20.0
         while stand.ask("output")["us"] < 1400.0 and time.monotonic() < until:
             time.sleep(0.02)
         since = time.monotonic()
-        os.kill(child.pid, signal.SIGKILL)
+        os.kill(child.pid, signal.SIGKILL if what == "killed" else signal.SIGINT)
         child.wait()
         seconds = _stopped_after(stand, since)
         time.sleep(1.5)  # its guard lets go of the wire
@@ -133,7 +134,7 @@ def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
                 stand.ask("break", what="silent" if what == "cut" else what)
             if what != "frozen":
                 with pytest.raises(Stopped):
-                    head._wait(3.0)
+                    head.rest(3.0)
             return _stopped_after(stand, since), head.stopped
     finally:
         stand.ask("break", what="")
@@ -141,8 +142,8 @@ def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
             wire.close()
 
 
-REASONS = {"nan": "thrust_N is no number", "current": "current", "killed": "", "cut": "", "guard killed": "gone",
-           "frozen": ""}  # fmt: skip
+REASONS = {"nan": "thrust_N is no number", "current": "current", "killed": "", "interrupted": "", "cut": "",
+           "guard killed": "gone", "frozen": ""}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", REASONS)
@@ -161,7 +162,7 @@ def test_fifty_stops(simulated: hand.Simulated) -> None:
 
 def test_every_wire_reads_the_same_stand(simulated: hand.Simulated) -> None:
     simulated.ask("set up", kind="again", runs=[], mended=[], day=0)
-    with Stand(simulated.wire, simulated.address, "", LIMITS, 1.0) as stand:
+    with Stand(simulated.wire, simulated.address, "", replace(LIMITS, patience_s=3.0), 1.0) as stand:
         row = stand.at_speed(10000.0)
         assert row.mean["rpm"] == pytest.approx(10000.0, rel=0.02) and row.samples == 20
         assert row.mean["thrust_N"] == pytest.approx(5.4, rel=0.1) and 0.0 < row.scatter["thrust_N"] < 0.1
@@ -263,12 +264,8 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
 
 def test_what_is_measured_through_the_wire_is_the_hidden_stand(tmp_path: Path) -> None:
     """A rotor of the proof, through the wire, reads what its item says, to the noise of the cells."""
-    from bemt.judge.proof import items
-
     bench = draw.benches(draw.SIZES["stand"], np.random.SeedSequence(5).spawn(2)[0])[0]
     made = items.make_item(bench, ("torque_gain",), (2.0,), 5, "sensor")
-    from dataclasses import replace
-
     seal.seal(tmp_path, seal.Key("bemt.key/1", "0", "5", "stand", (replace(made.entry, folder="0000"),)))
     with hand.wired(tmp_path, replace(made.entry, folder="0000")) as found:
         text = found.again((), 0)

@@ -17,10 +17,10 @@ from bemt.judge.proof.rows import Entry
 from bemt.judge.proof.stand import full_scales, record
 from bemt.judge.proof.truth_world import Conditions, TrueLoads, loads
 
-STOP_US, CUT_OFF_S = 1000.0, 0.25
+STOP_US, CUT_OFF_S = 1000.0, 0.2
 _LAG_S = 0.15  # Motor and rotor, first order
 _TOP, _CURVE = 1.4, 0.85  # Speed at full command over the top of the range, and its growth with the command
-_SETTLED = 1e-3
+_SETTLED, _STILL, _CALM_S = 1e-3, 0.02, 0.03  # Of the speed; a command that stays so long is solved for
 _STATES = {"wall": "wall_distance_m", "gap": "tip_gap_mm"}
 
 
@@ -29,9 +29,10 @@ class Truth:
 
     def __init__(self, bench: Bench, entry: Entry, lapse: float = 1.0) -> None:
         self.bench, self.entry, self.lapse = bench, entry, lapse
-        self.patience = CUT_OFF_S if lapse == 1.0 else 20.0 * CUT_OFF_S
+        self.patience = CUT_OFF_S if lapse == 1.0 else 100.0 * CUT_OFF_S
         self.lock = threading.RLock()
-        self.cells: dict[str, float] | None = None  # As read at the last settled speed
+        self.cells: dict[str, float] | None = None  # As they read at the speed ``read_at``
+        self.read_at = self.torque = 0.0
         self.us, self.changed, self.client, self.cut = STOP_US, time.monotonic(), 0.0, False
         self.rpm, self.then, self.broken = 0.0, time.monotonic(), ""
         self.noise = np.random.default_rng()
@@ -112,11 +113,14 @@ class Truth:
             self._output(STOP_US)
             self.cut = True
 
+    def _there(self) -> float:
+        """Speed that belongs to the command. [rev/min]"""
+        return float(_TOP * self.bench.rig.top_rpm * (max(self.us - STOP_US, 0.0) / 1000.0) ** _CURVE)
+
     def _turn(self) -> None:
         """Let the rotor follow the command."""
         now = time.monotonic()
-        share = max(self.us - STOP_US, 0.0) / 1000.0
-        there = _TOP * self.bench.rig.top_rpm * share**_CURVE
+        there = self._there()
         self.rpm = there + (self.rpm - there) * float(np.exp(-(now - self.then) * self.lapse / _LAG_S))
         self.rpm = there if abs(self.rpm - there) < _SETTLED * there else self.rpm
         self.then = now
@@ -132,7 +136,7 @@ class Truth:
             sigma |= {"rpm": self.stand.rpm_noise * self.rpm, "airspeed_m_s": self.stand.airspeed_noise}
             row = {n: v + sigma[n] * float(self.noise.standard_normal()) for n, v in read.items()}
             k_t = 60.0 / (2.0 * np.pi * self.bench.rig.motor.kv)
-            row["current_A"] = abs(self.solved[2]) / k_t + self.bench.rig.motor.idle_A * (self.rpm > 0.0)
+            row["current_A"] = abs(self.torque) / k_t + self.bench.rig.motor.idle_A * (self.rpm > 0.0)
             row["vibration_m_s2"] = 0.2 + 2.0 * (self.rpm / self.bench.rig.top_rpm) ** 2
             if self.broken == "nan":
                 row["thrust_N"] = float("nan")
@@ -144,26 +148,28 @@ class Truth:
 
     def _cells(self) -> dict[str, float]:
         """Cells at the present speed, the noise of this row and this day in them."""
-        n, T, Q = self.solved
-        if n and self.cells is not None and abs(self.rpm / n - 1.0) < _SETTLED:
+        plan, k, there = self.plan, self.k, self._there()
+        calm = (time.monotonic() - self.changed) * self.lapse > _CALM_S
+        due = calm and there > _STILL * self.bench.rig.top_rpm and self.solved[0] != there
+        if self.cells is not None and self.read_at == self.rpm and not due:
             return self.cells
-        share = max(self.us - STOP_US, 0.0) / 1000.0
-        settled = abs(self.rpm - _TOP * self.bench.rig.top_rpm * share**_CURVE) <= 1e-9
-        plan, k = self.plan, self.k
-        if settled and self.rpm > 0.02 * self.bench.rig.top_rpm:
-            c = _part(replace(plan, rpm=np.full(plan.rpm.size, self.rpm)), slice(k, k + 1))
+        scaled = (there / float(plan.rpm[k])) ** 2
+        if due:
+            self.solved = (there, scaled * float(self.real.thrust[k]), scaled * float(self.real.torque[k]))
+            c = _part(replace(plan, rpm=np.full(plan.rpm.size, there)), slice(k, k + 1))
             real = loads(self.rotor, self.world, c, self.duct, None)
-            T, Q = float(real.thrust[0]), float(real.torque[0])
-        if not (settled and np.isfinite(T + Q)) or self.rpm <= 0.02 * self.bench.rig.top_rpm:
-            T, Q = (float(v[k]) * (self.rpm / float(plan.rpm[k])) ** 2 for v in (self.real.thrust, self.real.torque))
-        self.solved = (self.rpm, T, Q)
+            if np.isfinite(real.thrust[0] + real.torque[0]):
+                self.solved = (there, float(real.thrust[0]), float(real.torque[0]))
+        near = self.solved if self.solved[0] else (plan.rpm[k], self.real.thrust[k], self.real.torque[k])
+        T, Q = (float(v) * (self.rpm / float(near[0])) ** 2 for v in near[1:])
+        self.torque, self.read_at = Q, self.rpm
         thrust, torque, rpm = self.real.thrust.copy(), self.real.torque.copy(), plan.rpm.copy()
         thrust[k], torque[k], rpm[k] = T, Q, self.rpm
         quiet = np.nan_to_num(thrust), np.nan_to_num(torque)
         rng = np.random.default_rng(self.seed)
-        there = record(TrueLoads(*quiet, self.real.re75, self.real.m_tip, self.real.answer), replace(plan, rpm=rpm),
+        shown = record(TrueLoads(*quiet, self.real.re75, self.real.m_tip, self.real.answer), replace(plan, rpm=rpm),
                        self.rotor.radius, None, self.stand, rng, self.scales)  # fmt: skip
-        self.cells = {n: float(v[k]) for n, v in there.items() if n != "time_s"}
+        self.cells = {n: float(v[k]) for n, v in shown.items() if n != "time_s"}
         return self.cells
 
 

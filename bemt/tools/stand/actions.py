@@ -20,7 +20,7 @@ __all__ = ["stand"]
 
 @action(
     "Recordings", "stand cases/prop_8x5 --yes --out sitting", words=("case",),
-    common=("on", "address", "largest_us", "ramp_us_s", "current_A", "top_rpm", "wind_m_s", "yes", "out"),
+    common=("on", "address", "largest_us", "current_A", "top_rpm", "wind_m_s", "yes", "out"),
 )  # fmt: skip
 def stand(
     case: Propeller | Path, *, out: Path,

@@ -39,7 +39,7 @@ class Limits(Documented):
     rpm: float = math.inf
     stop_us: float = 1000.0
     tick_s: float = 0.01
-    patience_s: float = 0.25  # Silence that stops: of the orders, of the stand [s]
+    patience_s: float = 0.2  # Silence that stops: of the orders, of the stand [s]
 
     def broken(self, row: dict[str, float]) -> str:
         """What a row says against going on; "" if nothing.

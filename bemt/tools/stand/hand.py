@@ -79,7 +79,8 @@ class Wired:
     def _measured(self, kind: str, rows: Rows) -> str:
         """Recording of the rows of a run: means, and the scatter of a sample as their uncertainty."""
         out: list[dict[str, float]] = []
-        if not rows or (self.may is not None and not self.may(kind, rows)):
+        able = bool(rows) and max(r["rpm"] for r in rows) <= self.stand.limits.rpm
+        if not able or (self.may is not None and not self.may(kind, rows)):
             return ""
         for row in rows:
             known = {"time_s": math.nan, **self.stand.meanwhile(partial(self.person.place, row))}
@@ -160,7 +161,7 @@ def lapsed(limits: Limits, lapse: float) -> Limits:
     """Limits of a simulated stand whose time runs faster; that much less depends on how busy the machine is."""
     if lapse == 1.0:
         return limits
-    return replace(limits, ramp_us_s=limits.ramp_us_s * lapse, tick_s=0.002, patience_s=5.0)
+    return replace(limits, ramp_us_s=limits.ramp_us_s * lapse, tick_s=0.002, patience_s=20.0)
 
 
 @contextlib.contextmanager

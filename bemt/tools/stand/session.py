@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from bemt.rotors.propeller import Propeller
 
 SCHEMA = "bemt.stand/1"
+_ARMING_S = 3.0  # At the stop value, until a controller takes commands
 _ABOVE = 1.1  # Speed at which the motor is stopped, over the top of the range [1]
 _UP, _WINDS = 10, 5  # Speeds of a plan at rest, and winds of one in a tunnel
 _USUAL = {"largest_us": 2000.0, "ramp_us_s": 500.0, "current_A": math.inf, "vibration_m_s2": math.inf}
@@ -175,6 +176,8 @@ def sit(
             aside = ", ".join(course.aside[-1])
             tell(f"step: {course.steps[-1]}" + (f" {aside}" if aside else ""))
         last = course.answers[-1]
+        if last.confirmed:
+            return tell(f"said: {', '.join(last.effects)} is there, a look has shown it")
         what = f" {' or '.join(last.effects) if last.verdict == 'class' else ', '.join(last.effects)}".rstrip()
         loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict, math.nan)
         tell(f"said: {last.verdict}{what} (probability {last.sure:.2f}, expected loss {loss:.2f})")
@@ -203,6 +206,9 @@ def sit(
             person, wire = AtTheTerminal(points, known, wind_m_s, limits.rpm), (on, address, line)
         try:
             stand = held.enter_context(Stand(*wire, limits, settle_s=max(2.0 / lapse, 0.3)))
+            if isinstance(person, AtTheTerminal):
+                person.calm = stand.stop
+                stand.rest(_ARMING_S)
             hand = Wired(stand, person, may, out.as_posix())
             made = hand.made
             if text := hand.again((), 0):

@@ -123,7 +123,7 @@ class Stand:
             wire.write(self.limits.stop_us)
             wire.close()
 
-    def _wait(self, seconds: float) -> None:
+    def rest(self, seconds: float) -> None:
         """Wait with a beat; raises as soon as the guard has stopped."""
         until = time.monotonic() + seconds
         while True:
@@ -140,7 +140,7 @@ class Stand:
         with ThreadPoolExecutor(1) as pool:
             doing = pool.submit(do)
             while not doing.done():
-                self._wait(_POLL_S)
+                self.rest(_POLL_S)
             return doing.result()
 
     def pulse(self, pulse_us: float) -> None:
@@ -153,7 +153,7 @@ class Stand:
         until = time.monotonic() + abs(pulse_us - self.us) / limits.ramp_us_s + self.settle_s
         step = min(10.0 * limits.tick_s, 0.1)
         while time.monotonic() < until:
-            self._wait(step)
+            self.rest(step)
             since = time.monotonic() - _WINDOW * self.settle_s
             seen = [(row.get("rpm", math.nan), us) for at, us, row in list(self._rows) if at > since]
             speeds = [rpm for rpm, us in seen if us == pulse_us]
@@ -165,7 +165,9 @@ class Stand:
         rows: dict[float, dict[str, float]] = {}
         since = time.monotonic()
         while len(rows) < self.samples:
-            self._wait(min(self.limits.tick_s, _POLL_S))
+            if time.monotonic() - since > self.settle_s + _START_S:
+                raise Stopped("the stand sends no rows")
+            self.rest(min(self.limits.tick_s, _POLL_S))
             rows = {row["stamp_s"]: row for at, _, row in list(self._rows) if at > since}
         taken = list(rows.values())[: self.samples]
         names = [n for n in taken[0] if n != "stamp_s"]
@@ -201,7 +203,7 @@ class Stand:
         """Stop the motor; the stand stays open."""
         self._say(go=self.limits.stop_us)
         while self.us > self.limits.stop_us and not self.stopped:
-            self._wait(_POLL_S)
+            self.rest(_POLL_S)
 
     def close(self) -> None:
         """Stop for good and let go of the stand."""

@@ -16,7 +16,7 @@ NAMES = ("flightstand", "rcbenchmark", "serial")
 """Drivers, one file each."""
 DEFAULTS = {"flightstand": "localhost:50051", "rcbenchmark": "127.0.0.1:55047:64126", "serial": "/dev/ttyUSB0@115200"}
 """Addresses where the makers' programs and most boards are."""
-PATIENCE_S = 0.25
+PATIENCE_S = 0.2
 """Longest wait for the other end; the guard sets it."""
 
 
