@@ -22,7 +22,7 @@ import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.judge.proof import draw, items, loop, seal
-from bemt.tools.stand import drivers, hand, sealed
+from bemt.tools.stand import drivers, hand, sealed, session
 from bemt.tools.stand.drivers import rcbenchmark, serial
 from bemt.tools.stand.guard import Guard, Limits
 from bemt.tools.stand.verbs import Stand, Stopped
@@ -170,7 +170,7 @@ def test_every_wire_reads_the_same_stand(simulated: hand.Simulated) -> None:
         with pytest.raises(InputError, match="1000 to 1800 us, the largest that was allowed"):
             stand.pulse(1900.0)
         stand.stop()
-        assert simulated.ask("output")["us"] == 1000.0
+        assert _stopped_after(simulated, time.monotonic()) < WITHIN_S
 
 
 def test_the_ramp_is_kept_up_and_not_down() -> None:
@@ -260,6 +260,34 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
     assert log.index("sealed: ") < log.index("run: ") < log.index("said: ") < log.index("unsealed: ")
     digest = log.partition("SHA-256 ")[2][:64]
     assert seal.sha256((folder / "sealed" / seal.KEY).read_text()) == digest, "sealed before the first run"
+
+
+def test_a_real_stand_asks_before_each_run_and_for_the_weather_once(
+    project: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind the wire of RCbenchmark is a simulated one, and the sitting does not know."""
+    asked: list[str] = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return "21" if "Temperature" in question else "1003" if "Pressure" in question else "s" * ("Needs" in question)
+
+    monkeypatch.setattr(session, "ask", ask)
+    monkeypatch.setattr(session, "_UP", 3)
+    there = hand.Simulated(key, "0000", "rcbenchmark", 1.0)
+    try:
+        found = bemt.stand(
+            project / "cases" / "prop_8x5", out=tmp_path / "real", on="rcbenchmark", address=there.address, runs=1,
+            top_rpm=15e3, largest_us=1800.0, ramp_us_s=2000.0, current_A=5e3,
+        )  # fmt: skip
+        assert there.ask("output")["us"] == 1000.0
+    finally:
+        there.close()
+    assert found.stopped == "" and found.there is None and found.course.answers
+    assert sum("Temperature" in q for q in asked) == 1 and any("Enter to run" in q for q in asked)
+    table = np.genfromtxt((tmp_path / "real" / "recording.csv").read_text().splitlines(), delimiter=",", names=True)
+    assert table.size == 5 and np.all(table["temperature_C"] == 21.0) and np.all(table["pressure_Pa"] == 100300.0)
+    assert np.all(np.diff(table["time_s"]) > 0.0) and not (tmp_path / "real" / "sealed").exists()
 
 
 def test_what_is_measured_through_the_wire_is_the_hidden_stand(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ class Limits(Documented):
     rpm: float = math.inf
     stop_us: float = 1000.0
     tick_s: float = 0.01
-    patience_s: float = 0.2  # Silence that stops: of the orders, of the stand [s]
+    patience_s: float = 0.2  # Longest wait for the stand; no row for one and a half of it, no beat for two stops [s]
 
     def broken(self, row: dict[str, float]) -> str:
         """What a row says against going on; "" if nothing.
@@ -105,9 +105,9 @@ class Guard:
         turning = max(self.us, self.target) > self.limits.stop_us
         if why := self.limits.broken(self.row):
             self.stop(why)
-        elif turning and now - self.fresh > self.limits.patience_s:
+        elif turning and now - self.fresh > 1.5 * self.limits.patience_s:
             self.stop(f"no row from the stand for {now - self.fresh:.2f} s")
-        elif turning and now - self.beat > self.limits.patience_s:
+        elif turning and now - self.beat > 2.0 * self.limits.patience_s:
             self.stop(f"no heartbeat for {now - self.beat:.2f} s")
         before, step = self.us, self.limits.ramp_us_s * (now - self.then)
         self.us, self.then = min(self.target, self.us + step), now  # down goes at once
