@@ -68,13 +68,12 @@ class Truth:
             self.rotor, self.duct, self.world, self.stand, self.plan, self.real = rotor, duct, world, stand, plan, real
             self.seed, self.k, self.solved, self.cells = (self.entry.seed, *draw), 0, (0.0, 0.0, 0.0), None
         hall = np.random.default_rng((*self.seed, 5)).standard_normal(plan.rpm.size + 1)
-        told = bool(self.entry.air_known) or any("pressure_Pa" in p for p in (runs or [[]])[-1])
         out = []
         for k in np.flatnonzero(np.isfinite(real.thrust) & np.isfinite(real.torque)):
             row = {"k": int(k), "run": int(plan.run[k]), "rpm": float(plan.rpm[k]), "time_s": float(plan.time[k]),
                    "airspeed_m_s": float(plan.airspeed[k]),
                    "temperature_C": float(plan.temperature_C[k] + 0.1 * hall[k])}  # fmt: skip
-            if told and "air_density" not in self.entry.causes:
+            if "air_density" not in self.entry.causes:  # the weather was asked for
                 row["pressure_Pa"] = float(plan.pressure_Pa[k] + 30.0 * hall[-1])
             if np.isfinite(plan.wall[k]):
                 row["wall_distance_m"] = float(plan.wall[k])

@@ -100,6 +100,8 @@ class Guard:
         except OSError as error:
             self.stop(f"wire lost: {error}")
         now = time.monotonic()
+        if now - self.then > self.limits.patience_s:  # this process was late: the beats are still in the pipe
+            self.beat = max(self.beat, now - self.limits.patience_s)
         if self.row.get("stamp_s", 0.0) != self.stamp:
             self.stamp, self.fresh = self.row.get("stamp_s", 0.0), now
         turning = max(self.us, self.target) > self.limits.stop_us
