@@ -29,7 +29,7 @@ def main() -> None:
                            fault=["thrust_gain"])  # fmt: skip
         (DOCS / "img" / "stand.png").write_bytes((Path(box) / "sitting" / "story.png").read_bytes())
     page = DOCS / "stand.md"
-    log = "\n".join(shown(line) for line in found.text.splitlines() if not line.startswith(("plan", "next")))
+    log = "\n".join(shown(line) for line in found.details.splitlines() if not line.startswith(("plan", "next")))
     text = re.sub(r"(?s)(<!-- log -->\n\n```text\n).*?(\n```)", lambda m: m[1] + log + m[2], page.read_text("utf-8"))
     page.write_text(text, encoding="utf-8")
 

@@ -21,6 +21,7 @@ from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import prove
 from bemt.judge.proof.loop import A_RUN, Course, Points, follow
 from bemt.physics import effects
+from bemt.rotors.case import load_case
 from bemt.tools.stand import sealed, story
 from bemt.tools.stand.guard import Limits
 from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, lapsed, wire_of_the_simulated
@@ -66,6 +67,12 @@ class StandAnswer:
 
     @property
     def text(self) -> str:
+        """What came of it; the rest was told while it happened."""
+        told = [line for line in self.lines if line.startswith(("stopped: ", "found: ", "unsealed: "))]
+        return "\n".join([*told, *(f"story: {f.as_posix()}" for f in self.files if f.suffix == ".html")])
+
+    @property
+    def details(self) -> str:
         """The story in lines."""
         return "\n".join(self.lines)
 
@@ -194,7 +201,7 @@ def sit(
         if on == "simulated":
             key = out / "sealed"
             own = secrets.randbits(40) if seed is None else seed
-            digest = sealed.seal_case(key, rotor.case, points, top, faults, own)
+            digest = sealed.seal_case(key, load_case(case), points, top, faults, own)
             tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
             person = one = Simulated(key, "0000", wire_of_the_simulated(), lapse)
             held.callback(one.close)
@@ -225,7 +232,11 @@ def sit(
     if on == "simulated":
         there = sealed.bench_of(out / "sealed", "0000")[1].causes
     answer = StandAnswer(rotor.name, course, stopped, there)
-    tell(f"found: {', '.join(answer.found) or 'nothing to mend'}; ended by: {stopped or course.end or 'no run'}; "
+    verdict = course.answers[-1].verdict if course.answers else ""
+    open_ = {"class": f"one of {', '.join(course.answers[-1].effects)}" if course.answers else "", "none": "nothing wrong",
+             "insufficient": "not settled", "unknown": "something that is not in the library"}  # fmt: skip
+    left = open_.get(verdict, "") if not answer.found or verdict == "class" else ""
+    tell(f"found: {', '.join(filter(None, (*answer.found, left))) or 'nothing was measured'}; ended by: {stopped or course.end or 'no run'}; "
          f"{sum(course.minutes) + minutes('run', len(points)):.0f} min of stand time")  # fmt: skip
     if there is not None:
         tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
