@@ -232,17 +232,23 @@ def sit(
     if on == "simulated":
         there = sealed.bench_of(out / "sealed", "0000")[1].causes
     answer = StandAnswer(rotor.name, course, stopped, there)
-    verdict = course.answers[-1].verdict if course.answers else ""
-    open_ = {"class": f"one of {', '.join(course.answers[-1].effects)}" if course.answers else "", "none": "nothing wrong",
-             "insufficient": "not settled", "unknown": "something that is not in the library"}  # fmt: skip
-    left = open_.get(verdict, "") if not answer.found or verdict == "class" else ""
-    tell(f"found: {', '.join(filter(None, (*answer.found, left))) or 'nothing was measured'}; ended by: {stopped or course.end or 'no run'}; "
-         f"{sum(course.minutes) + minutes('run', len(points)):.0f} min of stand time")  # fmt: skip
+    spent = sum(course.minutes) + minutes("run", len(points))
+    tell(f"found: {_found(answer)}; ended by: {stopped or course.end or 'no run'}; {spent:.0f} min of stand time")
     if there is not None:
         tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
     files = story.write(out, rotor, answer.course, made, lines)
     return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(lines))
+
+
+def _found(answer: StandAnswer) -> str:
+    """What was found, and what was left open."""
+    last = answer.course.answers[-1] if answer.course.answers else None
+    if last is None:
+        return "nothing, as nothing was measured"
+    left = {"class": f"one of {', '.join(last.effects)}", "none": "nothing wrong", "insufficient": "not settled",
+            "unknown": "something that is not in the library"}.get(last.verdict, "")  # fmt: skip
+    return ", ".join([*answer.found, *([left] if left and (not answer.found or last.verdict == "class") else [])])
 
 
 def _limits(
