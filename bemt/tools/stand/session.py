@@ -161,6 +161,7 @@ def sit(
     """Sit at a stand; everything goes into one folder."""
     top = top_rpm or rotor.case.rpm
     points, lines = plan_of(top, wind_m_s), list[str]()
+    course, stopped, made, there = Course("", []), "", list[tuple[str, str]](), None
     case = rotor.write(out)
     for file in beside(rotor.case) if rotor.case.path.is_file() else ():
         write_atomic(out / file.relative_to(rotor.case.folder), file.read_bytes())
@@ -178,7 +179,9 @@ def sit(
              f"{minutes('run', len(rows)):.0f} min")  # fmt: skip
         return yes or ask("Enter to run, s to skip.") != "s"
 
-    def told(course: Course) -> None:
+    def told(so_far: Course) -> None:
+        nonlocal course
+        course = so_far
         if course.steps:
             aside = ", ".join(course.aside[-1])
             tell(f"step: {course.steps[-1]}" + (f" {aside}" if aside else ""))
@@ -194,7 +197,6 @@ def sit(
     seen = plan({k: [p[k] for p in points] for k in ("rpm", "airspeed_m_s")}, case).detectable
     tell(f"plan: {len(points)} points; can show " + ", ".join(k for k, v in seen.items() if v == "yes"))
     tell("plan: cannot show " + ", ".join(k for k, v in seen.items() if v == "no"))
-    course, stopped, made, there = Course("", []), "", list[tuple[str, str]](), None
     with ExitStack() as held:
         limits = _limits(rotor, on, given, top_rpm, lapse)
         person: Person
@@ -223,12 +225,12 @@ def sit(
                 first, words = prove.asked(out, prove.question(out))
                 if not first:
                     raise InputError(Fault(str(out / "recording.csv"), "", words[-300:], "a recording to diagnose"))
-                course = Course("", [first])
-                told(course)
+                told(Course("", [first]))
                 course = follow(out, first, hand, runs, enough=A_RUN, tell=told)
         except Stopped as error:
             stopped = str(error)
-            tell(f"stopped: {stopped}; the output is at its stop value")
+            sure = not stopped.startswith(("wire lost", "no row", "the guard"))
+            tell(f"stopped: {stopped}; {'the output is at its stop value' if sure else 'look: does the motor stand?'}")
     if on == "simulated":
         there = sealed.bench_of(out / "sealed", "0000")[1].causes
     answer = StandAnswer(rotor.name, course, stopped, there)
