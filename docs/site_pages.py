@@ -50,6 +50,7 @@ PARTS = {  # navigation; a name ending in * stands for all pages of that name
         "design.md",
         "notebooks/*",
         "flight_logs.md",
+        "stand.md",
         "exports.md",
         "adding.md",
         "scaling.md",

@@ -98,6 +98,10 @@ MAY: dict[str, set[str]] = {
     "bemt.tools.flight.px4": {"files"},
     "bemt.tools.flight.table": {"files"},
     "bemt.tools.cfd.*": {"files", "clock", "environment"},
+    "bemt.tools.stand.*": {"files", "clock", "environment"},
+    # two processes that talk through pipes, and the questions of a sitting
+    "bemt.tools.stand.guard|bemt.tools.stand.simulated|bemt.tools.stand.session": {"print"},
+    "bemt.judge.proof.live": {"clock"},
     "bemt.tools.design.motors_file": {"files"},
     "bemt.tools.drive.*_file|bemt.tools.drive.*_folder|bemt.tools.drive.*_result": {"files"},
     "bemt.results.report|bemt.results.report.*": {"files"},

@@ -18,6 +18,7 @@ CALLS = {
     "drive": ["drive", "10x5", "--kv", "1000", "--cells", "3"],
     "exports": ["export", "cases/prop_8x5", "--out", "out"],
     "flight": ["fly", "log.csv"],
+    "stand": ["stand", "cases/prop_8x5", "--out", "out"],
 }
 """An action of each tool."""
 SWEEP = ["sweep", "cases/prop_8x5", "cases/ds30", "--json"]

@@ -11,7 +11,9 @@ A tool is a package of ``bemt.tools`` with a module ``offers``. Its tables map a
 * ``EXPORTS``: target of ``export``; the attribute is its class;
 * ``FILE_KINDS``: command that takes a file which no reader of recordings knows; the attribute takes a path and gives
   what the file is, empty if another's;
-* ``ACTIONS``: name at both doors; the attribute is the public function.
+* ``ACTIONS``: name at both doors; the attribute is the public function;
+* ``HANDS``: what makes the runs of a proof's loop; the attribute takes the folder of a proof and an entry of its
+  key, and gives a context manager of a :class:`bemt.judge.proof.loop.Hand`.
 
 >>> offered("CASE_PARTS")["drive"], offered("NOTHING")
 ('bemt.tools.drive.drive_result:full_document', {})
@@ -33,6 +35,7 @@ TOOLS: dict[str, tuple[str, ...]] = {
     "drive": ("drive", "map", "motor", "thrusters"),
     "exports": ("export",),
     "flight": ("fly",),
+    "stand": ("stand",),
 }
 """Tools of this version, with the actions and targets that are missing without them."""
 CASE_TABLES = ("drive",)

@@ -307,16 +307,17 @@ def calibrate_rotor(
 
 @action("Models and checks", "prove --seed 1")
 def prove(
-    *, size: Literal["small", "full", "ccblade", "real"] = "small", seed: int | None = None, jobs: Count | None = None,
-    follow: bool = False, loop: Count | None = None, fixed: bool = False, calibrate_intervals: Sequence[Path] = (),
-    out: Path | None = None, progress: Callable[[str], None] | None = None,
+    *, size: Literal["small", "full", "stand", "ccblade", "real"] = "small", seed: int | None = None,
+    jobs: Count | None = None, follow: bool = False, loop: Count | None = None, fixed: bool = False,
+    wired: bool = False, calibrate_intervals: Sequence[Path] = (), out: Path | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Told:  # fmt: skip
     """Hide causes in recordings, diagnose them, score the answers.
 
     Parameters
     ----------
-    size : {"small", "full", "ccblade", "real"}
-        41 or 605 generated items, 68 by CCBlade (extra wisdem), or published recordings.
+    size : {"small", "full", "stand", "ccblade", "real"}
+        41, 605 or, for a stand, 60 generated items, 68 by CCBlade (extra wisdem), or published recordings.
     seed : int, optional
         Random seed; from the operating system by default.
     jobs : int, optional
@@ -327,6 +328,8 @@ def prove(
         Then take the runs that open answers recommend, up to so many each, on the hidden stand.
     fixed : bool
         With a loop: a fixed programme of runs instead.
+    wired : bool
+        With a loop and size stand: measure everything on simulated stands in other processes, through their wire.
     calibrate_intervals : sequence of paths
         Folders of kept proofs made with the current interval factors: write new factors instead.
     out : path, optional
@@ -355,6 +358,7 @@ def prove(
     from pathlib import Path as File
 
     from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+    from bemt.base.plugins import load, missing, offered
     from bemt.judge.proof import follow as following
     from bemt.judge.proof import intervals, proof_text
     from bemt.judge.proof import loop as looping
@@ -367,6 +371,11 @@ def prove(
         raise InputError(Fault("--loop", "", got, "generated items and out"))
     if seed is not None and seed < 0:
         raise InputError(Fault("--seed", "", f"{seed}", "a whole number of 0 or more"))
+    if wired and not (loop and size == "stand"):
+        raise InputError(Fault("--wired", "", got, "size stand and a loop"))
+    hands = load(offered("HANDS")["wired"]) if wired and "wired" in offered("HANDS") else None
+    if wired and hands is None:
+        raise InputError(Fault("--wired", "", "no simulated stand", "the stand tool", missing("stand")))
     if calibrate_intervals:
         return Told({"schema": "bemt.intervals/1"}, intervals.rewrite([File(p) for p in calibrate_intervals], out))
     say, cores = progress or (lambda line: None), jobs or os.cpu_count() or 1
@@ -375,6 +384,6 @@ def prove(
     if follow and out is not None:
         taken.append(following.text(following.follow(File(out), cores, say)))
     if loop and out is not None:
-        taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say)))
+        taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say, hands)))
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
     return Told(found.document(), "\n\n".join([proof_text.text(found), *taken]), exit_code=code)

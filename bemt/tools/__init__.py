@@ -1,1 +1,1 @@
-"""What is done with a rotor: drive, design, flight, exports, cfd. Nothing outside of this folder imports a tool."""
+"""What is done with a rotor: drive, design, flight, exports, cfd, stand. Nothing else imports a tool."""

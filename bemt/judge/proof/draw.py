@@ -43,6 +43,13 @@ SIZES = {
         {"single": 240, "pair": 60, "null": 70, "mismatch": 35, "unlisted": 80, "sensor": 80, "underpowered": 40},
         (*((False, (*_OPEN, *_POOR)),) * 6, *((True, (*_DUCTED, "static_narrow")),) * 4),
     ),
+    "stand": Size(  # what a pulse width can do: settled points, no endurance
+        {"single": 20, "pair": 10, "null": 8, "mismatch": 0, "unlisted": 10, "sensor": 12, "underpowered": 0},
+        (
+            *((False, ("static_sweep", "grid_shuffled", "grid_ordered", "wall")),) * 4,
+            *((True, ("static_sweep", "grid_shuffled", "gap")),) * 3,
+        ),
+    ),
     "ccblade": Size(
         {"single": 30, "pair": 6, "null": 10, "mismatch": 4, "unlisted": 6, "sensor": 12, "underpowered": 0},
         ((False, _GRIDS),) * 3,

@@ -21,10 +21,11 @@ import shlex
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise, product
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -43,6 +44,8 @@ _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
 _DONE = ("named", "sensor")
 _NEW, _REFERENCE, _CASE = "new_run.csv", "reference.csv", "case.toml"
 _FIXED_POINTS = 6
+A_RUN = 0.1
+"""Cost of a run, in units of an "insufficient": ten of them are worth one answer; declared."""
 _MODEL = "model"
 # Effects of the air that somebody at the stand sets wrong, and right again: barometer, blade angle and alignment.
 _SET_UP = ("air_density", "pitch_offset", "oblique_inflow")
@@ -112,35 +115,88 @@ class _Taken:
     aside: list[str] = field(default_factory=list)  # Causes put aside
 
 
-@dataclass
-class _Item:
-    """An item at work: its files, its bench, the runs made so far, and the command that was answered last."""
+Points = Sequence[Mapping[str, float]]
+
+
+class Hand(Protocol):
+    """What makes the runs that an answer asks for: the hidden stand of an item, or one behind a wire.
+
+    Recordings are the texts of their files, "" where the stand cannot make them. Causes in ``mended`` are no longer
+    there; each ``day`` has noise of its own.
+    """
+
+    def reference(self) -> str:
+        """Make the run without the causes that can be taken away."""
+        ...
+
+    def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
+        """Make the last of the runs that were asked for."""
+        ...
+
+    def again(self, mended: Sequence[str], day: int) -> str:
+        """Make the points of the recording once more."""
+        ...
+
+    def there(self, name: str) -> bool:
+        """Look whether a cause is at work."""
+        ...
+
+    def mend(self, names: Sequence[str]) -> Sequence[str]:
+        """Put causes right; those that were there."""
+        ...
+
+
+Hands = Callable[[Path, Entry], AbstractContextManager[Hand]]
+
+
+@dataclass(frozen=True)
+class _Hidden:
+    """The hidden stand of an item of a proof."""
 
     out: Path
     entry: Entry
     bench: Bench
+
+    def reference(self) -> str:
+        file = self.out / prove.ASKED / self.entry.folder / _REFERENCE
+        return file.read_text("utf-8") if file.exists() else ""
+
+    def run(self, runs: Sequence[Points], mended: Sequence[str], day: int) -> str:
+        return "" if self.bench.rows.transient else further_run(self.bench, self.entry, runs, mended, day)
+
+    def again(self, mended: Sequence[str], day: int) -> str:
+        return recorded_again(self.bench, self.entry, mended, day)
+
+    def there(self, name: str) -> bool:
+        return name in self.entry.causes
+
+    def mend(self, names: Sequence[str]) -> Sequence[str]:
+        return [n for n in names if n in self.entry.causes]
+
+
+@dataclass
+class _Item:
+    """An item at work: its files, its stand, the runs made so far, and the command that was answered last."""
+
+    hand: Hand
     box: Path
     left: int  # Runs
     words: list[str] = field(default_factory=list)
-    runs: list[list[Mapping[str, float]]] = field(default_factory=list)
+    runs: list[Points] = field(default_factory=list)
     repeats: int = 0
     aside: list[str] = field(default_factory=list)
     mended: list[str] = field(default_factory=list)
 
     def reference(self) -> int:
-        """Bring the reference that was sealed with the item; how many points it has, 0 if there is none."""
-        file = self.out / prove.ASKED / self.entry.folder / _REFERENCE
-        if not file.exists():
-            return 0
-        words = file.read_text("utf-8")
-        write_atomic(self.box / _REFERENCE, words)
-        return words.count("\n") - 1
+        """Bring the reference; how many points it has, 0 if there can be none."""
+        words = self.hand.reference()
+        if words:
+            write_atomic(self.box / _REFERENCE, words)
+        return words.count("\n") - 1 if words else 0
 
-    def run(self, points: Sequence[Mapping[str, float]]) -> str:
+    def run(self, points: Points) -> str:
         """Measure new points; name of the file, "" if the stand cannot."""
-        if self.bench.rows.transient or not points:
-            return ""
-        words = further_run(self.bench, self.entry, [*self.runs, points], self.mended, len(self.mended))
+        words = self.hand.run([*self.runs, points], self.mended, len(self.mended)) if points else ""
         if not words:
             return ""
         self.runs.append(list(points))
@@ -150,7 +206,7 @@ class _Item:
 
     def repeat(self) -> tuple[str, int]:
         """Measure the points of the recording once more: name of the file and its points, "" if the stand cannot."""
-        words = recorded_again(self.bench, self.entry, self.mended, self._day())
+        words = self.hand.again(self.mended, self._day())
         if words:
             write_atomic(self.box / f"repeat_{self.repeats}.csv", words)
         return (f"repeat_{self.repeats}.csv", words.count("\n") - 1) if words else ("", 0)
@@ -161,13 +217,13 @@ class _Item:
 
     def mend(self, names: Sequence[str]) -> int:
         """Take causes away, those that are there, and record everything once more; how many points that is."""
-        self.mended += [n for n in names if n in self.entry.causes]
+        self.mended += self.hand.mend(names)
         day, points = self._day(), 0
-        texts = {"recording.csv": recorded_again(self.bench, self.entry, self.mended, day)}
+        texts = {"recording.csv": self.hand.again(self.mended, day)}
         for k in range(1, len(self.runs) + 1):
-            texts[f"run_{k}.csv"] = further_run(self.bench, self.entry, self.runs[:k], self.mended, day)
+            texts[f"run_{k}.csv"] = self.hand.run(self.runs[:k], self.mended, day)
         for file in self.box.glob("repeat_*.csv"):
-            texts[file.name] = recorded_again(self.bench, self.entry, self.mended, self._day())
+            texts[file.name] = self.hand.again(self.mended, self._day())
         for name, words in texts.items():
             if not words:
                 return 0
@@ -250,7 +306,7 @@ def _step(item: _Item, step: Step) -> _Taken | str:
     if kind == "look":
         if not step.checks:
             return "no run"
-        there = step.checks in item.entry.causes and step.checks not in item.mended
+        there = step.checks not in item.mended and item.hand.there(step.checks)
         return _Taken(kind, minutes(kind, 0), [] if there else words)
     if kind == "reference":
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
@@ -268,14 +324,14 @@ def programme(rig: Rig) -> list[list[dict[str, float]]]:
     return [still, wind]
 
 
-def _fixed(item: _Item, number: int) -> _Taken | str:
+def _fixed(item: _Item, number: int, wanted: Sequence[Points]) -> _Taken | str:
     """Run ``number`` of the fixed programme."""
     kind, points = "reference", 0
     if number == 0:
         points = 0 if (item.box / _REFERENCE).exists() else item.reference()
     else:
-        kind, wanted = "run", programme(item.bench.rig)[number - 1]
-        points = len(wanted) if item.run(wanted) else 0
+        kind, asked = "run", wanted[number - 1]
+        points = len(asked) if item.run(asked) else 0
     if not points:
         return "no run"
     known = ["--reference", _REFERENCE] if (item.box / _REFERENCE).exists() else []
@@ -283,45 +339,94 @@ def _fixed(item: _Item, number: int) -> _Taken | str:
     return _Taken(kind, minutes(kind, points), ["diagnose", "recording.csv", *runs, *known, "--case", _CASE])
 
 
-def _course(out: Path, entry: Entry, bench: Bench, first: Answer, runs: int, fixed: bool) -> Course:
-    course = Course(entry.folder, [first])
+def _course(
+    out: Path, entry: Entry, bench: Bench, first: Answer, runs: int, fixed: bool, hand: Hand | None = None
+) -> Course:  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
-        item = _Item(out, entry, bench, Path(box), runs)
-        for file in (out / "items" / course.folder).iterdir():
-            write_atomic(item.box / file.name, file.read_text("utf-8"))
-        item.words = prove.question(item.box)
-        for number in count():
-            if fixed and number == runs:
-                return replace(course, end="used up")
-            taken = _fixed(item, number) if fixed else _recommended(item, course.answers[-1])
-            if isinstance(taken, str):
-                if fixed and number < 2:  # no reference can be had: the next run of the programme
-                    continue
-                return replace(course, end=taken)
-            item.left -= taken.kind != _MODEL
-            course.steps.append(taken.kind)
-            course.minutes.append(taken.minutes)
-            course.aside.append(taken.aside)
-            if not taken.words:  # the check has found it
-                step = course.answers[-1].step
-                looked_for = step.checks or (step.otherwise or Step()).checks or ""
-                found = replace(course.answers[-1], verdict="named", effects=(looked_for,), confirmed=True)
-                course.answers.append(found)
+        for file in (out / "items" / entry.folder).iterdir():
+            write_atomic(Path(box) / file.name, file.read_text("utf-8"))
+        if hand is not None:  # everything is measured by it, the first recording, too
+            write_atomic(Path(box) / "recording.csv", hand.again((), 0))
+            if (Path(box) / _REFERENCE).exists():
+                write_atomic(Path(box) / _REFERENCE, hand.reference())
+            first, words = prove.asked(Path(box), prove.question(Path(box)))
+            if not first:
+                raise RuntimeError(f"item {entry.folder}: {words}")
+        wanted = programme(bench.rig) if fixed else None
+        enough = 0.0 if hand is None else A_RUN
+        found = follow(Path(box), first, hand or _Hidden(out, entry, bench), runs, wanted=wanted, enough=enough)
+        return replace(found, folder=entry.folder)
+
+
+def follow(
+    box: Path, first: Answer, hand: Hand, runs: int, *, wanted: Sequence[Points] | None = None, enough: float = 0.0,
+    tell: Callable[[Course], None] | None = None,
+) -> Course:  # fmt: skip
+    """Take the step that follows from each answer, for so many runs.
+
+    Parameters
+    ----------
+    box : Path
+        Folder with recording.csv, case.toml and perhaps reference.csv, as in ``first``; runs are added.
+    first : Answer
+        Answer on these.
+    hand : Hand
+        What makes the runs.
+    runs : int
+        Most runs.
+    wanted : sequence, optional
+        Runs of a fixed programme instead, after a reference.
+    enough : float
+        Expected loss of "none" below which no further run is worth its cost. [one "insufficient"]
+    tell : callable, optional
+        Called with the course after each answer.
+    """
+    course, item = Course("", [first]), _Item(hand, box, runs, prove.question(box))
+    for number in count():
+        last = course.answers[-1]
+        if wanted is not None and number == runs:
+            return replace(course, end="used up")
+        if wanted is None and last.verdict == "none" and _expected(last) < enough:
+            return replace(course, end="none")
+        taken = _recommended(item, last) if wanted is None else _fixed(item, number, wanted)
+        if isinstance(taken, str):
+            if wanted is not None and number < 2:  # no reference can be had: the next run of the programme
                 continue
+            return replace(course, end=taken)
+        item.left -= taken.kind != _MODEL
+        course.steps.append(taken.kind)
+        course.minutes.append(taken.minutes)
+        course.aside.append(taken.aside)
+        if taken.words:
             item.words = item.of_its_own(taken.words)
-            answer, _ = prove.asked(item.box, item.words)
+            answer, _ = prove.asked(box, item.words)
             if not answer:
                 return replace(course, end="failed")
-            course.answers.append(answer)
+        else:  # the check has found it
+            looked_for = last.step.checks or (last.step.otherwise or Step()).checks or ""
+            answer = replace(last, verdict="named", effects=(looked_for,), confirmed=True)
+        course.answers.append(answer)
+        if tell:
+            tell(course)
     raise AssertionError("a course has an end")
 
 
+def _expected(answer: Answer) -> float:
+    """Expected loss of what was said. [one "insufficient"]"""
+    value = dict(answer.whole.get("expected_loss") or {}).get(answer.verdict)
+    return float(value) if isinstance(value, int | float) else math.inf
+
+
 def loop(
-    out: Path, runs: int = 3, jobs: int = 2, fixed: bool = False, say: Callable[[str], None] | None = None
+    out: Path, runs: int = 3, jobs: int = 2, fixed: bool = False, say: Callable[[str], None] | None = None,
+    hands: Hands | None = None,
 ) -> Loop:  # fmt: skip
-    """Follow every item of a finished proof for so many runs; answers are kept in ``loop`` or ``loop_fixed``."""
+    """Follow every item of a finished proof for so many runs; answers are kept in ``loop`` or ``loop_fixed``.
+
+    With ``hands`` everything is measured by these, in ``loop_wired``; the loop then ends where a run is not worth it.
+    """
     key = seal.unseal(out)
-    kept = out / ("loop_fixed" if fixed else "loop")
+    kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
     found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
@@ -337,7 +442,12 @@ def loop(
         if file.exists():
             return Course.of(json.loads(file.read_text("utf-8")))
         bench = found[entry.rig, entry.plan]
-        course = _course(out, entry, Bench(bench.rig, bench.plan, bench.rows), answer, runs, fixed)
+        mine = Bench(bench.rig, bench.plan, bench.rows)
+        if hands is None:
+            course = _course(out, entry, mine, answer, runs, fixed)
+        else:
+            with hands(out, entry) as hand:
+                course = _course(out, entry, mine, answer, runs, fixed, hand)
         write_atomic(file, json.dumps(course.document()))
         return course
 

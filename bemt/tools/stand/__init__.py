@@ -1,0 +1,1 @@
+"""A stand that answers: three verbs behind a guard, and the loop from a recording to the run that decides."""

@@ -1,0 +1,174 @@
+"""The guard: a process of its own that owns the wire. Whatever happens to the one that gives orders, the motor stops.
+
+``python -m bemt.tools.stand.guard`` reads a line of JSON, the :class:`Limits` and the wire, then orders, a line each:
+``{"go": pulse width}``, ``{"beat": 1}``, ``{"stop": reason}``. It answers with rows, ``{"us": .., "row": {..}}``, and
+``{"stopped": reason}``. An order is approached at the ramp rate, the stop value at once. It stops for good at the end
+of its input (the other process is dead), without a beat, without a new row, at a reading that is no number, above a
+limit, and where the wire is lost; then it goes on writing the stop value.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+from bemt.base.document import Documented
+from bemt.base.errors import InputError
+from bemt.tools.stand import drivers
+from bemt.tools.stand.drivers import Wire, connect
+
+_QUIET_S = 0.1  # A command is written again after that
+_LINGER_S = 0.3  # The stop value is written for so long before the end
+_WATCHED = ("thrust_N", "torque_Nm", "rpm", "current_A", "vibration_m_s2")
+
+
+class Limits(Documented):
+    """What the stand may do."""
+
+    largest_us: float  # Largest pulse width, and that of standstill [us]
+    ramp_us_s: float  # Fastest rise of the command [us/s]
+    current_A: float = math.inf
+    vibration_m_s2: float = math.inf
+    rpm: float = math.inf
+    stop_us: float = 1000.0
+    tick_s: float = 0.01
+    patience_s: float = 0.2  # Longest wait for the stand; no row for one and a half of it, no beat for two stops [s]
+
+    def broken(self, row: dict[str, float]) -> str:
+        """What a row says against going on; "" if nothing.
+
+        >>> Limits(2000, 500, current_A=40).broken({"rpm": 5000.0, "current_A": 41.5})
+        'current 41.5 A above 40'
+        >>> Limits(2000, 500).broken({"rpm": float("nan")})
+        'rpm is no number'
+        """
+        for name in _WATCHED:
+            if name in row and not math.isfinite(row[name]):
+                return f"{name} is no number"
+        for name, limit in (("current_A", self.current_A), ("vibration_m_s2", self.vibration_m_s2), ("rpm", self.rpm)):
+            if abs(row.get(name, 0.0)) > limit:
+                what, _, unit = name.partition("_")
+                return f"{what} {row[name]:.4g} {unit.replace('m_s2', 'm/s2')}".strip() + f" above {limit:.4g}"
+        return ""
+
+
+class Guard:
+    """State of the guard: the command, where it goes, and why it was stopped."""
+
+    def __init__(self, wire: Wire, limits: Limits) -> None:
+        self.wire, self.limits = wire, limits
+        self.us = self.target = limits.stop_us
+        self.stopped = ""
+        self.written = self.stamp = -math.inf
+        self.beat = self.fresh = self.then = time.monotonic()
+        self.row: dict[str, float] = {}
+
+    def order(self, said: dict[str, Any]) -> None:
+        """Take an order."""
+        self.beat = time.monotonic()
+        if "stop" in said:
+            self.stop(str(said["stop"]))
+        if "go" in said and not self.stopped:
+            self.target = min(max(float(said["go"]), self.limits.stop_us), self.limits.largest_us)
+
+    def stop(self, why: str) -> None:
+        """Stop for good, at once."""
+        self.stopped = self.stopped or why
+        self.us = self.target = self.limits.stop_us
+        self.write()
+
+    def write(self) -> None:
+        """Write the command."""
+        try:
+            self.wire.write(self.us)
+        except OSError as error:
+            if not self.stopped:
+                self.stopped, self.us, self.target = f"wire lost: {error}", self.limits.stop_us, self.limits.stop_us
+        self.written = time.monotonic()
+
+    def tick(self) -> None:
+        """Read, check, go a step of the ramp."""
+        try:
+            self.row = self.wire.read()
+        except OSError as error:
+            self.stop(f"wire lost: {error}")
+        now = time.monotonic()
+        if now - self.then > self.limits.patience_s:  # this process was late: the beats are still in the pipe
+            self.beat = max(self.beat, now - self.limits.patience_s)
+        if self.row.get("stamp_s", 0.0) != self.stamp:
+            self.stamp, self.fresh = self.row.get("stamp_s", 0.0), now
+        turning = max(self.us, self.target) > self.limits.stop_us
+        if why := self.limits.broken(self.row):
+            self.stop(why)
+        elif turning and now - self.fresh > 1.5 * self.limits.patience_s:
+            self.stop(f"no row from the stand for {now - self.fresh:.2f} s")
+        elif turning and now - self.beat > 2.0 * self.limits.patience_s:
+            self.stop(f"no heartbeat for {now - self.beat:.2f} s")
+        before, step = self.us, self.limits.ramp_us_s * (now - self.then)
+        self.us, self.then = min(self.target, self.us + step), now  # down goes at once
+        if self.us != before or now - self.written > _QUIET_S:
+            self.write()
+
+
+def _orders(into: queue.SimpleQueue[dict[str, Any]]) -> None:
+    for line in sys.stdin:
+        try:
+            into.put(json.loads(line))
+        except ValueError:
+            into.put({"stop": "an order that cannot be read"})
+    into.put({"end": 1, "stop": "the orders ended"})
+
+
+def _tell(**said: Any) -> None:
+    """Write a line without ever waiting for a reader."""
+    try:
+        os.write(1, (json.dumps(said) + "\n").encode())
+    except (BlockingIOError, BrokenPipeError):
+        pass
+
+
+def main() -> None:
+    """Guard a wire until the orders end."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the one that gives orders
+    given = json.loads(sys.stdin.readline())
+    os.set_blocking(1, False)
+    limits = Limits.from_document(given["limits"])
+    drivers.PATIENCE_S = limits.patience_s
+    try:
+        wire = connect(given["driver"], given["address"], given["line"])
+    except InputError as error:
+        _tell(refused=[vars(f) for f in error.faults])
+        return
+    guard = Guard(wire, limits)
+    signal.signal(signal.SIGTERM, lambda *_: guard.stop("terminated"))
+    orders: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    threading.Thread(target=_orders, args=(orders,), daemon=True).start()
+    told, end = "", math.inf
+    try:
+        while time.monotonic() < end:
+            while not orders.empty():
+                said = orders.get()
+                guard.order(said)
+                end = time.monotonic() + _LINGER_S if "end" in said else end
+            guard.tick()
+            _tell(us=guard.us, row=guard.row)
+            if guard.stopped != told:
+                told = guard.stopped
+                _tell(stopped=told)
+            if told == "terminated":
+                end = min(end, time.monotonic() + _LINGER_S)
+            time.sleep(guard.limits.tick_s)
+    finally:
+        guard.stop("the guard failed")
+        wire.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,274 @@
+"""One sitting at a stand: limits, weather, the plan, the first recording, and the loop until a run is not worth it."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.tables import json_text, write_atomic
+from bemt.judge.actions import plan
+from bemt.judge.diagnose.improve import beside
+from bemt.judge.diagnose.suggest import minutes
+from bemt.judge.proof import prove
+from bemt.judge.proof.loop import A_RUN, Course, Points, follow
+from bemt.physics import effects
+from bemt.rotors.case import load_case
+from bemt.tools.stand import sealed, story
+from bemt.tools.stand.guard import Limits
+from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, lapsed, wire_of_the_simulated
+from bemt.tools.stand.verbs import Stand, Stopped
+
+if TYPE_CHECKING:
+    from bemt.rotors.propeller import Propeller
+
+SCHEMA = "bemt.stand/1"
+_ARMING_S = 3.0  # At the stop value, until a controller takes commands
+_ABOVE = 1.1  # Speed at which the motor is stopped, over the top of the range [1]
+_UP, _WINDS = 10, 5  # Speeds of a plan at rest, and winds of one in a tunnel
+_USUAL = {"largest_us": 2000.0, "ramp_us_s": 500.0, "current_A": math.inf, "vibration_m_s2": math.inf}
+_ASKED = {
+    "largest_us": "Largest pulse width [us]", "ramp_us_s": "Fastest rise of the pulse width [us/s]",
+    "current_A": "Largest current [A]", "vibration_m_s2": "Largest vibration [m/s2]",
+    "temperature_C": "Temperature of the air [C]", "pressure_hPa": "Pressure of the air, at the stand [hPa]",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class StandAnswer:
+    """What a sitting found, and how it went."""
+
+    case: str
+    course: Course
+    stopped: str = ""  # Why the guard stopped it
+    there: tuple[str, ...] | None = None  # What was sealed, of a simulated stand
+    files: tuple[Path, ...] = ()
+    lines: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def exit_code(self) -> int:
+        """1 if the guard stopped it."""
+        return EXIT_UNCONVERGED if self.stopped else EXIT_OK
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """Causes that were named, in order."""
+        last = self.course.answers[-1:] if self.course.answers else []
+        said = [n for some in self.course.aside for n in some]
+        return tuple(dict.fromkeys([*said, *(n for a in last if a.verdict in ("named", "sensor") for n in a.effects)]))
+
+    @property
+    def text(self) -> str:
+        """What came of it; the rest was told while it happened."""
+        told = [line for line in self.lines if line.startswith(("stopped: ", "found: ", "unsealed: "))]
+        return "\n".join([*told, *(f"story: {f.as_posix()}" for f in self.files if f.suffix == ".html")])
+
+    @property
+    def details(self) -> str:
+        """The story in lines."""
+        return "\n".join(self.lines)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of schema ``bemt.stand/1``."""
+        return {"schema": SCHEMA, "case": self.case, "found": list(self.found), "stopped": self.stopped,
+                "there": None if self.there is None else list(self.there), "end": self.course.end,
+                "steps": list(self.course.steps), "minutes": list(self.course.minutes),
+                "answers": [{"verdict": a.verdict, "effects": list(a.effects), "probability": a.sure}
+                            for a in self.course.answers]}  # fmt: skip
+
+
+def ask(question: str) -> str:
+    """Ask at the terminal."""
+    if not sys.stdin.isatty():
+        raise InputError(Fault("", "yes", "no terminal", f"somebody who answers: {question}", "Runs are confirmed"))
+    sys.stderr.write(f"{question} ")
+    sys.stderr.flush()
+    return sys.stdin.readline().strip()
+
+
+def asked_number(name: str) -> float:
+    """Number that was asked for at the terminal."""
+    got = ask(f"{_ASKED[name]}?")
+    try:
+        return float(got)
+    except ValueError:
+        raise InputError(Fault("", name, repr(got), "a number")) from None
+
+
+class AtTheTerminal:
+    """The person at a real stand (:class:`bemt.tools.stand.hand.Person`), asked for what no wire does."""
+
+    def __init__(self, points: Points, air: Mapping[str, float], wind_m_s: float, most_rpm: float) -> None:
+        self.points, self.air, self.wind, self.rpm, self.now = points, air, wind_m_s, most_rpm, 0.0
+        self.calm: Callable[[], None] = lambda: None  # Stops the motor: nobody goes near one that turns
+
+    def set_up(self, kind: str, runs: Sequence[Points], mended: Sequence[str], day: int) -> Rows:
+        """Ask for what a run needs; no rows where it cannot be."""
+        rows = [dict(p) for p in (runs[-1] if kind == "run" else self.points)]
+        if any(r["airspeed_m_s"] > self.wind or r["rpm"] > self.rpm for r in rows):
+            return []
+        need = "the rotor and the stand as they were before, without what is suspected" if kind == "reference" else ""
+        if "pressure_Pa" in rows[0]:
+            need = f"air of {rows[0]['temperature_C']:.0f} C and {rows[0]['pressure_Pa'] / 100:.0f} hPa"
+        if "wall_distance_m" in rows[0]:
+            need = f"a wall {rows[0]['wall_distance_m']:.2f} m behind the rotor"
+        return rows if not need or ask(f"Needs {need}. Enter when it is so, s to skip.") != "s" else []
+
+    def place(self, row: Mapping[str, float]) -> Mapping[str, float]:
+        """Ask for the wind of a row."""
+        if row["airspeed_m_s"] != self.now:
+            self.now = row["airspeed_m_s"]
+            self.calm()
+            ask(f"Wind of {self.now:.1f} m/s, then Enter.")
+        return {**self.air, **row}
+
+    def look(self, name: str) -> bool:
+        """Ask whether a cause is there."""
+        check = effects.catalogue()[name].check if name in effects.catalogue() else name
+        return ask(f"Look: {check}. Is it so? [y/n]").lower().startswith("y")
+
+    def mend(self, names: Sequence[str]) -> Sequence[str]:
+        """Ask to put causes right."""
+        ask(f"Mend this, then press Enter: {', '.join(names)}.")
+        return names
+
+
+def plan_of(top_rpm: float, wind_m_s: float) -> list[dict[str, float]]:
+    """Points of a first recording: up and down at rest, or speeds by winds."""
+    if not wind_m_s:
+        up = np.linspace(0.35, 1.0, _UP) * top_rpm
+        return [{"rpm": float(n), "airspeed_m_s": 0.0, "run": 0} for n in (*up, *up[-2::-1])]
+    speeds, winds = np.linspace(0.4, 1.0, _UP // 2) * top_rpm, np.linspace(0.0, wind_m_s, _WINDS)
+    return [{"rpm": float(n), "airspeed_m_s": float(V), "run": k} for k, V in enumerate(winds) for n in speeds]
+
+
+def sit(
+    rotor: Propeller, on: str, address: str, line: str, given: Mapping[str, float | None], *, top_rpm: float | None,
+    wind_m_s: float, runs: int, faults: Sequence[str], seed: int | None, lapse: float, yes: bool, out: Path,
+    say: Callable[[str], None],
+) -> StandAnswer:  # fmt: skip
+    """Sit at a stand; everything goes into one folder."""
+    top = top_rpm or rotor.case.rpm
+    points, lines = plan_of(top, wind_m_s), list[str]()
+    course, stopped, made, there = Course("", []), "", list[tuple[str, str]](), None
+    case = rotor.write(out)
+    for file in beside(rotor.case) if rotor.case.path.is_file() else ():
+        write_atomic(out / file.relative_to(rotor.case.folder), file.read_bytes())
+
+    def tell(text: str) -> None:
+        lines.append(text)
+        say(f"{text}\n")
+        write_atomic(out / "log.txt", "\n".join(lines) + "\n")
+
+    def may(kind: str, rows: Rows) -> bool:
+        speeds, winds = ([r[n] for r in rows] for n in ("rpm", "airspeed_m_s"))
+        what = {"again": "the recording", "run": "the run asked for", "reference": "a reference"}[kind]
+        wind = f", wind {min(winds):.1f} to {max(winds):.1f} m/s" if max(winds) else ", at rest"
+        tell(f"run: {what}, {len(rows)} points, {min(speeds):.0f} to {max(speeds):.0f} rev/min{wind}, about "
+             f"{minutes('run', len(rows)):.0f} min")  # fmt: skip
+        return yes or ask("Enter to run, s to skip.") != "s"
+
+    def told(so_far: Course) -> None:
+        nonlocal course
+        course = so_far
+        if course.steps:
+            aside = ", ".join(course.aside[-1])
+            tell(f"step: {course.steps[-1]}" + (f" {aside}" if aside else ""))
+        last = course.answers[-1]
+        if last.confirmed:
+            return tell(f"said: {', '.join(last.effects)} is there, a look has shown it")
+        what = f" {' or '.join(last.effects) if last.verdict == 'class' else ', '.join(last.effects)}".rstrip()
+        loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict, math.nan)
+        tell(f"said: {last.verdict}{what} (probability {last.sure:.2f}, expected loss {loss:.2f})")
+        if asks := dict(last.whole.get("next_measurement") or {}).get("text"):
+            tell(f"next: {asks}")
+
+    seen = plan({k: [p[k] for p in points] for k in ("rpm", "airspeed_m_s")}, case).detectable
+    tell(f"plan: {len(points)} points; can show " + ", ".join(k for k, v in seen.items() if v == "yes"))
+    tell("plan: cannot show " + ", ".join(k for k, v in seen.items() if v == "no"))
+    with ExitStack() as held:
+        limits = _limits(rotor, on, given, top_rpm, lapse)
+        person: Person
+        if on == "simulated":
+            key = out / "sealed"
+            own = secrets.randbits(40) if seed is None else seed
+            digest = sealed.seal_case(key, load_case(case), points, top, faults, own)
+            tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
+            person = one = Simulated(key, "0000", wire_of_the_simulated(), lapse)
+            held.callback(one.close)
+            wire = (one.wire, one.address, "")
+        else:
+            air = {n: asked_number(n) if given[n] is None else float(given[n] or 0.0)
+                   for n in ("temperature_C", "pressure_hPa")}  # fmt: skip
+            known = {"temperature_C": air["temperature_C"], "pressure_Pa": 100.0 * air["pressure_hPa"]}
+            person, wire = AtTheTerminal(points, known, wind_m_s, limits.rpm), (on, address, line)
+        try:
+            stand = held.enter_context(Stand(*wire, limits, settle_s=max(2.0 / lapse, 0.3)))
+            if isinstance(person, AtTheTerminal):
+                person.calm = stand.stop
+                stand.rest(_ARMING_S)
+            hand = Wired(stand, person, may, out.as_posix())
+            made = hand.made
+            if text := hand.again((), 0):
+                write_atomic(out / "recording.csv", text)
+                first, words = prove.asked(out, prove.question(out))
+                if not first:
+                    raise InputError(Fault(str(out / "recording.csv"), "", words[-300:], "a recording to diagnose"))
+                told(Course("", [first]))
+                course = follow(out, first, hand, runs, enough=A_RUN, tell=told)
+        except Stopped as error:
+            stopped = str(error)
+            sure = not stopped.startswith(("wire lost", "no row", "the guard"))
+            tell(f"stopped: {stopped}; {'the output is at its stop value' if sure else 'look: does the motor stand?'}")
+    if on == "simulated":
+        there = sealed.bench_of(out / "sealed", "0000")[1].causes
+    answer = StandAnswer(rotor.name, course, stopped, there)
+    spent = sum(course.minutes) + minutes("run", len(points))
+    tell(f"found: {_found(answer)}; ended by: {stopped or course.end or 'no run'}; {spent:.0f} min of stand time")
+    if there is not None:
+        tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
+    write_atomic(out / "stand.json", json_text(answer.to_dict()))
+    files = story.write(out, rotor, answer.course, made, lines)
+    return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(lines))
+
+
+def _found(answer: StandAnswer) -> str:
+    """What was found, and what was left open."""
+    last = answer.course.answers[-1] if answer.course.answers else None
+    if last is None:
+        return "nothing, as nothing was measured"
+    left = {"class": f"one of {', '.join(last.effects)}", "none": "nothing wrong", "insufficient": "not settled",
+            "unknown": "something that is not in the library"}.get(last.verdict, "")  # fmt: skip
+    return ", ".join([*answer.found, *([left] if left and (not answer.found or last.verdict == "class") else [])])
+
+
+def _limits(
+    rotor: Propeller, on: str, given: Mapping[str, float | None], top_rpm: float | None, lapse: float
+) -> Limits:  # fmt: skip
+    """Limits as given, from the case, or asked for."""
+    drive = rotor.case.file.drive
+    stated = {n: v for n, v in given.items() if v is not None and n in _USUAL}
+    if drive is not None and drive.esc is not None:
+        limit = {} if drive.esc.current_limit_A is None else {"current_A": drive.esc.current_limit_A}
+        stated = {"largest_us": drive.esc.pulse_max_us, **limit, **stated}
+    for name in ("largest_us", "ramp_us_s", "current_A") if on != "simulated" else ():
+        if name not in stated:
+            stated[name] = asked_number(name)
+    found = {**_USUAL, **stated}
+    top = top_rpm or (math.inf if on == "simulated" else rotor.case.rpm)
+    limits = Limits(**found, rpm=_ABOVE * top)
+    if not limits.stop_us < limits.largest_us <= 2500.0 or limits.ramp_us_s <= 0.0:
+        got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
+        raise InputError(Fault("", "largest_us, ramp_us_s", got, "1000 to 2500 us and a rise above 0"))
+    return lapsed(limits, lapse)

@@ -1,0 +1,222 @@
+"""The three verbs of a stand: set the pulse width, read a row, stop. The wire is the guard's (:mod:`.guard`)."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import math
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, TypeVar
+
+from bemt.base.errors import Fault, InputError
+from bemt.tools.stand.drivers import connect
+from bemt.tools.stand.guard import Limits
+
+T = TypeVar("T")
+_POLL_S, _START_S = 0.02, 10.0
+# The speed is steady when it has moved by less than this share for that share of the longest wait; that near to what
+# was asked for is near enough; attempts
+_STEADY, _WINDOW, _NEAR, _TRIES = 0.005, 0.15, 0.01, 5
+
+
+class Stopped(Exception):
+    """The guard has stopped the stand; says why."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A settled point: mean of each channel, and the scatter of its samples."""
+
+    mean: Mapping[str, float]
+    scatter: Mapping[str, float]  # Standard deviation of one sample [units of the channels]
+    pulse_us: float
+    samples: int
+    seconds: float  # On the clock of this machine, since the stand was opened [s]
+
+
+class Stand:
+    """A stand behind its guard; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    driver, address, line : str
+        As :func:`bemt.tools.stand.drivers.connect` takes them.
+    limits : Limits
+        What the stand may do.
+    settle_s : float
+        Longest wait until a command has come and the speed is steady. [s]
+    samples : int
+        Samples of a row.
+    """
+
+    def __init__(
+        self, driver: str, address: str, line: str, limits: Limits, settle_s: float = 2.0, samples: int = 20
+    ) -> None:  # fmt: skip
+        self.wire, self.limits, self.settle_s, self.samples = (driver, address, line), limits, settle_s, samples
+        self.began, self.stopped, self.us = time.monotonic(), "", limits.stop_us
+        self.known: dict[float, float] = {}  # Speed by pulse width, as it was read
+        self._rows: deque[tuple[float, float, dict[str, float]]] = deque(maxlen=2000)
+        self._refused: list[dict[str, str]] = []
+        self._new = threading.Condition()
+        command = [sys.executable, "-m", "bemt.tools.stand.guard"]
+        self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                      start_new_session=True, stderr=subprocess.DEVNULL)  # fmt: skip
+        self._say(driver=driver, address=address, line=line, limits=_plain(limits))
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+        atexit.register(self.close)
+        until = time.monotonic() + _START_S
+        while not self._rows:
+            if self._refused:
+                self.close()
+                raise InputError([Fault(**f) for f in self._refused])
+            if self.stopped or time.monotonic() > until:
+                self.close()
+                raise Stopped(self.stopped or "the guard did not start")
+            time.sleep(_POLL_S)
+
+    def __enter__(self) -> Stand:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def _say(self, **order: Any) -> None:
+        pipe = self.guard.stdin
+        if pipe is None or pipe.closed:
+            return
+        try:
+            pipe.write(json.dumps(order) + "\n")
+            pipe.flush()
+        except (BrokenPipeError, OSError):
+            self.stopped = self.stopped or "the guard is gone"
+
+    def _listen(self) -> None:
+        assert self.guard.stdout is not None
+        for text in self.guard.stdout:
+            if not text.startswith("{"):  # words of a client
+                continue
+            said = json.loads(text)
+            with self._new:
+                if "us" in said:
+                    self.us = said["us"]
+                    self._rows.append((time.monotonic(), said["us"], said["row"]))
+                self._refused = said.get("refused", self._refused)
+                self.stopped = said.get("stopped", "") or self.stopped
+                self._new.notify_all()
+        self.stopped = self.stopped or "the guard is gone"
+        if self.guard.stdin is not None and not self.guard.stdin.closed and not self._refused:
+            self._panic()  # killed: nobody else can reach the stand
+
+    def _panic(self) -> None:
+        with contextlib.suppress(Exception):
+            wire = connect(*self.wire)
+            wire.write(self.limits.stop_us)
+            wire.close()
+
+    def rest(self, seconds: float) -> None:
+        """Wait with a beat; raises as soon as the guard has stopped."""
+        until = time.monotonic() + seconds
+        while True:
+            self._say(beat=1)
+            if self.stopped:
+                raise Stopped(self.stopped)
+            left = until - time.monotonic()
+            if left <= 0.0:
+                return
+            time.sleep(min(left, _POLL_S))
+
+    def meanwhile(self, do: Callable[[], T]) -> T:
+        """Do something else, and keep the beat."""
+        with ThreadPoolExecutor(1) as pool:
+            doing = pool.submit(do)
+            while not doing.done():
+                self.rest(_POLL_S)
+            return doing.result()
+
+    def pulse(self, pulse_us: float) -> None:
+        """Set the pulse width and wait until it has come and the speed is steady. [us]"""
+        limits = self.limits
+        if not limits.stop_us <= pulse_us <= limits.largest_us:
+            expected = f"{limits.stop_us:g} to {limits.largest_us:g} us, the largest that was allowed"
+            raise InputError(Fault("", "pulse width", f"{pulse_us:g}", expected))
+        self._say(go=pulse_us)
+        until = time.monotonic() + abs(pulse_us - self.us) / limits.ramp_us_s + self.settle_s
+        step = min(10.0 * limits.tick_s, 0.1)
+        while time.monotonic() < until:
+            self.rest(step)
+            since = time.monotonic() - _WINDOW * self.settle_s
+            seen = [(row.get("rpm", math.nan), us) for at, us, row in list(self._rows) if at > since]
+            speeds = [rpm for rpm, us in seen if us == pulse_us]
+            if len(seen) == len(speeds) >= 5 and max(speeds) - min(speeds) <= _STEADY * max(speeds):
+                return
+
+    def row(self) -> Row:
+        """Read a row: the mean of the next samples."""
+        rows: dict[float, dict[str, float]] = {}
+        since = time.monotonic()
+        while len(rows) < self.samples:
+            if time.monotonic() - since > self.settle_s + _START_S:
+                raise Stopped("the stand sends no rows")
+            self.rest(min(self.limits.tick_s, _POLL_S))
+            rows = {row["stamp_s"]: row for at, _, row in list(self._rows) if at > since}
+        taken = list(rows.values())[: self.samples]
+        names = [n for n in taken[0] if n != "stamp_s"]
+        columns = {n: [row.get(n, math.nan) for row in taken] for n in names}
+        mean = {n: sum(v) / len(v) for n, v in columns.items()}
+        spread = {n: math.sqrt(sum((x - mean[n]) ** 2 for x in v) / max(len(v) - 1, 1)) for n, v in columns.items()}
+        return Row(mean, spread, self.us, len(taken), time.monotonic() - self.began)
+
+    def at_speed(self, rpm: float) -> Row:
+        """Find the pulse width of a speed from what was read so far, and read a row there. [rev/min]"""
+        low, high = self.limits.stop_us, self.limits.largest_us
+        row = None
+        for _ in range(_TRIES):
+            known = sorted({low: 0.0, **self.known}.items())
+            below = max((k for k in known if k[1] <= rpm), key=lambda k: k[1])
+            above = min((k for k in known if k[1] > rpm), key=lambda k: k[1], default=None)
+            if above is not None:
+                us = below[0] + (above[0] - below[0]) * (rpm - below[1]) / (above[1] - below[1])
+            elif below[1] > 0.0:
+                us = low + (below[0] - low) * min(rpm / below[1], 1.5)
+            else:
+                us = low + 0.15 * (high - low)
+            us = float(round(min(us, high)))  # steps of common ESCs
+            self.pulse(us)
+            row = self.row()
+            self.known[us] = row.mean["rpm"]
+            if abs(row.mean["rpm"] / rpm - 1.0) < _NEAR or us >= high:
+                break
+        assert row is not None
+        return row
+
+    def stop(self) -> None:
+        """Stop the motor; the stand stays open."""
+        self._say(go=self.limits.stop_us)
+        while self.us > self.limits.stop_us and not self.stopped:
+            self.rest(_POLL_S)
+
+    def close(self) -> None:
+        """Stop for good and let go of the stand."""
+        atexit.unregister(self.close)
+        if self.guard.stdin is not None and not self.guard.stdin.closed:
+            with contextlib.suppress(OSError):
+                self.guard.stdin.close()  # the guard stops at the end of its orders
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.guard.wait(5.0)
+        self._listener.join(5.0)
+        if self.guard.stdout is not None and not self._listener.is_alive():
+            self.guard.stdout.close()
+
+
+def _plain(limits: Limits) -> dict[str, Any]:
+    return {k: v for k, v in limits.document().items() if math.isfinite(v)}

@@ -1,0 +1,311 @@
+"""The promise of the stand: it stops, whatever happens; every wire reads and sets alike; a sitting is one folder."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bemt
+from bemt.app.cli import main
+from bemt.base.errors import InputError
+from bemt.judge.proof import draw, items, loop, seal
+from bemt.tools.stand import drivers, hand, sealed, session
+from bemt.tools.stand.drivers import rcbenchmark, serial
+from bemt.tools.stand.guard import Guard, Limits
+from bemt.tools.stand.verbs import Stand, Stopped
+
+LIMITS = Limits(1800.0, 4000.0, current_A=5e3, vibration_m_s2=50.0)
+WIRES = ("rcbenchmark", "flightstand", "serial")
+NEEDS = {"flightstand": "FlightStand", "serial": "serial", "rcbenchmark": "socket"}
+WITHIN_S = 0.5
+HEAD = """
+import sys
+from bemt.tools.stand.guard import Limits
+from bemt.tools.stand.verbs import Stand
+with Stand(sys.argv[1], sys.argv[2], "", Limits(1800.0, 4000.0), 1.0) as stand:
+    stand.pulse(1400.0)
+    while True:
+        stand.row()
+"""
+
+
+@pytest.fixture(scope="module")
+def key(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sealed key of a stand with a weak thrust cell."""
+    folder = tmp_path_factory.mktemp("key")
+    case = bemt.load(project / "cases" / "prop_8x5").case
+    points = [{"rpm": n, "airspeed_m_s": 0.0} for n in np.linspace(7e3, 2e4, 6)]
+    sealed.seal_case(folder, case, points, 2e4, ["thrust_gain"], 3)
+    return folder
+
+
+@pytest.fixture(scope="module", params=WIRES)
+def simulated(request: pytest.FixtureRequest, key: Path) -> Iterator[hand.Simulated]:
+    """Simulated stand in its own process, behind each of the wires."""
+    pytest.importorskip(NEEDS[request.param])
+    found = hand.Simulated(key, "0000", request.param, 1.0)
+    yield found
+    found.close()
+
+
+def _stopped_after(stand: hand.Simulated, since: float) -> float:
+    """Seconds until the output was at its stop value."""
+    until = time.monotonic() + 5.0
+    while time.monotonic() < until:
+        output = stand.ask("output")
+        if output["us"] == 1000.0:
+            return float(output["since"]) - since
+        time.sleep(0.01)
+    return math.inf
+
+
+class _Cut:
+    """A wire that can be cut: what comes in goes to the other end until then."""
+
+    def __init__(self, address: str) -> None:
+        self.cut, self.listener, self.ends = False, socket.create_server(("127.0.0.1", 0)), list[socket.socket]()
+        host, port = address.split(":")
+        self.to, self.address = (host, int(port)), f"127.0.0.1:{self.listener.getsockname()[1]}"
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                ends = self.listener.accept()[0], socket.create_connection(self.to)
+            except OSError:
+                return
+            self.ends += ends
+            for a, b in (ends, ends[::-1]):
+                threading.Thread(target=self._carry, args=(a, b), daemon=True).start()
+
+    def _carry(self, a: socket.socket, b: socket.socket) -> None:
+        try:
+            while data := a.recv(65536):
+                if not self.cut:
+                    b.sendall(data)
+        except OSError:
+            pass
+
+    def close(self) -> None:
+        """End it, and what waits."""
+        for end in (self.listener, *self.ends):
+            end.close()
+
+
+def _trial(stand: hand.Simulated, what: str) -> tuple[float, str]:
+    """Turn the motor, let something happen; seconds until the output was at its stop value, and what the guard said."""
+    stand.ask("break", what="")
+    stand.ask("set up", kind="again", runs=[], mended=[], day=0)
+    if what in ("killed", "interrupted"):
+        child = subprocess.Popen([sys.executable, "-c", HEAD, stand.wire, stand.address])
+        until = time.monotonic() + 20.0
+        while stand.ask("output")["us"] < 1400.0 and time.monotonic() < until:
+            time.sleep(0.02)
+        since = time.monotonic()
+        os.kill(child.pid, signal.SIGKILL if what == "killed" else signal.SIGINT)
+        child.wait()
+        seconds = _stopped_after(stand, since)
+        time.sleep(1.5)  # its guard lets go of the wire
+        return seconds, ""
+    wire = _Cut(stand.address) if what == "cut" and stand.wire == "flightstand" else None
+    try:
+        with Stand(stand.wire, wire.address if wire else stand.address, "", LIMITS, 1.0) as head:
+            head.pulse(1400.0)
+            assert stand.ask("output")["us"] == 1400.0
+            since = time.monotonic()
+            if what == "guard killed":
+                head.guard.kill()
+            elif wire:
+                wire.cut = True
+            else:
+                stand.ask("break", what="silent" if what == "cut" else what)
+            if what != "frozen":
+                with pytest.raises(Stopped):
+                    head.rest(3.0)
+            return _stopped_after(stand, since), head.stopped
+    finally:
+        stand.ask("break", what="")
+        if wire:
+            wire.close()
+
+
+REASONS = {"nan": "thrust_N is no number", "current": "current", "killed": "", "interrupted": "", "cut": "",
+           "guard killed": "gone", "frozen": ""}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", REASONS)
+def test_the_output_is_at_its_stop_value_within_half_a_second(simulated: hand.Simulated, what: str) -> None:
+    seconds, why = _trial(simulated, what)
+    assert seconds < WITHIN_S and REASONS[what] in why
+
+
+@pytest.mark.slow
+def test_fifty_stops(simulated: hand.Simulated) -> None:
+    times = {what: [_trial(simulated, what)[0] for _ in range(10)] for what in ("killed", "cut", "nan", "current",
+                                                                              "guard killed")}  # fmt: skip
+    print({what: round(max(t), 3) for what, t in times.items()})
+    assert max(max(t) for t in times.values()) < WITHIN_S
+
+
+def test_every_wire_reads_the_same_stand(simulated: hand.Simulated) -> None:
+    simulated.ask("set up", kind="again", runs=[], mended=[], day=0)
+    with Stand(simulated.wire, simulated.address, "", replace(LIMITS, patience_s=3.0), 1.0) as stand:
+        row = stand.at_speed(10000.0)
+        assert row.mean["rpm"] == pytest.approx(10000.0, rel=0.02) and row.samples == 20
+        assert row.mean["thrust_N"] == pytest.approx(5.4, rel=0.1) and 0.0 < row.scatter["thrust_N"] < 0.1
+        assert row.mean["torque_Nm"] == pytest.approx(0.07, rel=0.4) and row.mean["current_A"] > 0.0
+        with pytest.raises(InputError, match="1000 to 1800 us, the largest that was allowed"):
+            stand.pulse(1900.0)
+        stand.stop()
+        assert _stopped_after(simulated, time.monotonic()) < WITHIN_S
+
+
+def test_the_ramp_is_kept_up_and_not_down() -> None:
+    class Wire:
+        said: list[float] = []
+
+        def write(self, pulse_us: float) -> None:
+            self.said.append(pulse_us)
+
+        def read(self) -> dict[str, float]:
+            return {"rpm": 0.0, "thrust_N": 0.0, "stamp_s": time.monotonic()}
+
+        def close(self) -> None:
+            pass
+
+    guard = Guard(Wire(), Limits(2000.0, 1000.0))
+    guard.order({"go": 5000.0})
+    began = time.monotonic()
+    for _ in range(10):
+        time.sleep(0.01)
+        guard.tick()
+    assert guard.target == 2000.0, "no more than the largest"
+    assert 1050.0 < guard.us <= 1000.0 + 1000.0 * (time.monotonic() - began) + 20.0
+    guard.stop("enough")
+    assert guard.us == 1000.0 == Wire.said[-1]
+    guard.order({"go": 1500.0})
+    guard.tick()
+    assert guard.us == 1000.0, "a stop is for good"
+
+
+def test_units_are_those_that_a_wire_tells() -> None:
+    row = rcbenchmark._row({
+        "thrust": {"workingValue": 0.5, "workingUnit": "kgf"}, "torque": {"workingValue": 0.1, "workingUnit": "N·m"},
+        "motorOpticalSpeed": {"workingValue": 5000, "workingUnit": "RPM"},
+        "current": {"workingValue": 3, "workingUnit": "furlong"},
+    })  # fmt: skip
+    assert row["thrust_N"] == pytest.approx(4.903, abs=1e-3) and row["rpm"] == 5000.0 and row["torque_Nm"] == 0.1
+    assert math.isnan(row["current_A"]), "an unknown unit is no number, and the guard stops"
+    _, pattern, channels = serial.read_format("{pulse_us} -> t={time_ms} F={thrust_gf} n={rpm}")
+    found = pattern.fullmatch("t=1500 F=200.5 n=nan")
+    assert found and dict(channels)["thrust_N"] == pytest.approx(0.00980665) and channels[0] == ("stamp_s", 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("S{pulse_us}", "a command with {pulse_us}, an arrow, a row"),
+        ("S{pulse_us} -> {rpm},{thrust_V}", "got {thrust_V}; expected a channel and its unit"),
+        ("S{pulse_us} -> {rpm},{torque_Nm}", "got no thrust_N; expected speed and thrust"),
+    ],
+)
+def test_a_bad_line_says_what_is_wrong(line: str, said: str) -> None:
+    with pytest.raises(InputError) as error:
+        serial.read_format(line)
+    assert said in str(error.value)
+
+
+def test_a_stand_that_does_not_answer_is_said_and_nothing_is_left(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(project / "cases" / "prop_8x5")
+    limits = ["--largest-us", "1500", "--ramp-us-s", "200", "--current-A", "20", "--temperature-C", "20",
+              "--pressure-hPa", "1000"]  # fmt: skip
+    code = main(
+        ["stand", case, "--on", "rcbenchmark", "--address", "127.0.0.1:9", "--out", str(tmp_path / "a"), *limits]
+    )
+    err = capsys.readouterr().err
+    assert code == 2 and "got '127.0.0.1:9'; expected host:port:own port" in err
+    assert not (tmp_path / "a").exists()
+    code = main(["stand", case, "--on", "serial", "--yes", "--out", str(tmp_path / "a")])
+    assert code == 2 and "--yes: got a real stand" in capsys.readouterr().err
+    code = main(["stand", case, "--yes", "--fault", "gremlins", "--out", str(tmp_path / "a")])
+    assert code == 2 and "--fault: got gremlins; expected of" in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) -> None:
+    found = bemt.stand(project / "cases" / "prop_8x5", out=tmp_path / "sitting", yes=True, fault=["thrust_gain"],
+                       seed=3, runs=1, lapse=200.0)  # fmt: skip
+    folder = tmp_path / "sitting"
+    assert found.exit_code == 0 and found.there == ("thrust_gain",) and len(found.course.answers) >= 2
+    assert {"recording.csv", "reference.csv", "1_again.csv", "2_reference.csv", "log.txt", "story.html", "story.png",
+            "stand.json"} <= {f.name for f in folder.iterdir()}  # fmt: skip
+    assert json.loads((folder / "stand.json").read_text())["schema"] == "bemt.stand/1"
+    assert "img alt" in (folder / "story.html").read_text()
+    log = (folder / "log.txt").read_text()
+    assert log.index("sealed: ") < log.index("run: ") < log.index("said: ") < log.index("unsealed: ")
+    digest = log.partition("SHA-256 ")[2][:64]
+    assert seal.sha256((folder / "sealed" / seal.KEY).read_text()) == digest, "sealed before the first run"
+
+
+def test_a_real_stand_asks_before_each_run_and_for_the_weather_once(
+    project: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind the wire of RCbenchmark is a simulated one, and the sitting does not know."""
+    asked: list[str] = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return "21" if "Temperature" in question else "1003" if "Pressure" in question else "s" * ("Needs" in question)
+
+    monkeypatch.setattr(session, "ask", ask)
+    monkeypatch.setattr(session, "_UP", 3)
+    there = hand.Simulated(key, "0000", "rcbenchmark", 1.0)
+    try:
+        found = bemt.stand(
+            project / "cases" / "prop_8x5", out=tmp_path / "real", on="rcbenchmark", address=there.address, runs=1,
+            top_rpm=15e3, largest_us=1800.0, ramp_us_s=2000.0, current_A=5e3,
+        )  # fmt: skip
+        assert there.ask("output")["us"] == 1000.0
+    finally:
+        there.close()
+    assert found.stopped == "" and found.there is None and found.course.answers
+    assert sum("Temperature" in q for q in asked) == 1 and any("Enter to run" in q for q in asked)
+    table = np.genfromtxt((tmp_path / "real" / "recording.csv").read_text().splitlines(), delimiter=",", names=True)
+    assert table.size == 5 and np.all(table["temperature_C"] == 21.0) and np.all(table["pressure_Pa"] == 100300.0)
+    assert np.all(np.diff(table["time_s"]) > 0.0) and not (tmp_path / "real" / "sealed").exists()
+
+
+def test_what_is_measured_through_the_wire_is_the_hidden_stand(tmp_path: Path) -> None:
+    """A rotor of the proof, through the wire, reads what its item says, to the noise of the cells."""
+    bench = draw.benches(draw.SIZES["stand"], np.random.SeedSequence(5).spawn(2)[0])[0]
+    made = items.make_item(bench, ("torque_gain",), (2.0,), 5, "sensor")
+    seal.seal(tmp_path, seal.Key("bemt.key/1", "0", "5", "stand", (replace(made.entry, folder="0000"),)))
+    with hand.wired(tmp_path, replace(made.entry, folder="0000")) as found:
+        text = found.again((), 0)
+        assert found.there("torque_gain") and not found.there("duct")
+        assert list(found.mend(["torque_gain", "duct"])) == ["torque_gain"]
+    read, told = (np.genfromtxt(t.splitlines(), delimiter=",", names=True) for t in (text, made.files["recording.csv"]))
+    assert read.size == told.size == 48
+    for name in ("thrust_N", "torque_Nm"):
+        share = (read[name] / read["rpm"] ** 2) / (told[name] / told["rpm"] ** 2) - 1.0
+        assert abs(float(np.median(share))) < 0.01
+
+
+def test_a_course_ends_where_a_run_is_not_worth_it() -> None:
+    assert loop.A_RUN < 1.0, "a run costs less than to say nothing"
+    assert set(drivers.NAMES) == set(drivers.DEFAULTS)
