@@ -21,12 +21,14 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.diagnose.prior import DRIVE
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
-_PRIOR = {NONE: DRIVE["none"], UNKNOWN: DRIVE["unknown"]}
+PRIOR = {"none": 0.7, "single": 0.2, "pair": 0.05, "unknown": 0.05}
+"""Prior probability of the kinds of explanation of a drive, which is judged beside the loads: a cause is half as likely
+as there (declared) [1]."""
+_PRIOR = {NONE: PRIOR["none"], UNKNOWN: PRIOR["unknown"]}
 SUPPLY = Explanation.of("battery_sag")
 """Another voltage of battery or supply."""
 # What a recorded voltage does at one command and at one speed, powers of its ratio with their standard deviations: the

@@ -171,7 +171,8 @@ def _by_volts(part: Part) -> Array:
     extra = part.flow.extra
     if not {"voltage_V", "usual_voltage_V"} <= extra.keys():
         return np.zeros(len(part.record))
-    return np.clip(np.nan_to_num(np.log(extra["voltage_V"] / extra["usual_voltage_V"])), -TOLD_VOLTAGE, TOLD_VOLTAGE)
+    change = np.nan_to_num(np.log(extra["voltage_V"] / extra["usual_voltage_V"]))
+    return np.asarray(np.clip(change, -TOLD_VOLTAGE, TOLD_VOLTAGE))
 
 
 def _drives(problem: Problem) -> Iterator[tuple[str, dict[int, Part]]]:

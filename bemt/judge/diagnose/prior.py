@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemt.judge.compare.drive_laws import PRIOR as DRIVE
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
@@ -15,12 +16,10 @@ from bemt.physics.effects.duct import DuctEffect
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
 
-__all__ = ["ALWAYS", "DRIVE", "LEFT_OUT", "PRIOR", "kinds", "log_priors", "present", "prior_weights"]
+__all__ = ["ALWAYS", "LEFT_OUT", "PRIOR", "kinds", "log_priors", "present", "prior_weights"]
 
 PRIOR = {"none": 0.4, "single": 0.45, "pair": 0.1, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
-DRIVE = {"none": 0.7, "single": 0.2, "pair": 0.05, "unknown": 0.05}
-"""The same of what drives the rotor, which is judged beside the loads: a cause is half as likely (declared). [1]"""
 LEFT_OUT, PRESENT = 10.0, 0.01
 """Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
 parameters, beside 1 for all others, where no reference shows the rotor [1]."""
