@@ -235,8 +235,6 @@ TEXT = {
     "fan": "profile by its grammar, integrals of the rows",
     "flow360": "shapes and units",
     "px4": "formula of its source (sih.cpp), ranges of its parameters",
-    "simulink": "MAT file read by SciPy",
-    "su2-bem": "layout of its test case",
     "su2-disk": "layout of its test case, integrals of the rows",
 }
 """What the text of a target was checked with where its program was not run."""
@@ -417,7 +415,7 @@ At rest QPROP's lift goes on straight to its largest value, where the section's 
 where the inner blade is near the stall. In flight what is left is the parabola of the drag. QPROP takes the reference
 Reynolds number of the first station for all (a slip of its tqcalc.f), so the file has one for all.
 
-`bemt lab stations FILE` turns an XROTOR, QPROP, DFDC or AeroDyn file into a case.
+`bemt lab stations FILE` turns an XROTOR, QPROP or DFDC file into a case.
 
 ## Solids
 

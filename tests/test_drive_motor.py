@@ -7,6 +7,7 @@ import json
 import math
 from pathlib import Path
 
+import motor_trials
 import numpy as np
 import pytest
 from PIL import Image
@@ -14,7 +15,7 @@ from PIL import Image
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.tools.drive import motor_constant as mc
-from bemt.tools.drive import motor_errors, motor_file, motor_generate, picture
+from bemt.tools.drive import motor_errors, motor_file, picture
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 
@@ -85,7 +86,7 @@ def test_oscilloscope_files_of_three_kinds(tmp_path: Path) -> None:
 
 
 def folder(tmp_path: Path, seed: int, planted: dict[str, float] | None = None) -> Path:
-    for name, text in motor_generate.generate(seed, planted).items():
+    for name, text in motor_trials.generate(seed, planted).items():
         (tmp_path / name).write_text(text)
     return tmp_path
 
@@ -159,7 +160,8 @@ def test_a_scale_that_is_no_convention_is_called_a_gain(tmp_path: Path) -> None:
 
 def test_command_shows_the_case_and_labels_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = tmp_path / "made"
-    assert main(["motor", "--generate", str(made)]) == 0
+    made.mkdir()
+    folder(made, 0)
     assert all(
         "generated, not measured" in (made / n).read_text() for n in ("motor.toml", "back_emf.csv", "torque.csv")
     )
@@ -172,7 +174,7 @@ def test_command_shows_the_case_and_labels_it(tmp_path: Path, capsys: pytest.Cap
     assert by["torque"]["interval95"][0] < 0.0311 < by["torque"]["interval95"][1]
     assert "generated" in doc["data"] and doc["agree"] and doc["stated"]["thesis, adopted (28 trials)"] == 0.0311
     assert (tmp_path / "out" / "motor.png").read_bytes()[:4] == b"\x89PNG"
-    assert main(["motor", "--generate", str(made), "--plant", "torque.shunt=1.05"]) == 0
+    folder(made, 0, {"torque.shunt": 1.05})
     assert main(["motor", str(made)]) == 1
     assert "torque.shunt 1.0" in capsys.readouterr().out
 
@@ -210,7 +212,7 @@ def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.Ca
     assert main(["motor", str(path)]) == 2
     words = capsys.readouterr().err
     assert all(w in words for w in ("motor.winding", "torque.shunt", "torque.shunt_ohm", "back_emf.measure"))
-    path.write_text(motor_generate.generate(1)["motor.toml"].replace("shunt_ohm = 250.0", "shunt_ohm = 2.5"))
+    path.write_text(motor_trials.generate(1)["motor.toml"].replace("shunt_ohm = 250.0", "shunt_ohm = 2.5"))
     assert main(["motor", str(path)]) == 2
     assert "mA" in capsys.readouterr().err
     (tmp_path / "torque.csv").write_text("trial,current_A,shunt\n1,2,3\n")
@@ -218,56 +220,6 @@ def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.Ca
     assert main(["motor", str(path)]) == 2
     words = capsys.readouterr().err
     assert "column in V" in words and "no column trial" in words
-    assert main(["motor", "--generate", str(tmp_path), "--plant", "torque.shnt=1.0"]) == 2
-
-
-def test_measured_trials_are_never_replaced_by_generated_ones(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    for name in ("torque.csv", "back_emf.csv"):
-        (mine / name).write_text("trial,current_A,shunt_V\n1,0,1.0\n")
-    assert main(["motor", "--generate", str(mine)]) == 2
-    words = capsys.readouterr().err
-    assert f"{(mine / 'torque.csv').as_posix()}: got a file that was not generated" in words and "back_emf.csv" in words
-    assert {p.name: p.read_text()[:5] for p in mine.iterdir()} == {"torque.csv": "trial", "back_emf.csv": "trial"}
-    # what was generated may be generated again; a mixed folder stays whole
-    made = tmp_path / "made"
-    assert main(["motor", "--generate", str(made)]) == 0
-    assert main(["motor", "--generate", str(made), "--seed", "4"]) == 0
-    assert (made / "motor.toml").read_text() == motor_generate.generate(4)["motor.toml"]
-    (made / "back_emf.csv").write_text("trial,rpm,v_V\n1,2,3\n")
-    before = {p.name: p.read_text() for p in made.iterdir()}
-    assert main(["motor", "--generate", str(made), "--seed", "5"]) == 2
-    assert {p.name: p.read_text() for p in made.iterdir()} == before
-    # trials that are judged in the same run are not replaced, even where they are generated
-    other = folder(made, 6) / "motor.toml"
-    text = before["motor.toml"] = other.read_text()
-    text = text.replace('"torque.csv"', '"made/torque.csv"').replace('"back', '"made/back')
-    (tmp_path / "mine.toml").write_text(text)
-    capsys.readouterr()
-    assert main(["motor", str(tmp_path / "mine.toml"), "--generate", str(made), "--seed", "7"]) == 2
-    assert "which this run reads" in capsys.readouterr().err and other.read_text() == before["motor.toml"]
-
-
-def test_options_that_would_be_ignored_are_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made, out = str(tmp_path / "made"), str(tmp_path / "out")
-    assert main(["motor", "--generate", made, "--out", out]) == 2
-    assert "--out" in capsys.readouterr().err
-    assert main(["motor", "--generate", made, "--seed", "-1", "--plant", "x=1"]) == 2
-    words = capsys.readouterr().err
-    assert "--seed: got -1; expected a whole number of 0 or more." in words and "--plant: got 'x=1'" in words
-    assert main(["motor", "--plant", "torque.shunt=1.1", "--seed", "3"]) == 2
-    words = capsys.readouterr().err
-    assert all(w in words for w in ("--plant", "--seed: got 3; expected none without --generate", "FILE: got nothing"))
-    assert not list(tmp_path.iterdir())
-    assert main(["motor", "--generate", made, "--json", "--seed", "3", "--plant", "torque.shunt=1.1"]) == 0
-    doc = json.loads(capsys.readouterr().out)
-    assert doc["schema"] == "bemt.motor.generated/1" and (doc["seed"], doc["planted"]) == (3, {"torque.shunt": 1.1})
-    assert doc["folder"] == Path(made).as_posix() and {p.name for p in Path(made).iterdir()} == set(doc["files"])
-    assert main(["motor", made, "--generate", made, "--out", out, "--json"]) == 0  # both at once: judged and written
-    assert json.loads(capsys.readouterr().out) == json.loads((Path(out) / "motor.json").read_text())
 
 
 @pytest.mark.parametrize("link", [False, True])

@@ -40,7 +40,7 @@ from geometry.slicing import find_rotor
 
 NUMBERS = [word for word in target_ids() if word not in ("stl", "obj", "step", "flow", "openfoam")]
 LOADS = [word for word in NUMBERS if exports()[word].kind == "loads"]
-TABLES = ("jsbsim", "mujoco", "simulink", "table", "fmu")
+TABLES = ("jsbsim", "mujoco", "table", "fmu")
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +112,8 @@ def save(files: Files, folder: Path) -> Path:
 
 
 def test_every_target_says_what_it_holds() -> None:
-    assert {"jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "simulink", "table", "fmu", "rotor-disk",
-            "su2-disk", "su2-bem", "flow360", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
+    assert {"jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "table", "fmu", "rotor-disk",
+            "su2-disk", "flow360", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
     for word, target in exports().items():
         assert target.id == word and target.title and target.holds and target.source and target.conventions
         assert target.kind in ("solid", "loads", "disk", "blade") and target.features <= set(FEATURES)
@@ -521,7 +521,7 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float, han
 @pytest.mark.parametrize("name", ["prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8", "ds30"])
 def test_every_case_becomes_every_disk(project: Path, name: str) -> None:
     asked = Job(load_case(project / f"cases/{name}/case.toml"), airspeed_m_s=25.0)
-    for word in ("rotor-disk", "su2-disk", "su2-bem", "flow360", "fan"):
+    for word in ("rotor-disk", "su2-disk", "flow360", "fan"):
         files = written(word, asked)
         assert files and all(len(data) > 50 for data in files.values())
         assert "nan" not in " ".join(str(data).lower() for data in files.values() if isinstance(data, str))

@@ -11,10 +11,10 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
-from bemt.data.readers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
+from bemt.data.readers import polar_c81, polar_csv, polar_xfoil
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
-KINDS = {m.KIND: m for m in (polar_aerodyn, polar_c81, polar_csv, polar_xfoil)}
+KINDS = {m.KIND: m for m in (polar_c81, polar_csv, polar_xfoil)}
 ALPHA = np.arange(-12.0, 16.5, 1.0)
 
 
@@ -75,35 +75,6 @@ def c81(alpha: np.ndarray, machs: np.ndarray, machs_d: np.ndarray | None = None)
     return "\n".join(out) + "\n"
 
 
-def aerodyn15(re_list: list[float], alpha: np.ndarray = ALPHA) -> str:
-    """AirfoilInfo file with one table per Reynolds number."""
-    out = ["! ------------ AirfoilInfo v1.01.x Input File ------", '"DEFAULT"   InterpOrd  ! order',
-           "1  NonDimArea ! area", "0  NumCoords  ! none",
-           f"{len(re_list)}   NumTabs    ! Number of airfoil tables in this file."]  # fmt: skip
-    for k, Re in enumerate(re_list):
-        out += [f"! data for table {k + 1}", f"{Re / 1e6:g}   Re   ! Reynolds number in millions", "0  UserProp ! none",
-                "True  InclUAdata ! yes", "-2.0  alpha0 ! deg", "6.2  C_nalpha ! 1/rad", f"{len(alpha)}  NumAlf ! rows",
-                "! Alpha Cl Cd Cm"]  # fmt: skip
-        out += [f"{a:10.3f} {cl_of(a, Re):10.4f} {cd_of(a, Re):10.4f} {-0.09:10.4f}" for a in alpha]
-    return "\n".join(out) + "\n"
-
-
-def aerodyn13(re_list: list[float], alpha: np.ndarray = ALPHA) -> str:
-    """Version 13 file as AirfoilPrep and CCBlade write it."""
-    out = ["AeroDyn airfoil file.  Compatible with AeroDyn v13.0.", "NACA 4412", "made for a test",
-           f"{len(re_list):<10d}\tNumber of airfoil tables in this file"]  # fmt: skip
-    labels = ("Control setting", "Stall angle (deg)", "Angle of attack for zero Cn for linear Cn curve (deg)",
-              "Cn slope for zero lift for linear Cn curve (1/rad)", "Cn at stall value for positive angle of attack",
-              "Cn at stall value for negative angle of attack", "Angle of attack for minimum CD (deg)",
-              "Minimum CD value")  # fmt: skip
-    for Re in re_list:
-        out.append(f"{Re / 1e6:<10g}\tReynolds number in millions.")
-        out += [f"{0.5:<10f}\t{label}" for label in labels]
-        out += [f"{a:g}\t{cl_of(a, Re):g}\t{cd_of(a, Re):g}\t-0.09" for a in alpha]
-        out.append("EOT")
-    return "\n".join(out) + "\n"
-
-
 @pytest.fixture
 def put(tmp_path: Path) -> Callable[[str], Path]:
     """Write text to a file whose extension says nothing."""
@@ -129,7 +100,6 @@ SAMPLES = {
     "polar_csv": csv([5e4, 2e5]),
     "polar_xfoil": xfoil(),
     "polar_c81": c81(ALPHA, np.array([0.0, 0.3, 0.6])),
-    "polar_aerodyn": aerodyn15([5e4, 1e6]),
 }
 
 
@@ -214,20 +184,6 @@ def test_c81_tables_with_other_mach_numbers_are_joined(put: Callable[[str], Path
     np.testing.assert_allclose(cd, 0.5 * (cd_of(ALPHA) + cd_of(ALPHA, 1e5, 0.8)), atol=1e-9)
 
 
-@pytest.mark.parametrize("write", [aerodyn13, aerodyn15])
-@pytest.mark.parametrize("re_list", [[7.5e5], [5e4, 2e5, 1e6]])
-def test_aerodyn_round_trip(write: Callable[..., str], re_list: list[float], put: Callable[[str], Path]) -> None:
-    p = polar_aerodyn.read(put(write(re_list)))
-    assert p.Re == pytest.approx(np.array(re_list))
-    for Re in p.Re:
-        same_data(p, float(Re))
-
-
-def test_aerodyn_zero_reynolds_of_a_single_table_means_not_stated(put: Callable[[str], Path]) -> None:
-    p = polar_aerodyn.read(put(aerodyn13([1e5]).replace("0.1       \tReynolds", "0.0       \tReynolds")))
-    assert "the source states no Reynolds number" in p.notes
-
-
 BASE = csv()
 ONE_REPEATED = BASE + "4,0.9999,0.0182,0\n"
 FAULTY: dict[str, tuple[str, str, list[str]]] = {
@@ -253,12 +209,6 @@ FAULTY: dict[str, tuple[str, str, list[str]]] = {
     "cut": ("polar_c81", "\n".join(SAMPLES["polar_c81"].splitlines()[:20]), ["end of the file in the lift table"]),
     "shifted": ("polar_c81", SAMPLES["polar_c81"].replace("    0.0 ", "   0.0x "), ["7 characters wide"]),
     "disordered": ("polar_c81", c81(ALPHA, np.array([0.3, 0.0])), ["ascending Mach numbers"]),
-    "count": ("polar_aerodyn", aerodyn15([1e5]).replace("29  NumAlf", "31  NumAlf"), ["29 rows after NumAlf = 31"]),
-    "tables": ("polar_aerodyn", aerodyn15([1e5]).replace("1   NumTabs", "2   NumTabs"), ["1 tables after NumTabs"]),
-    "not millions": ("polar_aerodyn", aerodyn15([1e11]), ["Re = 100000", "in millions"]),
-    "control": ("polar_aerodyn", aerodyn15([1e5, 1e5]).replace("0  UserProp", "5  UserProp", 1), ["control setting"]),
-    "id": ("polar_aerodyn", aerodyn13([1e5, 2e5]).replace("Reynolds number in millions.", "Table ID parameter"),
-           ["a table without Re"]),
 }  # fmt: skip
 
 

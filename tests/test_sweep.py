@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import json
 import math
 import multiprocessing
@@ -616,7 +615,6 @@ def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(so
 
 AXES = "[sweep]\nrpm = {start = 3000, stop = 9000, num = 50}\n"
 needs_sigkill = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
-needs_parquet = pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, reason="needs the extra 'dask'")
 
 
 @pytest.fixture
@@ -664,8 +662,6 @@ def other_thrust(data: bytes) -> bytes:
         ("grid.csv", cut, True),
         ("grid.csv", other_digit, True),
         ("grid.csv", lambda data: data + b"\n", True),
-        pytest.param("grid.parquet", cut, True, marks=needs_parquet),
-        pytest.param("grid.parquet", other_digit, True, marks=needs_parquet),
         ("result.json", other_thrust, True),
         ("result.json", without_rows, True),
         ("result.json", lambda data: b"[]", True),
@@ -677,8 +673,7 @@ def test_what_was_damaged_is_made_again(
     tmp_path: Path, counted: list[str], name: str, damage: Callable[[bytes], bytes] | None, again: bool
 ) -> None:
     path = make_case(tmp_path / "cases", extra=AXES)
-    form = "parquet" if name.endswith("parquet") else "csv"
-    sweep([path], tmp_path / "out", grid_format=form)
+    sweep([path], tmp_path / "out")
     whole = tree(tmp_path / "out")
     counted.clear()
     victim = tmp_path / "out" / "one" / name
@@ -687,7 +682,7 @@ def test_what_was_damaged_is_made_again(
     else:
         victim.write_bytes(damage(victim.read_bytes()))
         assert victim.read_bytes() != whole[f"one/{name}"]
-    sweep([path], tmp_path / "out", grid_format=form)
+    sweep([path], tmp_path / "out")
     assert tree(tmp_path / "out") == whole
     assert counted == ["one"] * again
 

@@ -179,7 +179,7 @@ def stations(
     Parameters
     ----------
     file : str or path
-        STL, OBJ, STEP; XROTOR, QPROP, DFDC or an AeroDyn driver.
+        STL, OBJ, STEP; XROTOR, QPROP, DFDC.
     unit : {"mm", "m", "in"}, optional
         Unit of an STL or OBJ that does not state it.
     out : str or path, optional

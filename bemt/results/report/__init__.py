@@ -28,7 +28,6 @@ def _pages(book: Book) -> Iterator[Page]:
     from bemt.results.report.case_page import case_sections, reproduction_table
     from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
     from bemt.results.report.front import answers, front_parts
-    from bemt.results.report.trends import trend_sections
     from bemt.results.report.values import Page, sections
     from bemt.results.report.verdicts import headline
 
@@ -46,8 +45,7 @@ def _pages(book: Book) -> Iterator[Page]:
         "reports/studies/reproduce.py where those data are."
     )
     told = sections(*((item.name, diagnosis_parts(item)) for item in book.diagnoses))
-    trends = Page("trends", "Trends", "Trends", [], trend_sections(book))
-    yield from (p for p in (trends, *book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
+    yield from (p for p in (*book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
     if numbers:
         top = [("words", thesis), ("table", numbers), ("more", inputs)]
         yield Page("reproduction", "Reproduction", "Every number of the source thesis", top, [])

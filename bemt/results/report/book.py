@@ -1,4 +1,4 @@
-"""What a report shows, typed: cases with their curves, trends, numbers of the source thesis, diagnoses, pages of tools.
+"""What a report shows, typed: cases with their curves, numbers of the source thesis, diagnoses, pages of tools.
 
 Arrays are along the abscissa that stands first; NaN where nothing is known.
 """
@@ -163,58 +163,6 @@ class Reproduced(Documented):
     note: str
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
-    """BEMT and K1/K2 over one quantity that is varied."""
-
-    x: Array
-    thrust_N: Array
-    k1k2_thrust_N: Array
-    M_tip: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Family:
-    """One propeller with one quantity varied at a time."""
-
-    name: str
-    title: str
-    D_in: float
-    pitch_in: float
-    rpm_case: float
-    mach_per_rpm: float
-    mach_per_inch: float
-    diameter: Line
-    pitch: Line
-    rpm: Line
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A drive on the robot of the source thesis, thrust over weight."""
-
-    name: str
-    thrust_N: float
-    u: float
-    power_W: float
-    disk_loading: float
-    g_per_W: float
-    robot_ratio: float
-    u_ratio: float
-    needed: float
-    recorded: Sequence[tuple[str, str, float]]  # Label, source, ratio of a recorded thrust
-
-
-@dataclass(frozen=True, eq=False)
-class Trends:
-    """The page of trends; last the thrusts of one drive of a pair: label, source, thrust and its u [N]."""
-
-    family: Family | None = None
-    choice: Sequence[Choice] = ()
-    pair: str = ""
-    moments: Sequence[tuple[str, str, float, float]] = ()
-
-
 class About(Documented):
     """Head of the page, as far as wanted."""
 
@@ -230,7 +178,6 @@ class Book:
 
     version: str
     cases: tuple[CasePage, ...]
-    trends: Trends
     reproduction: Sequence[Reproduced]
     exit_code: int
     tools: tuple[Page, ...] = ()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +14,18 @@ from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError
 from bemt.base.page import FIRST
 from bemt.base.tables import json_text, number_of, write_atomic
-from bemt.results.report import curves, trends
-from bemt.results.report.book import Book, CasePage, Diagnosed, Diagnosis, Reproduced, Trends
+from bemt.results.report import curves
+from bemt.results.report.book import Book, CasePage, Diagnosed, Diagnosis, Reproduced
 from bemt.results.report.found_files import read_json, safe_files
 from bemt.results.report.rotor_view import still
 from bemt.results.sweep.rows import Result
-from bemt.rotors.case import Case, find_cases, load_case
+from bemt.rotors.case import find_cases, load_case
 from geometry.common import GeometryError
 from geometry.surface import surfaces
 
 Progress = Callable[[str], None]
+ORIGIN = "Cahill 2025"
+"""What a case of the source thesis states as its ``origin``."""
 SCHEMAS = ("bemt.diagnosis/", "bemt.run-comparison/")
 """What a page shows: a diagnosis, or a recording of too few readings for one beside the model."""
 ALL_BYTES = 4_000_000
@@ -37,27 +38,22 @@ def gather(paths: Sequence[str | Path], out: Path, progress: Progress | None = N
 
     tell = progress or (lambda line: None)
     swept = sweep(paths, out, progress=tell)
-    pages, solved = [], []
+    pages = []
     for path, result in zip(find_cases(paths), swept.cases, strict=True):
         tell(f"report: {result.name}")
-        page, case = _case(path, result)
-        pages.append(page)
-        if case is not None and result.rows:
-            solved.append(case)
-    tell("report: trends")
-    thesis = [result for result in swept.cases if result.origin == trends.ORIGIN]  # the robot is that of the thesis
-    reproduced = _reproduction(out) if thesis else ()
-    book = Book(bemt.__version__, tuple(pages), _trends(solved, thesis), reproduced, swept.exit_code)
+        pages.append(_case(path, result))
+    reproduced = _reproduction(out) if any(r.origin == ORIGIN for r in swept.cases) else ()
+    book = Book(bemt.__version__, tuple(pages), reproduced, swept.exit_code)
     for part in plugins.loaded("REPORT_PARTS"):
         book = part(book, out)
     return attach_diagnoses(book, out)
 
 
-def _case(path: Path, result: Result) -> tuple[CasePage, Case | None]:
+def _case(path: Path, result: Result) -> CasePage:
     """Page of one case."""
     page = CasePage(result)
     if not result.rows:
-        return page, None
+        return page
     try:
         case = load_case(path)
         files = [(file.name, hashlib.sha256(file.read_bytes()).hexdigest()) for file in case.files()]
@@ -66,22 +62,13 @@ def _case(path: Path, result: Result) -> tuple[CasePage, Case | None]:
         page = replace(page, radial=curves.radial_curves(case))
         page = replace(page, refinement=curves.refinement(case))
     except (InputError, GeometryError, ValueError) as error:
-        return replace(page, problems=(f"some figures could not be computed: {error}",)), None
+        return replace(page, problems=(f"some figures could not be computed: {error}",))
     try:
         found = surfaces(case.rotor(), case.duct())
         page = replace(page, surfaces=found, picture=still(found))
     except GeometryError as error:
         page = replace(page, problems=(f"no picture: {error}",))
-    return page, case
-
-
-def _trends(solved: Sequence[Case], thesis: Sequence[Result]) -> Trends:
-    base = next((case for case in solved if not case.ducted), None)
-    family = None
-    if base is not None:
-        with suppress(InputError, GeometryError, ValueError):
-            family = trends.families(base)
-    return Trends(family, trends.choice(thesis), *trends.moments(thesis))
+    return page
 
 
 def _reproduction(out: Path) -> Sequence[Reproduced]:

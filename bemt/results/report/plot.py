@@ -72,12 +72,10 @@ def points(
 
 @dataclass(frozen=True)
 class Mark:
-    """A place on an axis: a line across the plot with words, or a shaded range beyond it."""
+    """A place on the x axis: a line across the plot with words."""
 
     at: float  # Where, in the unit of the axis
     words: str  # What is there
-    axis: str = "x"  # ``x`` or ``y``
-    beyond: str = ""  # Empty, ``above`` or ``below``: which side is outside of the range of a model
 
 
 @dataclass(frozen=True)
@@ -161,7 +159,7 @@ class _Frame:
         xs = [math.log10(x) for x in xs] if self.log else xs
         self.x0, self.x1 = _fit(xs, plot.x_zero and not self.log)
         self.y0, self.y1 = (-0.6, len(plot.y_names) - 0.4) if plot.y_names else _fit(ys, plot.zero)
-        above = 14 * sum(m.axis == "x" for m in plot.marks) if plot.y_names else 0  # words clear of the rows
+        above = 14 * len(plot.marks) if plot.y_names else 0  # words clear of the rows
         self.left, self.right, self.top, self.bottom = left, width - RIGHT, TOP + above, height - BOTTOM
 
     def x(self, v: float) -> float:
@@ -286,17 +284,9 @@ def _marks(plot: Plot, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str,
     words: list[dict[str, Any]] = []
     for mark in plot.marks:
         v = _number(mark.at)
-        if math.isnan(v) or (mark.axis == "x" and f.log and v <= 0):
+        if math.isnan(v) or (f.log and v <= 0):
             continue
-        p = f.x(v) if mark.axis == "x" else f.y(v)
-        if mark.axis == "y":
-            if f.top <= p <= f.bottom:
-                lines.append(("mark", f"M{f.left} {p:.1f}H{f.right}"))
-                words.append(_text(f.right - 4, p - 4, mark.words, "end", "note"))
-            continue
-        ends = (f.inside(p), f.right) if mark.beyond == "above" else (f.left, f.inside(p))
-        if mark.beyond and ends[1] > ends[0]:
-            lines.insert(0, ("beyond", f"M{ends[0]:.1f} {f.top}H{ends[1]:.1f}V{f.bottom}H{ends[0]:.1f}z"))
+        p = f.x(v)
         if f.left <= p <= f.right:
             lines.append(("mark", f"M{p:.1f} {TOP if plot.y_names else f.top}V{f.bottom}"))
             late = p > 0.62 * f.right

@@ -1,6 +1,6 @@
 """What a sweep keeps in its folder: results that know their content, of one sweep at a time.
 
-``DIR/<case>`` holds ``result.json``, ``table.txt`` and, when the case sweeps axes, ``grid.csv`` or ``grid.parquet``.
+``DIR/<case>`` holds ``result.json``, ``table.txt`` and, when the case sweeps axes, ``grid.csv``.
 A result says what it was made from (its fingerprint) and what it was when it was written (SHA-256 of itself and of the
 grid); one that was edited, cut off or made from something else is never used. It is removed before the case is solved
 anew, so that no reader takes an old one for the answer of a case that has failed or was interrupted.
@@ -17,7 +17,7 @@ from typing import Any
 
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
-from bemt.results.sweep.grid.formats import FORMATS, program_hash
+from bemt.results.sweep.grid.formats import program_hash
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.text import case_text, overview_text, rows_csv
 
@@ -36,7 +36,7 @@ def _seal(stored: Mapping[str, Any]) -> str:
     return hashlib.sha256(json_text(stored).encode(errors="backslashreplace")).hexdigest()
 
 
-def reuse(folder: Path, mark: str, form: str) -> Result | None:
+def reuse(folder: Path, mark: str) -> Result | None:
     """Take up the result of an earlier sweep; its table is written anew."""
     try:
         stored = json.loads((folder / RESULT).read_text(encoding="utf-8"))
@@ -44,7 +44,7 @@ def reuse(folder: Path, mark: str, form: str) -> Result | None:
         if stored["fingerprint"] != mark or seal != _seal(stored):
             return None
         result = Result.from_document(stored["result"])
-        if result.grid is not None and file_hash(folder / f"grid.{form}") != result.grid.sha256:
+        if result.grid is not None and file_hash(folder / "grid.csv") != result.grid.sha256:
             return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
@@ -61,7 +61,7 @@ def keep(folder: Path, mark: str, result: Result) -> None:
 
 def remove_result(folder: Path) -> None:
     """Remove the result of a case; finished chunks of its grid, which only their fingerprint makes a result, stay."""
-    for name in (RESULT, TABLE, *(f"grid.{form}" for form in FORMATS)):
+    for name in (RESULT, TABLE, "grid.csv"):
         with suppress(FileNotFoundError, NotADirectoryError):
             (folder / name).unlink()
 

@@ -98,7 +98,7 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
             out.append((x, read))
         else:
             got = f"a different type of file ({type(read).__name__})"
-            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL, C81 or AeroDyn"))
+            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL or C81"))
     if faults:
         raise InputError(faults)
     return out

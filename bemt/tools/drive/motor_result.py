@@ -3,85 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
-from bemt.tools.drive import motor_errors, motor_file, motor_generate, outputs, picture
+from bemt.tools.drive import motor_errors, motor_file, outputs, picture
 from bemt.tools.drive.motor_constant import Line
 
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
-
-
-def check_options(
-    file: str | None, generate: str | None, seed: int | None, plant: Sequence[str], out: str | None
-) -> None:
-    """Refuse options that would be ignored, all at once."""
-    faults = []
-    if not generate:
-        given = [("--plant", " ".join(plant)), ("--seed", seed)]
-        told = [(name, value) for name, value in given if value not in (None, "")]
-        faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in told]
-        if not file:
-            hint = "Or --generate DIR for an example"
-            faults.append(Fault("", "FILE", "nothing", "motor.toml or its folder", hint))
-    elif out and not file:
-        hint = "Name the generated folder as FILE too, to judge it at once"
-        faults.append(Fault("", "--out", out, "none with --generate DIR alone, which only writes to DIR", hint))
-    if faults:
-        raise InputError(faults)
-
-
-def generate(
-    target: str, seed: int | None, plant: Sequence[str], file: str | None = None, out: str | None = None
-) -> dict[str, Any]:
-    """Write generated trials; only generated files are overwritten."""
-    folder, seed = Path(target), seed or 0
-    faults: list[Fault] = []
-    planted: dict[str, float] = {}
-    texts: dict[str, str] = {}
-    try:
-        planted = motor_generate.plants(list(plant))
-    except InputError as error:
-        faults += error.faults
-    try:
-        texts = motor_generate.generate(seed, planted)
-    except InputError as error:
-        faults += error.faults
-    inputs: tuple[Path, ...] = ()
-    if file and Path(file).resolve() not in (folder.resolve(), (folder / "motor.toml").resolve()):
-        inputs = motor_file.read(file).files  # before writing: its faults leave nothing behind
-    faults += outputs.faults("--generate", folder, texts, inputs)
-    if out:
-        faults += outputs.faults("--out", Path(out), RESULTS, [*inputs, *(folder / name for name in texts)])
-    hint = "Name another folder: measured data are not replaced by generated data"
-    for name in texts:
-        if (folder / name).exists() and not _generated(folder / name):
-            faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))
-    if faults:
-        raise InputError(faults)
-    for name, content in texts.items():
-        write_atomic(folder / name, content)
-    return {
-        "schema": "bemt.motor.generated/1",
-        "folder": folder.as_posix(),
-        "files": list(texts),
-        "seed": seed,
-        "planted": planted,
-    }
-
-
-def _generated(path: Path) -> bool:
-    """Whether a file says in its first line that it was generated."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        return stream.readline(200).startswith(motor_generate.LABEL.encode())
 
 
 def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any]:
@@ -179,11 +111,6 @@ def text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
     if made["Kt"] is not None:
         lines.append(f"K_t = {made['Kt']:.5f} ± {1.96 * made['u_Kt']:.2g} N m/A (95 %)")
     return "\n".join(lines + [f"! {note}" for note in made["notes"]]) + "\n"
-
-
-def generated_text(made: dict[str, Any]) -> str:
-    """Say what was generated and how to go on."""
-    return f"generated trials (seed {made['seed']}); now: bemt lab motor {made['folder']}\n"
 
 
 def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, dict[str, Any]]:

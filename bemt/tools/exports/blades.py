@@ -78,14 +78,6 @@ class Frozen:
     at_alpha: Array
     at_M: Array
 
-    def at_mach(self) -> tuple[Array, Array]:
-        """Coefficients (S, Na) at the Mach number of the operating point, linear in its square as in the solver."""
-        out = []
-        for table in (self.cl, self.cd):
-            rows = [[np.interp(m * m, self.M**2, row) for row in one] for m, one in zip(self.at_M, table, strict=True)]
-            out.append(np.array(rows))
-        return out[0], out[1]
-
 
 def baked(job: Job, count: int = 20) -> Frozen:
     """Section tables as the solver uses them, all effects on sections included, at some of its stations."""

@@ -1,1 +1,1 @@
-"""Parameter grids, chunk by chunk: on this machine or a Dask cluster, CSV or Parquet (`run` joins them)."""
+"""Parameter grids, chunk by chunk: on this machine or a Dask cluster, as CSV (`run` joins them)."""

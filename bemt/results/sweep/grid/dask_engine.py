@@ -50,7 +50,7 @@ class _Work:
     grid: Grid
     files: dict[str, bytes]
     tables: dict[tuple[str, str], dict[str, Any]]
-    form: str | None
+    rows: bool
     program: str
     proof: str
 
@@ -65,12 +65,12 @@ def _proof(solver: GridSolver) -> str:
     return digest.hexdigest()
 
 
-def _packed(case: Case, grid: Grid, form: str | None) -> bytes:
+def _packed(case: Case, grid: Grid, rows: bool) -> bytes:
     """Work as bytes, with the numbers of this machine as its proof."""
     with cache.used() as tables:
         proof = _proof(GridSolver(case, grid))
     moved, files = _portable(case)
-    return pickle.dumps(_Work(moved, grid, files, dict(tables), form, program_hash(), proof))
+    return pickle.dumps(_Work(moved, grid, files, dict(tables), rows, program_hash(), proof))
 
 
 def _portable(case: Case) -> tuple[Case, dict[str, bytes]]:
@@ -115,7 +115,7 @@ def _solver(token: str, packed: bytes) -> GridSolver:
         (folder / name).write_bytes(data)
     for (kind, key), arrays in work.tables.items():
         cache.cached_arrays(kind, key, lambda arrays=arrays: arrays)  # type: ignore[misc]
-    solver = GridSolver(replace(work.case, path=folder / work.case.path), work.grid, 1, work.form)
+    solver = GridSolver(replace(work.case, path=folder / work.case.path), work.grid, 1, work.rows)
     _check(worker.address, "sample of the grid", _proof(solver), work.proof, "Use workers with the same processor")
     _own.held = (token, solver, folder)
     return solver
@@ -182,11 +182,11 @@ class Cluster:
             raise InputError(Fault("", "--scheduler", got, expected, hint)) from error
         return self._client
 
-    def __call__(self, case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
+    def __call__(self, case: Case, grid: Grid, numbers: Sequence[int], rows: bool) -> Generator[Solved]:
         """Solve chunks; few are out at a time."""
         if not numbers:
             return
-        packed = _packed(case, grid, form)
+        packed = _packed(case, grid, rows)
         client = self._connect()
         from distributed import KilledWorker, as_completed
         from distributed.client import FutureCancelledError

@@ -1,7 +1,6 @@
-"""Blocks of a grid as bytes, and finished blocks joined into one file: CSV or Parquet.
+"""Blocks of a grid as CSV of 7 significant digits, and finished blocks joined into one file.
 
-CSV shows 7 significant digits. Parquet keeps every bit of the numbers; it needs pyarrow, which the extra ``dask``
-brings. The bytes of a block depend on its numbers alone, and joining reads one block at a time.
+The bytes of a block depend on its numbers alone, and joining reads one block at a time.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +38,6 @@ def program_hash() -> str:
     return digest.hexdigest()
 
 
-FORMATS = ("csv", "parquet")
-ROW_GROUP = 50_000
-"""Rows of a row group of Parquet, about, at least: small blocks are put together, or the footer outgrows the data."""
-
-
 def require_extra(option: str, *modules: str) -> None:
     """Refuse an option whose optional packages are not installed."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
@@ -63,24 +56,15 @@ class Block:
     converged: NDArray[np.bool_]  # (N,) whether the point has a solution
 
 
-def encode(block: Block, form: str) -> bytes:
+def encode(block: Block) -> bytes:
     """Bytes of a block.
 
     >>> axis = {"rpm": (np.array([5000.0, 6000.0]), np.array([0, 1]))}
-    >>> print(encode(Block(axis, {"CT": np.array([0.1, np.nan])}, np.array([True, False])), "csv").decode(), end="")
+    >>> print(encode(Block(axis, {"CT": np.array([0.1, np.nan])}, np.array([True, False]))).decode(), end="")
     5000,1.000000e-01,1
     6000,nan,0
     """
-    if form == "csv":
-        return csv_block([*(_near(*axis) for axis in block.axes.values()), *block.columns.values(), block.converged])
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    cells: dict[str, NDArray[Any]] = {name: values[index] for name, (values, index) in block.axes.items()}
-    table = pa.table({**cells, **block.columns, "converged": block.converged})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, **_options(list(cells), list(block.columns)))
-    return bytes(sink.getvalue())
+    return csv_block([*(_near(*axis) for axis in block.axes.values()), *block.columns.values(), block.converged])
 
 
 def _near(values: NDArray[np.float64], index: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -89,24 +73,15 @@ def _near(values: NDArray[np.float64], index: NDArray[np.intp]) -> tuple[NDArray
     return values[low : int(index.max()) + 1], index - low
 
 
-def _options(axes: list[str], columns: list[str]) -> dict[str, Any]:
-    """How Parquet is written: an axis takes few values; the bytes of real numbers compress better sorted by place."""
-    encoding = dict.fromkeys(columns, "BYTE_STREAM_SPLIT")
-    return {"compression": "zstd", "use_dictionary": axes, "column_encoding": encoding}
-
-
-def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequence[Path], form: str) -> str:
+def join(target: Path, names: Sequence[str], parts: Sequence[Path]) -> str:
     """Put blocks together under a temporary name, in order, and rename."""
     temporary = target.with_name(f".{target.name}.tmp")
     try:
-        if form == "csv":
-            with temporary.open("wb") as out:
-                out.write(",".join(names).encode() + b"\n")
-                for path in parts:
-                    with path.open("rb") as part:
-                        shutil.copyfileobj(part, out, 1 << 20)
-        else:
-            _join_parquet(temporary, [n for n in names[:-1] if n not in axes], axes, parts)
+        with temporary.open("wb") as out:
+            out.write(",".join(names).encode() + b"\n")
+            for path in parts:
+                with path.open("rb") as part:
+                    shutil.copyfileobj(part, out, 1 << 20)
         digest = file_hash(temporary)
         temporary.replace(target)
         return digest
@@ -115,19 +90,3 @@ def join(target: Path, names: Sequence[str], axes: Sequence[str], parts: Sequenc
         raise
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def _join_parquet(target: Path, columns: list[str], axes: Sequence[str], parts: Sequence[Path]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    with pq.ParquetFile(parts[0]) as first:
-        schema = first.schema_arrow
-    with pq.ParquetWriter(target, schema, **_options(list(axes), columns)) as out:
-        held: list[Any] = []
-        for i, path in enumerate(parts):
-            with pq.ParquetFile(path) as part:
-                held.append(part.read(use_threads=False))
-            if i == len(parts) - 1 or sum(table.num_rows for table in held) >= ROW_GROUP:
-                out.write_table(pa.concat_tables(held).combine_chunks())
-                held = []

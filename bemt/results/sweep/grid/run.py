@@ -98,15 +98,15 @@ class Grid:
 
 
 Solved = tuple[int, bytes, Statistics]
-Engine = Callable[[Case, Grid, Sequence[int], str | None], Generator[Solved]]
-"""Solves chunks: (case, grid, numbers, format) to (number, bytes, statistics) in whatever order."""
+Engine = Callable[[Case, Grid, Sequence[int], bool], Generator[Solved]]
+"""Solves chunks: (case, grid, numbers, whether rows are wanted) to (number, bytes, statistics) in whatever order."""
 
 
 class GridSolver:
-    """Evaluates stretches of a grid; remembers the last geometry and states of the air. No `form`: statistics only."""
+    """Evaluates stretches of a grid, rows or statistics only; remembers the last geometry and states of the air."""
 
-    def __init__(self, case: Case, grid: Grid, threads: int = 1, form: str | None = "csv") -> None:
-        self.case, self.grid, self.threads, self.form = case, grid, threads, form
+    def __init__(self, case: Case, grid: Grid, threads: int = 1, rows: bool = True) -> None:
+        self.case, self.grid, self.threads, self.rows = case, grid, threads, rows
         self.columns = _columns(case)
         self._axes = dict(zip(grid.names, grid.values, strict=True))
         self._last: tuple[int, Any] = (-1, None)
@@ -175,14 +175,14 @@ def solve_chunk(solver: GridSolver, number: int) -> tuple[bytes, Statistics]:
         ends.append((float(good.min()), float(good.max())) if good.size else (math.nan, math.nan))
     statistics = Statistics(int(fine.size), int((~fine).sum()), *ends)
     told = Statistics.from_document(plain(statistics.document()))
-    return b"" if solver.form is None else encode(block, solver.form), told
+    return encode(block) if solver.rows else b"", told
 
 
 def _here(threads: int) -> Engine:
     """Engine in this process."""
 
-    def solve(case: Case, grid: Grid, numbers: Sequence[int], form: str | None) -> Generator[Solved]:
-        solver = GridSolver(case, grid, threads, form) if numbers else None
+    def solve(case: Case, grid: Grid, numbers: Sequence[int], rows: bool) -> Generator[Solved]:
+        solver = GridSolver(case, grid, threads, rows) if numbers else None
         for number in numbers:
             assert solver is not None
             yield number, *solve_chunk(solver, number)
@@ -205,14 +205,13 @@ def run_grid(
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
     resume: bool = True,
-    form: str = "csv",
     engine: Engine | None = None,
 ) -> GridResult | None:
     """Solve the grid of a case."""
     grid = Grid.of(case)
     if grid is None:
         return None
-    parts = None if folder is None else folder / f"grid.parts-{fingerprint[:16]}-{form}"
+    parts = None if folder is None else folder / f"grid.parts-{fingerprint[:16]}-csv"
     if folder is not None and parts is not None:
         for old in folder.glob("grid.parts-*"):
             if old != parts or not resume:
@@ -230,14 +229,14 @@ def run_grid(
 
     if parts is not None:
         for number in range(grid.chunks):
-            found = _finished(_part(parts, number, form))
+            found = _finished(_part(parts, number))
             if found is not None:
                 count(number, found)
     todo = [number for number in range(grid.chunks) if number not in statistics]
-    with closing((engine or _here(threads))(case, grid, todo, None if parts is None else form)) as solved:
+    with closing((engine or _here(threads))(case, grid, todo, parts is not None)) as solved:
         for number, data, made in solved:
             if parts is not None:
-                path = _part(parts, number, form)
+                path = _part(parts, number)
                 write_atomic(path, data)
                 told = plain(made.document())
                 record = {"statistics": told, "sha256": _seal(data, told)}
@@ -246,17 +245,17 @@ def run_grid(
     digest = None
     names = (*grid.names, *_columns(case), "converged")
     if folder is not None and parts is not None:
-        files = [_part(parts, number, form) for number in range(grid.chunks)]
-        digest = join(folder / f"grid.{form}", names, grid.names, files, form)
+        files = [_part(parts, number) for number in range(grid.chunks)]
+        digest = join(folder / "grid.csv", names, files)
         shutil.rmtree(parts, ignore_errors=True)
     axes = {n: Axis(v.size, v.min(), v.max()) for n, v in zip(grid.names, grid.values, strict=True)}
-    file = None if folder is None else f"{case.name}/grid.{form}"
+    file = None if folder is None else f"{case.name}/grid.csv"
     merged = _merge([statistics[number] for number in range(grid.chunks)])
     return GridResult(**vars(merged), axes=axes, columns=names, file=file, sha256=digest)
 
 
-def _part(parts: Path, number: int, form: str) -> Path:
-    return parts / f"{number:06d}.{form}"
+def _part(parts: Path, number: int) -> Path:
+    return parts / f"{number:06d}.csv"
 
 
 def _seal(data: bytes, statistics: Mapping[str, Any]) -> str:

@@ -8,14 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
 from bemt.tools.drive import motor_constant as mc
-from bemt.tools.drive.motor_errors import FACTORS
-
-PLANTS = ("back_emf.offset", "torque.offset", "torque.shunt", "data_sheet.factor", "back_emf.factor", "torque.factor")
-"""Errors that can be planted: offsets in V and N m, R_true/R_assumed, a factor on the method's result."""
-LABEL = "# generated, not measured"
-"""Start of the first line of every generated file; no other file may be replaced."""
 
 
 @dataclass(frozen=True)
@@ -41,31 +34,12 @@ class MotorBench:
     shunt_ohm: float = 250.0  # resistor as assumed. [ohm]
 
 
-def plants(words: list[str]) -> dict[str, float]:
-    """Read ``NAME=SIZE``; a factor may be written as in the verdict, ``back_emf.factor=sqrt(3)``."""
-    out, faults = {}, []
-    for word in words:
-        name, _, size = word.partition("=")
-        try:
-            value = FACTORS[size] if size in FACTORS else float(size)
-        except ValueError:
-            value = math.nan
-        if name not in PLANTS or not math.isfinite(value) or (value <= 0.0 and not name.endswith("offset")):
-            faults.append(Fault("", "--plant", repr(word), f"NAME=SIZE with NAME one of {', '.join(PLANTS)}"))
-        out[name] = value
-    if faults:
-        raise InputError(faults)
-    return out
-
-
 def generate(seed: int, planted: Mapping[str, float] | None = None, bench: MotorBench | None = None) -> dict[str, str]:
     """Generate trials and the motor.toml that describes them.
 
     The readings carry the error, the motor.toml does not know of it. The data sheet's K_v is drawn within its tolerance
     of what belongs to the true constant only when a seed other than 0 asks for it; seed 0 keeps the printed K_v.
     """
-    if seed < 0:
-        raise InputError(Fault("", "--seed", str(seed), "a whole number of 0 or more"))
     b, error = bench or MotorBench(), dict(planted or {})
     rng = np.random.default_rng(seed)
     winding = "delta"
@@ -78,7 +52,7 @@ def generate(seed: int, planted: Mapping[str, float] | None = None, bench: Motor
     gain_emf = 1.0 + b.u_gain_emf_pct / 100.0 * rng.standard_normal()
     gain_torque = 1.0 + b.u_gain_torque_pct / 100.0 * rng.standard_normal()
     shunt = b.shunt_ohm * error.get("torque.shunt", 1.0) * (1.0 + b.u_shunt_pct / 100.0 * rng.standard_normal())
-    label = f"{LABEL}: seed {seed}"
+    label = f"# generated, not measured: seed {seed}"
     rows = [label, "trial,rpm,peak_to_peak_V"]
     for k in range(b.emf_trials):
         slope = 2.0 * ke * gain_emf * error.get("back_emf.factor", 1.0) * (1.0 + b.sd_trial * rng.standard_normal())
