@@ -10,6 +10,8 @@ A reader is a module of this package that defines
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
 
+or ``READERS``, a tuple of objects with these names: formats that differ in words only are rows of one file.
+
 The file extension is ignored. If two readers claim a file, that is an error that asks for ``format =``.
 """
 
@@ -25,7 +27,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -238,12 +240,12 @@ def number(token: str) -> float | None:
 
 
 @cache
-def importers() -> Mapping[str, ModuleType]:
+def importers() -> Mapping[str, Any]:
     """Find the readers in this folder.
 
     Returns
     -------
-    mapping of str to module
+    mapping of str to module (or an object like one)
         By kind, sorted; read-only.
 
     Raises
@@ -251,17 +253,18 @@ def importers() -> Mapping[str, ModuleType]:
     TypeError
         If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
     """
-    found: dict[str, ModuleType] = {}
+    found: dict[str, Any] = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
-        kind = getattr(module, "KIND", None)
-        if kind is None:  # what readers share
-            continue
-        if not isinstance(kind, str) or not callable(getattr(module, "sniff", None)) or not hasattr(module, "read"):
-            raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
-        if kind in found:
-            raise TypeError(f"{module.__name__} repeats the kind {kind!r} of {found[kind].__name__}")
-        found[kind] = module
+        for reader in getattr(module, "READERS", (module,)):
+            kind = getattr(reader, "KIND", None)
+            if kind is None:  # what readers share
+                continue
+            if not isinstance(kind, str) or not callable(getattr(reader, "sniff", None)) or not hasattr(reader, "read"):
+                raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
+            if kind in found:
+                raise TypeError(f"{module.__name__} repeats the kind {kind!r}")
+            found[kind] = reader
     return MappingProxyType(dict(sorted(found.items())))
 
 

@@ -19,7 +19,7 @@ from dataclasses import replace
 from bemt.data.readers import SourceText, load_text
 from bemt.data.readers.cfd import Column, ExportRow, head_lines, history, numeric_table, unique
 from bemt.data.readers.columns import Channel, channels_of, dataset
-from bemt.data.readers.fluent_report import column_of
+from bemt.data.readers.histories import column_of
 from bemt.physics.dataset import Dataset
 
 KIND = "fluent_xy"
