@@ -14,8 +14,8 @@ from PIL import Image
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.tools.drive import motor_constant, motor_result, outputs
 from bemt.tools.drive import motor_constant as mc
-from bemt.tools.drive import motor_errors, motor_file, picture
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 
@@ -78,11 +78,11 @@ def test_oscilloscope_files_of_three_kinds(tmp_path: Path) -> None:
     )
     for name, text in (("k", keysight), ("p", plain), ("t", tek)):
         (tmp_path / name).write_text(text)
-        got_t, got_v = motor_file.read_waveform(tmp_path / name)
+        got_t, got_v = motor_result.read_waveform(tmp_path / name)
         assert np.allclose(got_t, t, atol=1e-8) and np.allclose(got_v, v, atol=1e-5), name
     (tmp_path / "none").write_text("a,b\n1,2\n2,3\n")
     with pytest.raises(InputError, match="no units"):
-        motor_file.read_waveform(tmp_path / "none")
+        motor_result.read_waveform(tmp_path / "none")
 
 
 def folder(tmp_path: Path, seed: int, planted: dict[str, float] | None = None) -> Path:
@@ -92,8 +92,8 @@ def folder(tmp_path: Path, seed: int, planted: dict[str, float] | None = None) -
 
 
 def verdict(tmp_path: Path, seed: int, planted: dict[str, float] | None = None):  # noqa: ANN201
-    trials = motor_file.read(folder(tmp_path, seed, planted))
-    return trials, motor_errors.judge(trials.measured)
+    trials = motor_result.read(folder(tmp_path, seed, planted))
+    return trials, motor_constant.judge(trials.measured)
 
 
 def test_clean_trials_name_no_error(tmp_path: Path) -> None:
@@ -125,11 +125,11 @@ def test_planted_offsets_and_resistors_are_named_and_measured(tmp_path: Path, na
     assert right >= 11 and inside >= 11 and constant >= 11
 
 
-@pytest.mark.parametrize("method", motor_errors.METHODS)
-@pytest.mark.parametrize("word", motor_errors.FACTORS)
+@pytest.mark.parametrize("method", motor_constant.METHODS)
+@pytest.mark.parametrize("word", motor_constant.FACTORS)
 def test_planted_convention_factors_are_named(tmp_path: Path, method: str, word: str) -> None:
     for seed in range(1, 4):
-        trials, got = verdict(tmp_path, seed, {f"{method}.factor": motor_errors.FACTORS[word]})
+        trials, got = verdict(tmp_path, seed, {f"{method}.factor": motor_constant.FACTORS[word]})
         assert got.named == (f"{method}.factor {word}",)
         best = got.explanations[0]
         assert abs(best.ke * trials.to_kt - 0.0311) <= 3.0 * best.u_ke * trials.to_kt
@@ -145,7 +145,7 @@ def test_what_cannot_be_told_apart_is_not_named(tmp_path: Path) -> None:
     path = folder(tmp_path, 4, {"torque.factor": 2.0}) / "motor.toml"
     text = path.read_text()
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("kv_")))
-    got = motor_errors.judge(motor_file.read(path).measured)
+    got = motor_constant.judge(motor_result.read(path).measured)
     found = {e.names for e in got.explanations}
     assert not got.named and {("torque.factor 2",), ("back_emf.factor 1/2",)} <= found
 
@@ -198,7 +198,7 @@ def test_waveforms_stand_for_trials(tmp_path: Path) -> None:
         'winding = "delta"', 'winding = "delta"\npole_pairs = 12'
     )
     (path / "motor.toml").write_text(text)
-    trials = motor_file.read(path)
+    trials = motor_result.read(path)
     assert trials.measured.back_emf is not None
     assert trials.measured.back_emf.slope == pytest.approx(ke, rel=1e-3)
 
@@ -244,6 +244,6 @@ def test_results_never_replace_trials(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("title", ["Motor", "Motor MN4006 KV380: generated trials, seed 0: nobody measured them, " * 3])
 def test_no_title_is_cut(title: str) -> None:
     trials = {"data sheet": np.array([0.0308]), "torque sensor": np.linspace(0.03, 0.032, 5)}
-    with Image.open(io.BytesIO(picture.box_plot(trials, {"adopted": 0.031}, "constant [N m/A]", title))) as page:
+    with Image.open(io.BytesIO(outputs.box_plot(trials, {"adopted": 0.031}, "constant [N m/A]", title))) as page:
         edges = np.asarray(page.convert("L"))[:, [0, -1]]
     assert edges.min() == 255, "ink on the edge"

@@ -24,8 +24,7 @@ from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.cfd.record import CampaignRecord
-from bemt.tools.cfd.rows import COLUMNS, TEXTS, RunRow
-from bemt.tools.cfd.schema import Campaign, load_campaign
+from bemt.tools.cfd.schema import COLUMNS, TEXTS, Campaign, RunRow, load_campaign
 from bemt.tools.cfd.worker import Worker, point_key
 
 if TYPE_CHECKING:

@@ -21,8 +21,7 @@ from bemt.data.readers import number
 from bemt.data.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
 from bemt.data.recordings.grid_study import grid_study, ratios
 from bemt.tools.cfd.balance import BALANCE_LIMIT
-from bemt.tools.cfd.rows import COLUMNS, TEXTS, LoadStudy, RunRow, Study
-from bemt.tools.cfd.schema import Campaign
+from bemt.tools.cfd.schema import COLUMNS, TEXTS, Campaign, LoadStudy, RunRow, Study
 from bemt.tools.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
 
 LOADS = ("thrust_N", "torque_Nm")

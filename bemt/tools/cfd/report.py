@@ -27,7 +27,7 @@ from bemt.results.report.values import Page, Section, picture, sections
 from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.rows import Conditions, Result, Row
 from bemt.rotors.validity import serious
-from bemt.tools.cfd.rows import RunRow, run_of
+from bemt.tools.cfd.schema import RunRow, run_of
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000

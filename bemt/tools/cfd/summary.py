@@ -18,8 +18,7 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import parted
 from bemt.tools.cfd.record import csv_rows, studies_of
-from bemt.tools.cfd.rows import RunRow, Study, run_of
-from bemt.tools.cfd.schema import Campaign, load_campaign
+from bemt.tools.cfd.schema import Campaign, RunRow, Study, load_campaign, run_of
 
 BANDS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.90, 1.0)
 """Edges of the bands. [R]"""

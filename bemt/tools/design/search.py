@@ -6,9 +6,9 @@ form:
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
 with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
-its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
-class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v and
-voltage, as in `drive`. Idle current and battery take the
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.motors_file`), and has the resistance of
+its class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v
+and voltage, as in `drive`. Idle current and battery take the
 shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
 
     k Omega_full = (1 - sag) V_oc - R I_full,   I_full = Q_full / (k (1 - idle)).
@@ -39,7 +39,7 @@ from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
-from bemt.tools.design import masses, rotor_loads
+from bemt.tools.design import motors_file, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
 
@@ -161,7 +161,7 @@ def choose(
         Mass of the vehicle; power, current and time are then those of hover instead of those at `thrust_N`. [kg]
     rest_kg : float, optional
         Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
-        this and what it weighs itself (:mod:`bemt.tools.design.masses`). [kg]
+        this and what it weighs itself (:mod:`bemt.tools.design.motors_file`). [kg]
     rotors : int
         Rotors that carry the vehicle.
     airspeed_m_s, max_diameter_in : float, optional
@@ -207,7 +207,7 @@ def choose(
                      fluid, coaxial, arm_mm)  # fmt: skip
     ends, counts = _several(kv), _several(blades)
     _check(ends, max_diameter_in, sure, counts)
-    room = math.inf if target.arm_m is None else masses.diameter_on(target.arm_m, target.arms) / INCH
+    room = math.inf if target.arm_m is None else motors_file.diameter_on(target.arm_m, target.arms) / INCH
     most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
@@ -289,7 +289,7 @@ def _target(
     if hover is not None and most < hover:
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
         raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
-    rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
+    rest = (1.0 - motors_file.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
     arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
                   thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
@@ -482,12 +482,12 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     ]  # fmt: skip
 
 
-def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> masses.Masses:
+def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> motors_file.Masses:
     """Mass of one rotor's parts for the thrust asked for at a speed."""
     torque = float(loads.torque_at(np.array([rpm]))[0])
-    arm = masses.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
+    arm = motors_file.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
     watts = torque * rpm * math.pi / 30.0 / EFFICIENCY
-    return masses.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    return motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
 
 
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:

@@ -13,8 +13,7 @@ import math
 from bemt.rotors.case import Case
 from bemt.rotors.case.drive_schema import DriveTable
 from bemt.rotors.case.motor import class_resistance
-from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.tools.drive.rotor_table import RotorMap
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor, RotorMap
 
 ROTOR_DENSITY = 0.06
 """Mass of a plastic two-blade propeller over its diameter squared: declared. [kg/m2]"""

@@ -24,9 +24,8 @@ from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
-from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
-from bemt.tools.drive.drive_model import EFFECTS, Drive, Steady
-from bemt.tools.drive.rotor_table import RotorMap
+from bemt.tools.drive import case_drive, drive_model, mission, outputs
+from bemt.tools.drive.drive_model import EFFECTS, Drive, RotorMap, Steady
 
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
@@ -242,12 +241,12 @@ def _carried(
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()
-    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s)
+    rpm, V = drive_model.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s)
     found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
     rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
 
     def rotor(loads: Mapping[str, Array]) -> RotorMap:
-        return rotor_table.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
+        return drive_model.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
 
     own = rotor(found.nominal)
     drive = case_drive.drive_of(case, own).without(*off)
@@ -402,4 +401,4 @@ def write(found: DriveResult, out: str | Path) -> None:
     if found.course is not None:
         series = [("", found.course.time_s, found.course.thrust_N, "-")]
         panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
-    write_atomic(folder / RESULTS[2], picture.curves(panels, found.case.name))
+    write_atomic(folder / RESULTS[2], outputs.curves(panels, found.case.name))

@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import plain, write_atomic
 from bemt.base.toml import Table
 from bemt.rotors.case.schema import PointTable
-from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
+from bemt.tools.exports.parts import CHECK_ANGLES, HubTable, hub_of
 from bemt.tools.exports.performance import (
     Loading,
     Performance,

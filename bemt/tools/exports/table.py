@@ -9,8 +9,16 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.tables import csv_text, json_text
 from bemt.tools.exports.base import Files, Job, LoadsExport
-from bemt.tools.exports.hub import COEFFICIENTS, hub_document, hub_loads
-from bemt.tools.exports.parts import header, plain_name, still_hub, table_document, table_of_document
+from bemt.tools.exports.parts import (
+    COEFFICIENTS,
+    header,
+    hub_document,
+    hub_loads,
+    plain_name,
+    still_hub,
+    table_document,
+    table_of_document,
+)
 
 _LOOKUP = """
 /* Thrust [N] and shaft torque [N m] at rev/min, axial airspeed [m/s] and density [kg/m3];

@@ -92,7 +92,7 @@ class FlightsAnswer:
 
 def layouts() -> dict[str, str]:
     """Layouts by name: angle of each motor from ahead to the left [deg], with + for one that turns to the left."""
-    from bemt.tools.flight.layout import LAYOUTS
+    from bemt.tools.flight.log import LAYOUTS
 
     return dict(LAYOUTS)
 

@@ -16,8 +16,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.data.readers import crazyflie_log
-from bemt.tools.flight.layout import layout_of, mixed
-from bemt.tools.flight.log import FlightLog, joined, thrust_axis
+from bemt.tools.flight.log import FlightLog, joined, layout_of, mixed, thrust_axis
 
 KIND = "Crazyflie usdlog"
 

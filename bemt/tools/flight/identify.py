@@ -2,7 +2,7 @@
 
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
-Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.batches`).
+Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.identify`).
 """
 
 from __future__ import annotations
@@ -11,12 +11,63 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.tools.flight.batches import BATCHES, half_width, jackknifed
 from bemt.tools.flight.log import FlightLog
+
+# Uncertainty of a time series from pieces of it: samples of one flight are not independent, its tenths nearly are.
+#
+# Batch means (Law, Simulation Modeling and Analysis, ch. 9), and for a regression the delete-a-group jackknife (Kott,
+# J. Official Statistics 17, 2001; neither checked there).
+
+BATCHES = 10
+"""Pieces of a flight."""
+
+
+def u_of_mean(values: ArrayLike) -> float:
+    """Standard uncertainty of the mean of a series in order of time, 10 values or more.
+
+    >>> u_of_mean(np.ones(40))
+    0.0
+    """
+    means = [b.mean() for b in np.array_split(np.asarray(values, dtype=float), BATCHES)]
+    return float(np.std(means, ddof=1) / np.sqrt(BATCHES))
+
+
+def half_width(of_batches: ArrayLike) -> float:
+    """Half width of the 95 % interval of a mean, from its value in each batch.
+
+    >>> round(half_width([1.0, 2.0, 3.0]), 3)
+    2.484
+    """
+    from scipy import stats
+
+    v = np.asarray(of_batches, dtype=float)
+    return float(stats.t.ppf(0.975, v.size - 1) * v.std(ddof=1) / np.sqrt(v.size))
+
+
+def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
+    """Least squares of readings in order of time, with standard uncertainties from ten fits that each lack a tenth.
+
+    >>> x = np.linspace(0.0, 1.0, 50)
+    >>> jackknifed(x[:, None], 2.0 * x)[0]
+    array([2.])
+    """
+
+    def fitted(keep: NDArray[np.bool_]) -> Array:
+        return np.asarray(np.linalg.lstsq(X[keep], y[keep], rcond=None)[0], dtype=float)
+
+    every = np.ones(y.size, dtype=bool)
+    parts = []
+    for p in np.array_split(np.arange(y.size), BATCHES):
+        keep = every.copy()
+        keep[p] = False
+        parts.append(fitted(keep))
+    spread = np.array(parts) - np.mean(parts, axis=0)
+    return fitted(every), np.asarray(np.sqrt((BATCHES - 1) * np.mean(spread**2, axis=0)))
+
 
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
@@ -140,7 +191,7 @@ def _yaw(
     log: FlightLog, on: NDArray[np.bool_], power: Array, speeds: bool, out: dict[str, Constant], unseen: list[str]
 ) -> None:
     """Angular acceleration in yaw over the difference of the two directions of turning."""
-    from bemt.tools.flight.layout import layout_of
+    from bemt.tools.flight.log import layout_of
 
     known = layout_of(log.layout, log.rotors)
     if log.rates is None or known is None:

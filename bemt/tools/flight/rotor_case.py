@@ -10,7 +10,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError
 from bemt.judge.diagnose.rotor_calibration import learn
 from bemt.rotors.model import air_fields, air_of_points
-from bemt.tools.flight.repeat import flight_scatter
+from bemt.tools.flight.sessions import flight_scatter
 
 if TYPE_CHECKING:
     from bemt.rotors.as_measured import AsMeasured
@@ -25,7 +25,7 @@ def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Ident
     """Condition the rotor of a case on hovering flights, one point a flight, by the names of their logs.
 
     Thrust is that of the rotor where it sits: body in its wash and neighbours included. Flights differ by what
-    :func:`bemt.tools.flight.repeat.flight_scatter` says; all share the uncertainty of the density. InputError when a
+    :func:`bemt.tools.flight.sessions.flight_scatter` says; all share the uncertainty of the density. InputError when a
     flight has no thrust constant in N/rpm^2, or one that is not of this propeller.
     """
     faults, k, own, rpm = [], [], [], []

@@ -32,7 +32,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.tools.flight.batches import BATCHES, jackknifed, u_of_mean
+from bemt.tools.flight.identify import BATCHES, jackknifed, u_of_mean
 from bemt.tools.flight.log import FlightLog
 
 _SMOOTH_S = 0.2
