@@ -109,7 +109,7 @@ MUTANTS = (
     Mutant("bemt/base/averaging.py", "0.0 if t[0] == 0.0 else min(dt[0], t[0])", "dt[0] if t[0] == 0.0 else min(dt[0], t[0])",
            "test_cfd_numbers.py"),
     Mutant("bemt/base/averaging.py", 'edges[:-1] + slack, side="right"', 'edges[:-1] - slack, side="left"', "test_cfd_numbers.py"),
-    Mutant("bemt/data/readers/_unit_text.py", '"kgf/W": units.Unit("N_W", "efficacy", units.KGF)',
+    Mutant("bemt/data/readers/unit_text.py", '"kgf/W": units.Unit("N_W", "efficacy", units.KGF)',
            '"kgf/W": units.Unit("N_W", "efficacy", 1.0)', f"{RECORDINGS} -k mutant_changed"),
     Mutant("bemt/data/readers/_headings.py", '("Hz", "1/s")', '("Hz",)', f"{RECORDINGS} -k mutant_changed"),
     Mutant("bemt/data/readers/coaxial_stand.py", "values[0] = np.nan", "pass", f"{RECORDINGS} -k tare"),

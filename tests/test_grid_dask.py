@@ -21,9 +21,9 @@ from test_sweep import make_case, tree
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
+from bemt.results.sweep import grid as grid_module
 from bemt.results.sweep import sweep
-from bemt.results.sweep.grid import run as grid_module
-from bemt.results.sweep.grid.run import Grid, GridSolver
+from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.rotors.case import load_case
 
 needs_dask = pytest.mark.skipif(
@@ -149,7 +149,7 @@ def test_a_worker_that_gives_other_bits_is_refused(
     tmp_path: Path, cluster: Any, monkeypatch: pytest.MonkeyPatch, what: str, words: str
 ) -> None:
     path = make_case(tmp_path / "cases", extra=GRID)
-    monkeypatch.setattr(f"bemt.results.sweep.grid.dask_engine.{what}", lambda *_: "0123456789abcdef")
+    monkeypatch.setattr(f"bemt.results.sweep.dask_engine.{what}", lambda *_: "0123456789abcdef")
     found = sweep([path], tmp_path / "out", engine="dask", scheduler=cluster.scheduler_address).cases[0]
     assert found.exit_code == 2 and len(found.faults) == 1
     assert found.faults[0].startswith("worker tcp://") and f": {words}: got other bits" in found.faults[0]
@@ -158,7 +158,7 @@ def test_a_worker_that_gives_other_bits_is_refused(
 
 @needs_dask
 def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
-    from bemt.results.sweep.grid.dask_engine import _portable
+    from bemt.results.sweep.dask_engine import _portable
 
     path = make_case(tmp_path / "cases", extra=GRID)
     (tmp_path / "shared").mkdir()
@@ -218,7 +218,7 @@ def test_options_that_contradict_are_refused_together(tmp_path: Path) -> None:
 def test_a_scheduler_that_does_not_answer_is_a_fault_of_the_input(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("bemt.results.sweep.grid.dask_engine.PATIENCE", 0.5)
+    monkeypatch.setattr("bemt.results.sweep.dask_engine.PATIENCE", 0.5)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"

@@ -22,13 +22,12 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate, solve_at
 from bemt.rotors.conditioning import condition
 from bemt.rotors.latents import NAMES, Prior, Sensed
-from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import WEIGHTS, Population, population, sizes
-from bemt.rotors.predict import Prediction, predict
+from bemt.rotors.predict import LEVELS, Prediction, half_width, inside, pair_half_width, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
-from bemt.rotors.validate import built
-from bemt.rotors.validate.built import MeasuredRotor
+from bemt.rotors.validate import points
+from bemt.rotors.validate.points import MeasuredRotor
 from bemt.rotors.validity import Validity
 
 K = len(NAMES)
@@ -296,7 +295,7 @@ def test_likelihood_of_all_rotors_at_once_is_that_of_a_mixture_of_normal_laws() 
     rotors[1] = replace(rotors[1], **short, static=rotors[1].static[:6], y=rotors[1].y[:, :6])
     together = Rotors(rotors).log_likelihood(p)
     for m, value in zip(rotors, together, strict=True):
-        at, law = m.part(fit.counted(m)), built.law(p, m)
+        at, law = m.part(fit.counted(m)), points.law(p, m)
         top = np.abs(at.top).reshape(-1)
         T = np.moveaxis(at.T, 1, 2).reshape(top.size, K) / top[:, None]
         N = (p.rest(at) + np.diag(p.noise_sd(at).reshape(-1) ** 2)) / np.outer(top, top)

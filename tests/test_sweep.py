@@ -27,11 +27,10 @@ from bemt.physics.bem import Model
 from bemt.physics.k1k2 import U_MEASURED
 from bemt.results.sweep import batch, fingerprint
 from bemt.results.sweep import batch as sweep_module
+from bemt.results.sweep import grid as grid_module
+from bemt.results.sweep.answer import summary as summary_of
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.comparison import Comparison
-from bemt.results.sweep.grid import run as grid_module
-from bemt.results.sweep.rows import Result
-from bemt.results.sweep.summary import summary as summary_of
+from bemt.results.sweep.rows import Comparison, Result
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bemt.app import old_names
+from bemt.app import registry
 from bemt.app.terminal import complain, progress
 from bemt.base.action import Declaration, about, check_counts, did_you_mean
 from bemt.base.errors import EXIT_OK
@@ -246,7 +246,7 @@ def _fault(one: Parameter, got: str, expected: str) -> Exception:
 
 def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
     """Words of a command line, by the parameters of its action."""
-    typed = old_names.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
+    typed = registry.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
     if "--help-all" in typed:
         parser_of(function, prog, everything=True).print_help()
         raise SystemExit(EXIT_OK)

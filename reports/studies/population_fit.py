@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt.rotors.latents import NAMES, Sensed
 from bemt.rotors.population import SHARED, WEIGHTS, Family, Population, bias_columns, sizes
-from bemt.rotors.validate.built import MeasuredRotor, law
+from bemt.rotors.validate.points import MeasuredRotor, law
 
 Array = NDArray[np.float64]
 

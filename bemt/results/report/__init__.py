@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from bemt.results.report.book import Book
-    from bemt.results.report.values import Page
+    from bemt.results.report.book import Book, Page
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
@@ -25,10 +24,10 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
 def _pages(book: Book) -> Iterator[Page]:
     """Pages in the order of the menu."""
+    from bemt.results.report.book import Page, sections
     from bemt.results.report.case_page import case_sections, reproduction_table
     from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
     from bemt.results.report.front import answers, front_parts
-    from bemt.results.report.values import Page, sections
     from bemt.results.report.verdicts import headline
 
     names = [page.result.name for page in book.cases]

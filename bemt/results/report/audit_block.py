@@ -9,8 +9,8 @@ from typing import Any
 from bemt.base.page import Cell, num, table
 from bemt.data.recordings.audit import Audit
 from bemt.data.recordings.grid_study import LOADS, LoadStudy
+from bemt.results.report.book import Part
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
-from bemt.results.report.values import Part
 
 KIND = {"fine": "fine", "doubtful": "doubtful", "fault": "fault", "not stated": "unknown"}
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bemt.base.page import FIRST, num, table
-from bemt.results.report.book import CasePage, Diagnosed, Told
-from bemt.results.report.values import Part, picture
+from bemt.results.report.book import CasePage, Diagnosed, Part, Told, picture
 from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",

@@ -9,10 +9,9 @@ from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.results.report.book import Book, CasePage
+from bemt.results.report.book import Answer, Book, CasePage, Part, uri
 from bemt.results.report.diagnosis_block import diagnosis_verdict, page_verdict
 from bemt.results.report.plot import Mark, Plot, figure, points
-from bemt.results.report.values import Answer, Part, uri
 from bemt.results.report.verdicts import answer, headline, verdict
 
 SOURCES = {

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemt.base.arrays import Array
-from geometry.surface import Surface
+from geometry.mesh import Surface
 
 COLOURS = {"blade": "#4f93c4", "hub": "#8d99a6", "duct": "#c9973f", "cut": "#e3c58c", "stator": "#b58a4a"}
 OPEN, CUT_OPEN = (-0.25, 0.95, 1.25), (0.45, 1.05, 0.95)

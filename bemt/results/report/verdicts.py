@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.tables import number_text
-from bemt.results.sweep.comparison import Comparison, State
-from bemt.results.sweep.rows import Result, Row
+from bemt.results.sweep.rows import Comparison, Result, Row, State
 
 NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight", "openfoam": "own CFD"}
 """Sources in the order in which they are spoken of."""

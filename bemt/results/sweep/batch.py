@@ -9,6 +9,7 @@ otherwise it is removed before the case is solved. So a case that fails has no r
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import signal
@@ -26,13 +27,12 @@ from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.grid.formats import require_extra
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.store import SCHEMA, fingerprint
 from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
 
 if TYPE_CHECKING:
-    from bemt.results.sweep.grid.run import Engine
+    from bemt.results.sweep.grid import Engine
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -99,7 +99,7 @@ def run_case(
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
         grid = None
         if case.axes():
-            from bemt.results.sweep.grid.run import run_grid
+            from bemt.results.sweep.grid import run_grid
 
             grid = run_grid(
                 case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, engine
@@ -217,7 +217,7 @@ def sweep(
             stack.enter_context(store.locked(folder))
         on: Engine | None = None
         if engine == "dask":
-            from bemt.results.sweep.grid.dask_engine import Cluster
+            from bemt.results.sweep.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:
@@ -297,3 +297,11 @@ def off_tolerance(result: Result, tolerance: float) -> list[str]:
     if grid and grid.unconverged:
         reasons.append(f"{result.name}: {grid.unconverged} of {grid.points} grid points unconverged")
     return reasons
+
+
+def require_extra(option: str, *modules: str) -> None:
+    """Refuse an option whose optional packages are not installed."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        expected = "the optional packages of the extra 'dask'"
+        raise InputError(Fault("", option, f"no {' and no '.join(missing)}", expected, "pip install 'bemt[dask]'"))

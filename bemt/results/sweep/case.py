@@ -18,10 +18,10 @@ from bemt.base import plugins, units
 from bemt.base.arrays import Array
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
-from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.rows import (
     ROW_SOURCES,
     AssumptionRow,
+    Comparison,
     Conditions,
     Fan,
     FullThrottle,
@@ -248,8 +248,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
 
 def _audit(row: Row, ready: Model | PairModel, ducted: bool) -> Audit:
     """Audit of a recorded CFD value by its remark."""
-    from bemt.data.recordings.audit import Audit, CfdFacts
-    from bemt.data.recordings.audit_remarks import facts_from_remark
+    from bemt.data.recordings.audit import Audit, CfdFacts, facts_from_remark
 
     D = ready.diameter_m
     known = CfdFacts(M_tip=float(row.M_tip), J=row.airspeed_m_s / (row.rpm / 60.0 * D),

@@ -9,15 +9,17 @@ anew, so that no reader takes an old one for the answer of a case that has faile
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import bemt
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import file_hash, json_text, write_atomic
-from bemt.results.sweep.grid.formats import program_hash
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.text import case_text, overview_text, rows_csv
 
@@ -99,3 +101,19 @@ def locked(folder: Path) -> Iterator[None]:
         with suppress(OSError):  # Windows keeps open files: there it stays
             (folder / LOCK).unlink()
         lock.release()
+
+
+@lru_cache(maxsize=1)
+def program_hash() -> str:
+    """Hash of the program text and of the libraries that decide numbers."""
+    digest = hashlib.sha256(bemt.__version__.encode())
+    here = Path(bemt.__file__).parent
+    for folder in (here, here.parent / "geometry"):
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes())
+    for library in ("numpy", "numba", "neuralfoil"):
+        try:
+            digest.update(f"{library} {importlib.metadata.version(library)}\0".encode())
+        except importlib.metadata.PackageNotFoundError:
+            digest.update(f"{library} absent\0".encode())
+    return digest.hexdigest()

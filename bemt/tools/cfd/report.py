@@ -20,12 +20,10 @@ from bemt.base.page import num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
 from bemt.results.report.audit_block import audit_parts
-from bemt.results.report.book import Book, CasePage
-from bemt.results.report.found_files import read_json, safe_files
+from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
+from bemt.results.report.gather import read_json, safe_files
 from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
-from bemt.results.report.values import Page, Section, picture, sections
-from bemt.results.sweep.comparison import Comparison
-from bemt.results.sweep.rows import Conditions, Result, Row
+from bemt.results.sweep.rows import Comparison, Conditions, Result, Row
 from bemt.rotors.validity import serious
 from bemt.tools.cfd.schema import RunRow, run_of
 

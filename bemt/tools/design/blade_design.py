@@ -29,7 +29,7 @@ from bemt.tools.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
     from bemt.physics.bem.model import Model
-    from geometry.blade import Blade
+    from geometry.rotor import Blade
 
 Progress = Callable[[str], None]
 

@@ -17,7 +17,7 @@ from bemt.tools.design.minimum_loss import MinimumLoss, minimum_loss
 from bemt.tools.design.problem import BladeProblem, Values, top_lift
 from bemt.tools.design.requirement import Requirement
 from bemt.tools.design.shape import CONTROLS, Shape
-from geometry.blade import Blade, from_stations
+from geometry.rotor import Blade, from_stations
 
 if TYPE_CHECKING:
     from bemt.physics.bem.model import Model

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from bemt.physics.bem.model import Model
     from bemt.physics.bem.solver import Prepared
     from bemt.physics.sections.polars import Polar
-    from geometry.blade import Stations
+    from geometry.rotor import Stations
 
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
 _ALPHA, _W, _AXIAL, _SWIRL, _CL, _ROOM, _LIFT = range(2, 9)  # the last two are added here

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from geometry.blade import Blade, Stations
+from geometry.rotor import Blade, Stations
 
 CONTROLS = 5
 """Control points of the chord, and as many of the blade angle."""

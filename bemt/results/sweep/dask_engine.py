@@ -27,8 +27,8 @@ import numpy as np
 
 from bemt.base import cache
 from bemt.base.errors import Fault, InputError
-from bemt.results.sweep.grid.formats import program_hash
-from bemt.results.sweep.grid.run import Grid, GridSolver, Solved, solve_chunk
+from bemt.results.sweep.grid import Grid, GridSolver, Solved, solve_chunk
+from bemt.results.sweep.store import program_hash
 from bemt.rotors.case import Case
 from bemt.rotors.case.schema import CaseFile
 

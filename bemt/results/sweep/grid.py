@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.tables import plain, write_atomic
+from bemt.base.tables import csv_block, file_hash, plain, write_atomic
 from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS
-from bemt.results.sweep.grid.formats import Block, encode, join
 from bemt.results.sweep.rows import Axis, GridResult, Statistics
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import prepared, solve_at
@@ -31,6 +30,58 @@ from bemt.rotors.case.propagate import prepared, solve_at
 if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.dataset import Dataset
+
+
+# Blocks of a grid as CSV of 7 significant digits, and finished blocks joined into one file.
+#
+# The bytes of a block depend on its numbers alone, and joining reads one block at a time.
+
+
+@dataclass(frozen=True)
+class Block:
+    """N rows of a grid."""
+
+    # (A,) values of each axis, in the unit of its name, and which one holds in each row
+    axes: dict[str, tuple[NDArray[np.float64], NDArray[np.intp]]]
+    columns: dict[str, NDArray[np.float64]]  # (N,) results, in the unit of the name; NaN where not converged
+    converged: NDArray[np.bool_]  # (N,) whether the point has a solution
+
+
+def encode(block: Block) -> bytes:
+    """Bytes of a block.
+
+    >>> axis = {"rpm": (np.array([5000.0, 6000.0]), np.array([0, 1]))}
+    >>> print(encode(Block(axis, {"CT": np.array([0.1, np.nan])}, np.array([True, False]))).decode(), end="")
+    5000,1.000000e-01,1
+    6000,nan,0
+    """
+    return csv_block([*(_near(*axis) for axis in block.axes.values()), *block.columns.values(), block.converged])
+
+
+def _near(values: NDArray[np.float64], index: NDArray[np.intp]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Only the stretch of an axis that occurs: formatting a long axis in every block would cost the square."""
+    low = int(index.min())
+    return values[low : int(index.max()) + 1], index - low
+
+
+def join(target: Path, names: Sequence[str], parts: Sequence[Path]) -> str:
+    """Put blocks together under a temporary name, in order, and rename."""
+    temporary = target.with_name(f".{target.name}.tmp")
+    try:
+        with temporary.open("wb") as out:
+            out.write(",".join(names).encode() + b"\n")
+            for path in parts:
+                with path.open("rb") as part:
+                    shutil.copyfileobj(part, out, 1 << 20)
+        digest = file_hash(temporary)
+        temporary.replace(target)
+        return digest
+    except OSError as error:  # a full disk names no file; the temporary one nobody knows
+        error.filename = str(target)
+        raise
+    finally:
+        temporary.unlink(missing_ok=True)
+
 
 CHUNK = 50_000
 """Points per chunk, at most."""
