@@ -112,7 +112,7 @@ MUTANTS = (
     Mutant("bemt/data/readers/unit_text.py", '"kgf/W": units.Unit("N_W", "efficacy", units.KGF)',
            '"kgf/W": units.Unit("N_W", "efficacy", 1.0)', f"{RECORDINGS} -k mutant_changed"),
     Mutant("bemt/data/readers/_headings.py", '("Hz", "1/s")', '("Hz",)', f"{RECORDINGS} -k mutant_changed"),
-    Mutant("bemt/data/readers/coaxial_stand.py", "values[0] = np.nan", "pass", f"{RECORDINGS} -k tare"),
+    Mutant("bemt/data/readers/stands.py", "values[0] = np.nan", "pass", f"{RECORDINGS} -k tare"),
     Mutant("bemt/data/readers/_stations.py", "(0.5 if found[1] else 1.0)", "1.0", "test_stations_new.py -k over"),
     Mutant("bemt/data/readers/_stations.py", "np.arctan2(beta, 2.0 * np.pi * x)", "np.arctan2(beta, np.pi * x)",
            "test_strangers.py -k stations"),

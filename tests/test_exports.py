@@ -578,20 +578,20 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
 
 def test_dfdc_puts_the_rotor_where_the_case_has_it(fan: Job, tmp_path: Path) -> None:
     """Behind the lip, wherever the origin of the file lies; a third of the length unless the case says more."""
-    from bemt.data.readers import dfdc
+    from bemt.data.readers import blade
 
     for stated, x in ((None, 20.0), (25.0, 25.0)):
         case = fan.case if stated is None else fan.case.replaced({"duct.rotor_position_mm": stated})
         text = str(exports()["dfdc"].write(Job(case, fan.rpm, 20.0))["ds30.case"])
         (tmp_path / "a.case").write_text(text)
-        duct = dfdc.read(tmp_path / "a.case").duct
+        duct = blade.read_dfdc(tmp_path / "a.case").duct
         assert duct is not None and duct["rotor_position_mm"] == pytest.approx(x, abs=1e-6)
         head, geometry = text.split("GEOM\n", 1)
         name, *rows = geometry.split("ENDGEOM")[0].splitlines()
         moved = [row if "999" in row else f" {float(row.split()[0]) + 0.5:.10f} {row.split()[1]}" for row in rows]
         head = re.sub(r"(Nblds\s+NRPdef\n )([\d.]+)", lambda m: f"{m[1]}{float(m[2]) + 0.5:.9g}", head)
         (tmp_path / "b.case").write_text(head + "\n".join(["GEOM", name, *moved, "ENDGEOM", ""]))
-        assert dfdc.read(tmp_path / "b.case").duct == pytest.approx(duct, abs=1e-5)
+        assert blade.read_dfdc(tmp_path / "b.case").duct == pytest.approx(duct, abs=1e-5)
 
 
 def test_what_dfdc_holds_of_a_fan_is_near_the_fan(fan: Job, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.data.readers import detect, dfdc, qprop, xrotor
+from bemt.data.readers import blade, detect
 from bemt.data.readers.stations import read_stations
 from bemt.physics.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
 from bemt.rotors.case import load_case
@@ -116,7 +116,7 @@ walls
 ENDGEOM
 """
 FILES = {"qprop": QPROP, "xrotor": XROTOR, "dfdc": DFDC}
-READERS = {"qprop": qprop, "xrotor": xrotor, "dfdc": dfdc}
+READERS = {reader.KIND: reader for reader in blade.READERS}
 
 
 @pytest.fixture
@@ -140,15 +140,15 @@ def test_a_file_is_known_by_its_content_and_becomes_a_case(
 
 
 def test_numbers_and_units_of_each_file(files: dict[str, Path]) -> None:
-    q = qprop.read(files["qprop"])
+    q = blade.read_qprop(files["qprop"])
     assert (q.blades, q.R_m, q.r_m[0], q.chord_m[1]) == pytest.approx((2, 0.0762, 0.01905, 0.69 * 0.0254))
     assert np.degrees(q.beta_rad[[0, -1]]) == pytest.approx([27.5, 4.2])
     assert q.sections == [(0.0, QpropSection(0.5, 5.8, -0.4, 1.2, 0.028, 0.05, 0.02, 0.5, 70000.0, -0.7))]
-    x = xrotor.read(files["xrotor"])
+    x = blade.read_xrotor(files["xrotor"])
     assert (x.blades, x.R_m, x.Rhub_m) == (3, 0.1, pytest.approx(0.015))
     assert x.rpm == pytest.approx(10.0 / (0.1 * 0.1) * 30.0 / np.pi) and x.airspeed_m_s == 10.0
     assert x.sections[0][1].a0 == pytest.approx(np.radians(-1.5)) and x.sections[0][1].reexp == -0.4
-    d = dfdc.read(files["dfdc"])
+    d = blade.read_dfdc(files["dfdc"])
     assert (d.blades, d.rpm, d.airspeed_m_s) == (5, 8000.0, 5.0)
     assert (d.R_m, d.Rhub_m) == pytest.approx((0.15, 0.04))  # walls at Xdisk, not the outermost stations
 

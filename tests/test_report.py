@@ -32,8 +32,7 @@ from bemt.results.report import book_html
 from bemt.results.report.book import About, Book
 from bemt.results.report.front import summary
 from bemt.results.report.gather import attach_diagnoses, gather, safe_files
-from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks
-from bemt.results.report.rotor_view import viewer
+from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks, viewer
 from bemt.results.report.verdicts import verdict
 from bemt.results.sweep.rows import Comparison, Result, Row
 from bemt.tools.cfd.report import attach, cfd_runs, operating_run, report_pages

@@ -204,15 +204,15 @@ def stations(
     """
     from pathlib import Path
 
-    from bemt.rotors.case import from_blade_file, from_solid
+    from bemt.rotors.case import from_solid
 
     path, folder = Path(file), None if out is None else Path(out)
-    blade = from_blade_file.read_blade(path, unit)
+    blade = from_solid.read_blade(path, unit)
     told = None if folder is None else str(folder)
     if blade is not None:
         if folder is not None:
-            from_blade_file.write(blade, path, folder)
-        return Told(from_blade_file.document(blade, path), from_blade_file.text(blade, path, told))
+            from_solid.write_blade(blade, path, folder)
+        return Told(from_solid.blade_document(blade, path), from_solid.blade_text(blade, path, told))
     found, scale, words = from_solid.find_stations(path, unit)
     if folder is not None:
         from_solid.write(found, scale, path, folder)

@@ -10,7 +10,7 @@ A reader is a module of this package that defines
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
 
-or ``READERS``, a tuple of objects with these names: formats that differ in words only are rows of one file.
+or ``READERS``, a tuple of :class:`Reader` or of objects like it, where several formats share a file.
 
 The file extension is ignored. If two readers claim a file, that is an error that asks for ``format =``.
 """
@@ -23,7 +23,7 @@ import math
 import os
 import pkgutil
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -37,12 +37,33 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
 
-__all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
+__all__ = [
+    "HEAD_BYTES",
+    "Reader",
+    "SourceText",
+    "decode",
+    "detect",
+    "head_text",
+    "importers",
+    "load_text",
+    "number",
+    "read",
+]
 
 HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader among several of one file."""
+
+    KIND: str
+    sniff: Callable[[bytes | str], bool]
+    read: Callable[[str | os.PathLike[str]], Any]
+    BLADE: bool = False
 
 
 @dataclass(eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.packed import packed, unpacked
-from bemt.data.readers import load_bytes, polar_c81, uiuc
+from bemt.data.readers import load_bytes, polars, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.references import Reference
@@ -84,7 +84,7 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
     for pattern, got, hint in _INSIDE:
         if pattern.search(head):
             return (got, hint)
-    if polar_c81.resembles(head.decode("latin-1")):
+    if polars.resembles(head.decode("latin-1")):
         hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
         return ("a C81 table with a different column width", hint)
     lines = [line for line in head.decode("latin-1").splitlines() if line.strip()]

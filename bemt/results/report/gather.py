@@ -31,7 +31,7 @@ from bemt.results.report.book import (
     Refinement,
     Reproduced,
 )
-from bemt.results.report.rotor_view import still
+from bemt.results.report.plot import still
 from bemt.results.sweep.rows import Result
 from bemt.rotors.case import Case, find_cases, load_case
 from geometry.common import GeometryError

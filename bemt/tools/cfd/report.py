@@ -19,8 +19,8 @@ from bemt.base.document import Documented
 from bemt.base.page import num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
-from bemt.results.report.audit_block import audit_parts
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
+from bemt.results.report.diagnosis_block import audit_parts
 from bemt.results.report.gather import read_json, safe_files
 from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
 from bemt.results.sweep.rows import Comparison, Conditions, Result, Row

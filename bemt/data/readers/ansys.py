@@ -1,4 +1,6 @@
-r"""CSV of CFD-Post: blocks of ``[Name]`` and ``[Data]``, units in the headings; or expressions with their values.
+r"""Tables that ANSYS exports: CSV of CFD-Post, nodes of Fluent, design points of Workbench.
+
+CFD-Post writes blocks of ``[Name]`` and ``[Data]``, units in the headings; or expressions with their values.
 
 ::
 
@@ -25,7 +27,8 @@ from dataclasses import replace
 import numpy as np
 
 from bemt.base.averaging import Mean
-from bemt.data.readers import SourceText, load_text, number
+from bemt.base.tables import number_of
+from bemt.data.readers import Reader, SourceText, load_text, number
 from bemt.data.readers.cfd import (
     Column,
     ExportRow,
@@ -43,7 +46,7 @@ from bemt.data.readers.columns import Channel, channels_of, dataset
 from bemt.data.readers.headings import may_be_shaft_speed
 from bemt.physics.dataset import Dataset
 
-KIND = "cfd_post_csv"
+CFD_POST_CSV = "cfd_post_csv"
 
 _SECTION = re.compile(r"\[(\w[\w ]*)\]")
 _HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
@@ -53,7 +56,7 @@ _EXPRESSION = re.compile(
 _VALUES = re.compile(r'\s*"?[\w ]+"?\s*[,;\t=]\s*"?values?"?[,;\s]*', re.IGNORECASE)
 
 
-def sniff(head: bytes | str) -> bool:
+def sniff_cfd_post_csv(head: bytes | str) -> bool:
     r"""Tell whether the file begins with the section Name or Data, or with an expression and its value.
 
     >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")
@@ -85,7 +88,7 @@ def _heading(text: str) -> Column:
     return Column(f"{slug(match[1])}_{unit}", unit, role)
 
 
-def read(path: str | os.PathLike[str]) -> Dataset:
+def read_cfd_post_csv(path: str | os.PathLike[str]) -> Dataset:
     """Read a CSV of CFD-Post."""
     source = load_text(path)
     lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
@@ -125,7 +128,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
         label = block if often[block] == 1 else f"{block} {k + 1}"
         channels |= {f"{key}({label})": channel for key, channel in channels_of(record).items()}
         notes += [f"{label}: {text}" for text in record.notes]
-    return dataset(KIND, "cfd", channels, notes, {**source.about, "clock": "none"})
+    return dataset(CFD_POST_CSV, "cfd", channels, notes, {**source.about, "clock": "none"})
 
 
 def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
@@ -145,7 +148,7 @@ def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
         name: Channel(np.array([value]), column.unit, Mean(value, "one value of an expression"))
         for name, (column, value) in zip(unique([c.name for c in columns]), found, strict=True)
     }
-    return dataset(KIND, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
+    return dataset(CFD_POST_CSV, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
 
 
 def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
@@ -157,4 +160,113 @@ def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
     table = numeric_table(source, columns, body, commas=commas)
     notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
     build = history if columns[0].role == "time" else fields
-    return build(KIND, source, columns, table, [*notes, *no_units(columns)])
+    return build(CFD_POST_CSV, source, columns, table, [*notes, *no_units(columns)])
+
+
+# Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
+#
+# ::
+#
+#     nodenumber,    x-coordinate,    y-coordinate,        pressure
+#              1, 8.427639012E-17,-7.500000000E-01,-3.011805813E-01
+#
+# Fluent exports in SI whatever units it displays, but the file does not say so; units stay open. Coordinates and fields
+# are values at points, which carry no areas: forces cannot be summed from them.
+
+FLUENT_ASCII = "fluent_ascii"
+
+_FIRST = ("nodenumber", "cellnumber")
+
+
+def sniff_fluent_ascii(head: bytes | str) -> bool:
+    r"""Tell whether the first line names node or cell numbers and a coordinate.
+
+    >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
+    (True, False)
+    """
+    return any(line.lower().lstrip('"').startswith(_FIRST) for line in head_lines(head, 1))
+
+
+def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
+    """Read an ASCII export."""
+    source = load_text(path)
+    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
+    if not lines or not sniff_fluent_ascii(lines[0][1]):
+        got = repr(lines[0][1][:60]) if lines else "no text"
+        source.refuse(1, got, "a header that begins with nodenumber or cellnumber")
+    mark = next((m for m in (",", ";") if m in lines[0][1]), None)
+    names = cells_of(lines[0][1], mark)
+    columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
+    rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
+    body = [row for row in rows if row.cells != names]
+    table = numeric_table(source, columns, body, commas=mark != ",")
+    repeated = len(rows) - len(body)
+    notes = [f"header repeated {number_of(repeated, 'time')}: several surfaces in one file"] if repeated else []
+    return fields(FLUENT_ASCII, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])
+
+
+# Design points of Ansys Workbench as CSV: one operating point a row.
+#
+# ::
+#
+#     # The parameters defined in the project are:
+#     # ,P1 - rpm [rev min^-1],P2 - thrust [N]
+#     # The following header line defines the name of the columns by reference to the parameters.
+#     Name,P1,P2
+#     DP 0,8000,3.6
+#
+# or, as the parametric study of Fluent saves it, ``Design Points,rpm,thrust-op`` without units.
+
+DESIGN_POINTS = "design_points"
+
+_HEAD = re.compile(r"(Name\s*[,;]\s*P\d|Design Points?\s*[,;])", re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*(P\d+) - (.*?)\s*(?:\[([^\]]*)\])?\s*")
+
+
+def sniff_design_points(head: bytes | str) -> bool:
+    r"""Tell whether the first line that is no comment heads a table of design points.
+
+    >>> sniff("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000"), sniff("Design Points,rpm,T-op\nDP1,1,2"), sniff("Name,a")
+    (True, True, False)
+    """
+    lines = [line for line in head_lines(head) if not line.startswith("#")]
+    return bool(lines) and _HEAD.match(lines[0]) is not None
+
+
+def read_design_points(path: str | os.PathLike[str]) -> Dataset:
+    """Read design points; one that failed is NaN."""
+    source = load_text(path)
+    told: dict[str, tuple[str, str]] = {}
+    names: tuple[str, ...] = ()
+    rows: list[ExportRow] = []
+    labels: list[str] = []
+    mark = ","
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        if text.startswith("#"):
+            found = map(_PARAMETER.fullmatch, text.lstrip("# ").split(","))
+            told |= {m[1]: (m[2], m[3] or "") for m in found if m}
+        elif text and not names:
+            mark = ";" if ";" in text and "," not in text else ","
+            names = cells_of(text, mark)[1:]
+        elif text:
+            label, *cells = cells_of(text, mark) if not text.endswith(mark) else (*cells_of(text, mark), "")
+            labels.append(label)
+            rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
+    if not names:
+        source.refuse("", "no header", "a line such as Name,P1,P2")
+    columns = [Column(words, si_unit(unit) or unit) for words, unit in (told.get(n, (n, "")) for n in names)]
+    table = numeric_table(source, columns, rows, mark != ",")
+    keys = unique([c.name for c in columns])
+    channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
+    texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
+    about = {**source.about, "clock": "none"}
+    notes = (*table.warnings, *no_units(columns))
+    return dataset(DESIGN_POINTS, "cfd", channels, notes, about, lines=table.lines, texts=texts)
+
+
+READERS = (
+    Reader(CFD_POST_CSV, sniff_cfd_post_csv, read_cfd_post_csv),
+    Reader(FLUENT_ASCII, sniff_fluent_ascii, read_fluent_ascii),
+    Reader(DESIGN_POINTS, sniff_design_points, read_design_points),
+)
