@@ -1,4 +1,4 @@
-"""Wall behind the propeller."""
+"""What stands round the rotor: ground, walls of a hall or a wind tunnel."""
 
 from __future__ import annotations
 
@@ -89,3 +89,94 @@ class GroundEffect(Effect):
         ]  # fmt: skip
         names = ("form", "z_over_R", "strength", "plate_radius_over_R")
         return tuple(dict(zip(names, values, strict=True)) for values in settings)
+
+
+# Slipstream that comes back through the room.
+
+
+@dataclass(frozen=True)
+class Recirculation(Effect):
+    """Room that is too small: the slipstream returns and the rotor meets V + k v (1 - exp(-t/tau)).
+
+    Notes
+    -----
+    First-order growth from the start of each run, ``before_s`` before its first point, v the induced speed of the
+    baseline; ventilated by airspeed as 1 / (1 + (V/v)^2). Small rotors in closed rooms change within seconds of the
+    start: Stephenson, Weitsman and Zawodny (2019), J. Acoust. Soc. Am. 145:1153 (not checked); form and ranges are
+    declared. Needs time: permanent recirculation cannot be distinguished from lower thrust.
+    """
+
+    k: float = 0.05
+    tau_s: float = 10.0
+    before_s: float = 0.0
+
+    id = "recirculation"
+    title = "recirculation in the room"
+    check = "release smoke behind the propeller, or repeat with a door open and after a pause"
+    check_in_room = True
+    along = ("time_s",)
+    sign = (
+        "thrust decays within seconds of each start, only at low advance ratio; drift of a cell does not depend on "
+        "speed"
+    )
+    needs = ("time_s",)
+    parameters = (
+        Parameter("k", "1", 0.0, 0.25, "declared; share of the induced speed", 4, 0.0),
+        Parameter("tau_s", "s", 1.0, 60.0, "declared; room length over jet speed", 4),
+        Parameter("before_s", "s", 0.0, 600.0, "declared; the rotor ran before the recording began", 0),
+    )
+    discrete = ("before_s",)
+    on_by_default = False
+
+    def flow(self, flow: Flow) -> None:
+        """Add the returning flow."""
+        v = flow.induced
+        fade = v**2 / np.maximum(v**2 + flow.V**2, 1e-12)
+        flow.V = flow.V + self.k * v * fade * -np.expm1(-(flow.clock + self.before_s) / self.tau_s)
+
+    def variants(self) -> tuple[dict[str, float], ...]:
+        """Eleven sizes at six times, the times in ratio, from the start; and sizes of a room long stirred up."""
+        sizes = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.25)
+        times = (1.0, 2.5, 6.0, 13.0, 28.0, 60.0)
+        grown = tuple({"k": k, "tau_s": t, "before_s": 0.0} for k in sizes for t in times)
+        late = tuple({"k": k, "tau_s": 60.0, "before_s": 20.0} for k in sizes)
+        return (*grown, *late, *({"k": k, "tau_s": 1.0, "before_s": 600.0} for k in sizes))
+
+
+# Walls of a closed wind tunnel around a propeller.
+
+# Advance ratio up to which the air is at rest.
+_STILL = 0.03
+
+
+@dataclass(frozen=True)
+class TunnelBlockage(Effect):
+    """Closed test section: the thrust is that of a lower free airspeed V' than the tunnel's.
+
+    Notes
+    -----
+    V'/V = 1 - tau alpha / (2 sqrt(1 + 2 tau)), tau = T / (rho A V^2), alpha disk over test-section area (Glauert 1935,
+    Airplane Propellers, ch. VIII; in this form in Barlow, Rae and Pope 1999, Low-Speed Wind Tunnel Testing; not checked
+    against the books). A static test has no free airspeed to correct; below J = 0.03 an airspeed is the noise of its
+    sensor (declared), and the correction would be largest there.
+    """
+
+    area_ratio: float = 0.05
+
+    id = "tunnel_blockage"
+    inviscid = True
+    title = "wind tunnel blockage"
+    check = "compare disk area and test section: above 5 % the airspeed needs a correction"
+    sign = "thrust and torque rise with loading at airspeed: the shift of J grows with thrust, not with V"
+    parameters = (Parameter("area_ratio", "1", 0.0, 0.25, "disk over test-section area", 5, 0.0),)
+    on_by_default = False
+
+    def applies(self, flow: Flow) -> str:
+        """Only airspeed can be corrected."""
+        return "" if np.any(flow.J > _STILL) else "no point has airspeed"
+
+    def flow(self, flow: Flow) -> None:
+        """Lower the airspeed to the equivalent free one."""
+        load = flow.T0 / (flow.rho * flow.area)
+        root = np.sqrt(np.maximum(flow.V**2 + 2.0 * load, 0.25 * flow.V**2 + 1e-12))
+        flow.V = flow.V - np.where(flow.J > _STILL, 0.5 * self.area_ratio * load / root, 0.0)
