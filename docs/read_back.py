@@ -30,7 +30,7 @@ from bemt.tools.drive.drive_result import with_drive
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job, LoadsExport
 from bemt.tools.exports.jsbsim import motor_of
-from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))

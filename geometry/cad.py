@@ -17,10 +17,9 @@ import numpy as np
 from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
-from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
 from geometry.printed import HEXAGON, cutters, framed, root_depth
 from geometry.rotor import Rotor
-from geometry.solid import Mesh, profile_volume
+from geometry.solid import Mesh, StatorPlan, centre_body, duct_profile, plan_stator, profile_volume
 
 MM = 1000.0
 TOLERANCE = 5e-3

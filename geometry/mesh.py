@@ -17,10 +17,24 @@ import numpy as np
 
 from geometry.common import Array, Faults, GeometryError, offset
 from geometry.duct import Duct
-from geometry.mesh_duct import centre_body, duct_mesh, duct_profile, plan_stator, vane_rows
 from geometry.printed import Printed, cutters, framed, outline, root_depth, seeds, settled
 from geometry.rotor import Blade, Rotor
-from geometry.solid import Mesh, Options, as_solid, check_closed, join, profile_volume, ray_thickness, revolve, skin
+from geometry.solid import (
+    Mesh,
+    Options,
+    as_solid,
+    centre_body,
+    check_closed,
+    duct_mesh,
+    duct_profile,
+    join,
+    plan_stator,
+    profile_volume,
+    ray_thickness,
+    revolve,
+    skin,
+    vane_rows,
+)
 
 __all__ = [
     "Mesh",

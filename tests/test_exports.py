@@ -24,9 +24,9 @@ from bemt.rotors.case import Case, load_case
 from bemt.tools.cfd.openfoam.write import Run, settings_of
 from bemt.tools.exports import exports, target_ids
 from bemt.tools.exports.base import FEATURES, Files, Job, LoadsExport
-from bemt.tools.exports.fan import read_profile
+from bemt.tools.exports.flow_solvers import read_profile
 from bemt.tools.exports.folder import export_case
-from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import solve_points
 from geometry import export as module
 from geometry.airfoil import naca4
@@ -421,7 +421,7 @@ def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job
 
 def test_px4_commands_what_its_simulator_gives(project: Path, job: Job) -> None:
     """The controller inverts THR_MDL_FAC, the simulated rotor gives T_MAX u: together, the thrust asked for."""
-    from bemt.tools.exports.px4 import parameters
+    from bemt.tools.exports.autopilots import parameters
 
     files = written("px4", job)
     sih, vehicle = (parameters(str(next(t for n, t in files.items() if n.endswith(end))))

@@ -25,7 +25,7 @@ from bemt.tools.cfd.openfoam.grid import extent, mrf_zone
 from bemt.tools.cfd.openfoam.write import Run, settings_of, write_openfoam
 from bemt.tools.cfd.worker import history_of
 from geometry.mesh import Options
-from geometry.mesh_duct import plan_stator
+from geometry.solid import plan_stator
 
 COARSE = Options(n=41, segments=48)
 TOKEN = re.compile(r'"[^"]*"|[{}();]|[^\s{}();"]+(?:\([^\s;]*\))?')

@@ -5,7 +5,7 @@ A reader is a module of this package that defines
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True if the head of a file (:data:`HEAD_BYTES` bytes, or text) has this format;
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
-  with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.columns.dataset`.
+  with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.samples.dataset`.
   Readers of blades and polars return the object of their own package instead;
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.

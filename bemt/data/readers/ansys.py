@@ -42,8 +42,8 @@ from bemt.data.readers.cfd import (
     slug,
     unique,
 )
-from bemt.data.readers.columns import Channel, channels_of, dataset
 from bemt.data.readers.headings import may_be_shaft_speed
+from bemt.data.readers.samples import Channel, channels_of, dataset
 from bemt.physics.dataset import Dataset
 
 CFD_POST_CSV = "cfd_post_csv"

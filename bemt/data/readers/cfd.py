@@ -21,7 +21,7 @@ from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, head_text, number
-from bemt.data.readers.columns import Channel, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)

@@ -22,9 +22,9 @@ from bemt.base import units
 from bemt.base.toml_text import Collector
 from bemt.base.units import G0
 from bemt.data.readers import Reader, first_cells, load_bytes
-from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.headings import known
 from bemt.data.readers.recording import Builder
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 CRAZYFLIE_LOG = "crazyflie_log"

@@ -29,7 +29,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data.readers import Reader, SourceText, load_text, number
 from bemt.data.readers.cfd import head_lines, si_unit, slug, unique
-from bemt.data.readers.columns import Channel, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 FLUENT_FORCES = "fluent_forces"

@@ -54,7 +54,7 @@ from bemt.data.readers.cfd import (
     si_unit,
     unique,
 )
-from bemt.data.readers.columns import Channel, channels_of, dataset
+from bemt.data.readers.samples import Channel, channels_of, dataset
 from bemt.physics.dataset import Dataset
 
 

@@ -24,9 +24,9 @@ import numpy as np
 
 from bemt.base import units
 from bemt.data.readers import Reader, first_cells, load_text
-from bemt.data.readers.columns import Channel
 from bemt.data.readers.headings import Heading, heading, known, slug
 from bemt.data.readers.recording import Builder, slip
+from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import split_table
 from bemt.physics.dataset import Dataset
 

@@ -36,11 +36,19 @@ from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
-from bemt.data.recordings.adapt import adapt, damaged_export, recognised
+from bemt.data.recordings.adapt import (
+    adapt,
+    damaged_export,
+    findings,
+    is_recording,
+    points_text,
+    recognised,
+    reduction_document,
+    reduction_of,
+)
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.choice import Choice, averaged
-from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault

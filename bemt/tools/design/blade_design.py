@@ -22,8 +22,8 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.unknowns import AIR, SECTION, SURFACE
 from bemt.tools.design import optimise as search
-from bemt.tools.design.best_label import Label, best_labels
 from bemt.tools.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
+from bemt.tools.design.optimise import Label, best_labels
 from bemt.tools.design.problem import BladeProblem, Values
 from bemt.tools.design.requirement import DesignPoint, Requirement, required
 

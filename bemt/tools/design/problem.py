@@ -34,8 +34,8 @@ from bemt.physics.bem.packing import blend_weights
 from bemt.physics.effects import Effect
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
 from bemt.tools.design import materials
+from bemt.tools.design.minimum_loss import CONTROLS, Shape
 from bemt.tools.design.requirement import WIDEST, Requirement
-from bemt.tools.design.shape import CONTROLS, Shape
 
 if TYPE_CHECKING:
     from bemt.physics.bem.duct import DuctFlow

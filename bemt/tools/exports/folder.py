@@ -17,7 +17,7 @@ from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
-from bemt.tools.exports.manifest import joined
+from bemt.tools.exports.parts import joined
 from bemt.tools.exports.printing import Print, faults_of, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA

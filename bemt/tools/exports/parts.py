@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,13 +12,14 @@ import numpy as np
 from bemt import __version__
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.plugins import missing_for
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.prepare import prepare_case
-from bemt.tools.exports.performance import LOWEST, Performance, table_loads
+from bemt.tools.exports.performance import LOWEST, THINNER, Performance, table_loads
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case
-    from bemt.tools.exports.base import Job
+    from bemt.tools.exports.base import Export, Files, Job
 
 
 # Loads of the hub in oblique flow for the exports: a table over speed, axial and in-plane advance ratio.
@@ -295,3 +297,75 @@ def run_hub(text: str, rpm: Array, V: Array, side: Array) -> Array:
     space: dict[str, Any] = {}
     exec(compile(text, "<export>", "exec"), space)
     return np.array([space["hub"](*map(float, at)) for at in zip(rpm, V, side, strict=True)]).T
+
+
+# What the manifest of an export says of one target: what its files hold, and what they do not.
+
+HUB_NOTE = (
+    "steady, stiff blades; moments come out too large, because the inflow that they cause themselves is left out; "
+    "neither H, Y nor the moments have been compared with a measurement"
+)
+
+
+def _lost(export: Export, job: Job) -> list[str]:
+    """What the target does not hold, for its notes: direction of rotation, Reynolds number, the end of a table."""
+    out = []
+    if "rotation" not in export.features:
+        out.append(f"the direction of rotation is not in the file: this rotor is {job.rotation}")
+    if export.kind != "loads":
+        return out
+    out += missing_for(job.case)
+    if "hub" not in export.features:
+        out.append("loads across the shaft are not in the file: no H force, no hub moments, thrust as in axial flow")
+    elif job.case.ducted:
+        out.append("a ducted rotor has no loads across the shaft here: its hub loads are 0")
+    else:
+        out.append(f"loads across the shaft: {HUB_NOTE}")
+    air, (thrust, torque) = job.case.air(), job.thinner
+    out.append(
+        f"the coefficients hold the Reynolds numbers of the case's air ({air.rho:.4g} kg/m3): at {THINNER:g} of that "
+        f"density, static CT would be {100 * thrust:+.2g} %, CP {100 * torque:+.2g} %"
+    )
+    if {"windmill", "reynolds"} <= export.features:
+        t = job.performance
+        out.append(
+            f"the table covers each speed up to {t.range_document()['airspeed_m_s_greatest']:.3g} m/s and descent to J "
+            f"{t.J[0]:.2g}; beyond, the last coefficient is held, so the drag of a windmill stops growing with airspeed"
+        )
+    return out
+
+
+def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
+    """Manifest entry of one target: what a reader of its files must know, and a hash of each."""
+    found: dict[str, Any] = {
+        "target": export.id,
+        "title": export.title,
+        "kind": export.kind,
+        "holds": export.holds,
+        "features": sorted(export.features),
+        "conventions": export.conventions,
+        "rotation": job.rotation,
+        "source": export.source,
+    }
+    found |= export.checked(job, files)
+    if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
+        found["full_throttle"] = job.full_throttle
+    speeds = [] if job.speeds_note is None or job.rpm is not None else [job.speeds_note]
+    found["notes"] = speeds + export.notes(job) + _lost(export, job)
+    found["files"] = [
+        {"path": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        for name, data in ((n, d.encode() if isinstance(d, str) else d) for n, d in files.items())
+    ]
+    return found
+
+
+def joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+    """Both manifests in one; the second is the newer."""
+    joined = {**first, **second}
+    for key in ("volumes_m3", "case_sha256"):
+        if key in first or key in second:
+            joined[key] = {**first.get(key, {}), **second.get(key, {})}
+    for key in ("files", "targets"):
+        if key in first or key in second:
+            joined[key] = [*first.get(key, []), *second.get(key, [])]
+    return joined

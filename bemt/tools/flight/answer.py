@@ -16,7 +16,7 @@ from bemt.judge.explanation import NONE
 from bemt.tools.flight.balance import axes_of, features
 from bemt.tools.flight.decision import Decision
 from bemt.tools.flight.identify import Constant, Identified, identify
-from bemt.tools.flight.inflow import Inflow, inflow, mass_faults
+from bemt.tools.flight.inflow import Inflow, Wind, inflow, mass_faults, wind
 from bemt.tools.flight.judge import FALSE_ALARM, FlightVerdict, judge
 from bemt.tools.flight.log import FlightLog, layout_of
 from bemt.tools.flight.rules import BesideBalance, FlightChange, change_in
@@ -24,7 +24,6 @@ from bemt.tools.flight.sessions import Sessions, flight_scatter, sessions
 from bemt.tools.flight.simulator import simulator_constants, thrust_curve
 from bemt.tools.flight.speed_sensor import checked, speed_changes
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
-from bemt.tools.flight.wind import Wind, wind
 
 _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]

@@ -35,8 +35,7 @@ from bemt.tools.cfd.openfoam.settings import (
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, export
 from geometry.mesh import Options, build
-from geometry.mesh_duct import centre_body, plan_stator
-from geometry.solid import revolve
+from geometry.solid import centre_body, plan_stator, revolve
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
