@@ -27,7 +27,7 @@ from bemt.rotors.population import WEIGHTS, Population, population, sizes
 from bemt.rotors.predict import LEVELS, Prediction, half_width, inside, pair_half_width, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validate import points
-from bemt.rotors.validate.points import MeasuredRotor
+from bemt.rotors.validate.points import ComparedRotor
 from bemt.rotors.validity import Validity
 
 K = len(NAMES)
@@ -263,13 +263,13 @@ def test_widths_are_those_of_the_prior() -> None:
     assert p.widths("label", 0.254)[1][0] < p.widths("stations", 0.254)[1][0]  # labels err more heavily
 
 
-def _family(name: str, angle_deg: float, n: int, seed: int) -> list[MeasuredRotor]:
+def _family(name: str, angle_deg: float, n: int, seed: int) -> list[ComparedRotor]:
     """Rotors whose blades all stand off their drawings by the same angle."""
     out = []
     for k in range(n):
         at = _sensed(10, seed + k)
         y = at.f + angle_deg * at.T[:, NAMES.index("angle_deg")]
-        out.append(MeasuredRotor(**vars(at), name=f"{name}{k}", family=name, section="rule", gap_deg=math.nan,
+        out.append(ComparedRotor(**vars(at), name=f"{name}{k}", family=name, section="rule", gap_deg=math.nan,
                                  static=at.J == 0.0, y=y))  # fmt: skip
     return out
 

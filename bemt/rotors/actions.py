@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from bemt.rotors.case.estimate import Estimate
+    from bemt.rotors.case.estimate import RotorEstimate
     from bemt.rotors.case.sources import Sources
     from bemt.rotors.propeller import Propeller
 
@@ -27,7 +27,7 @@ def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
     density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0, reading: str | None = None,
-) -> Estimate:  # fmt: skip
+) -> RotorEstimate:  # fmt: skip
     """Estimate thrust and power from a label such as 10x5, with bands; K1/K2 for comparison.
 
     Every speed of rotation is solved with every airspeed at every angle.

@@ -59,10 +59,12 @@ _VALUES = re.compile(r'\s*"?[\w ]+"?\s*[,;\t=]\s*"?values?"?[,;\s]*', re.IGNOREC
 def sniff_cfd_post_csv(head: bytes | str) -> bool:
     r"""Tell whether the file begins with the section Name or Data, or with an expression and its value.
 
-    >>> sniff("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff("[propeller]\nname = 1")
+    >>> sniff_cfd_post_csv("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff_cfd_post_csv("[propeller]\nname = 1")
     (True, False)
-    >>> sniff("Expression, Value\nThrust, 2.61 [kg m s^-2]\n"), sniff("rpm,thrust [N]\n6000,2.61\n")
-    (True, False)
+    >>> sniff_cfd_post_csv("Expression, Value\nThrust, 2.61 [kg m s^-2]\n")
+    True
+    >>> sniff_cfd_post_csv("rpm,thrust [N]\n6000,2.61\n")
+    False
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
     return bool(lines) and (lines[0].rstrip(",;") in ("[Name]", "[Data]") or _lists_expressions(lines[:2]))
@@ -181,7 +183,7 @@ _FIRST = ("nodenumber", "cellnumber")
 def sniff_fluent_ascii(head: bytes | str) -> bool:
     r"""Tell whether the first line names node or cell numbers and a coordinate.
 
-    >>> sniff("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff("node,x\n1,2")
+    >>> sniff_fluent_ascii("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff_fluent_ascii("node,x\n1,2")
     (True, False)
     """
     return any(line.lower().lstrip('"').startswith(_FIRST) for line in head_lines(head, 1))
@@ -226,8 +228,12 @@ _PARAMETER = re.compile(r"\s*(P\d+) - (.*?)\s*(?:\[([^\]]*)\])?\s*")
 def sniff_design_points(head: bytes | str) -> bool:
     r"""Tell whether the first line that is no comment heads a table of design points.
 
-    >>> sniff("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000"), sniff("Design Points,rpm,T-op\nDP1,1,2"), sniff("Name,a")
-    (True, True, False)
+    >>> sniff_design_points("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000")
+    True
+    >>> sniff_design_points("Design Points,rpm,T-op\nDP1,1,2")
+    True
+    >>> sniff_design_points("Name,a")
+    False
     """
     lines = [line for line in head_lines(head) if not line.startswith("#")]
     return bool(lines) and _HEAD.match(lines[0]) is not None

@@ -181,7 +181,7 @@ _XROTOR_HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)
 def sniff_xrotor(head: bytes | str) -> bool:
     r"""Tell whether a file begins as XROTOR's SAVE writes it.
 
-    >>> sniff("XROTOR VERSION:  7.55\nblade\n"), sniff("DFDC Version 0.55\n")
+    >>> sniff_xrotor("XROTOR VERSION:  7.55\nblade\n"), sniff_xrotor("DFDC Version 0.55\n")
     (True, False)
     """
     return _XROTOR_HEAD.match(head_text(head)) is not None
@@ -263,7 +263,7 @@ def sniff_qprop(head: bytes | str) -> bool:
     r"""Tell whether a file has a title and the seven lines of numbers of a propeller file, then stations.
 
     >>> head = "6x3\n 2 .0762\n0.5 5.8\n-0.4 1.2\n.028 .05 .05 .5\n70000 -.7\n.0254 .0254 1\n0 0 0\n"
-    >>> sniff(head + ".75 .66 27.5\n1 .69 22\n")
+    >>> sniff_qprop(head + ".75 .66 27.5\n1 .69 22\n")
     True
     """
     rows = [t for t in head_text(head).splitlines() if t.strip() and t.lstrip()[0] not in "#!"]
@@ -330,7 +330,7 @@ _DFDC_HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
 def sniff_dfdc(head: bytes | str) -> bool:
     r"""Tell whether a file begins as a DFDC case.
 
-    >>> sniff("DFDC Version 0.55\nduct\n"), sniff("XROTOR VERSION: 7.55\n")
+    >>> sniff_dfdc("DFDC Version 0.55\nduct\n"), sniff_dfdc("XROTOR VERSION: 7.55\n")
     (True, False)
     """
     return _DFDC_HEAD.match(head_text(head)) is not None

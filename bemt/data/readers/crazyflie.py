@@ -160,8 +160,10 @@ _SPEEDS = ("1_rpm", "2_rpm", "3_rpm", "4_rpm")
 def sniff_crazyflie_bench(head: bytes | str) -> bool:
     r"""Tell whether the first line has a command, four speeds and a total thrust.
 
-    >>> sniff("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n"), sniff("pwm,rpm,thrust[g]\n")
-    (True, False)
+    >>> sniff_crazyflie_bench("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n")
+    True
+    >>> sniff_crazyflie_bench("pwm,rpm,thrust[g]\n")
+    False
     """
     cells = set(map(_base, first_cells(head)))
     return {"pwm", "rpm1", "rpm2", "rpm3", "rpm4"} <= cells and bool({"weight", "thrust"} & cells)

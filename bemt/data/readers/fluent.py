@@ -42,7 +42,7 @@ _SI = {"force": "N", "moment": "Nm"}
 
 
 @dataclass(frozen=True)
-class Entry:
+class ForceEntry:
     """One number of a force report: name without its zone, unit, zone, value."""
 
     name: str
@@ -54,8 +54,10 @@ class Entry:
 def sniff_fluent_forces(head: bytes | str) -> bool:
     r"""Tell whether a title of forces is followed by a line of zones, and this is no transcript.
 
-    >>> sniff("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n"), sniff("Zone,Pressure")
-    (True, False)
+    >>> sniff_fluent_forces("Forces\n      Forces (n)\nZone  Pressure  Viscous  Total\n")
+    True
+    >>> sniff_fluent_forces("Zone,Pressure")
+    False
     """
     lines = head_lines(head, 60)
     titles = [k for k, line in enumerate(lines) if _TITLE.fullmatch(line)]
@@ -99,7 +101,7 @@ def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tupl
     return out
 
 
-def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], list[Fault]]]:
+def blocks(source: SourceText) -> Iterator[tuple[int, list[ForceEntry], list[str], list[Fault]]]:
     """Find the force tables of a text."""
     lines = source.lines
     k = 0
@@ -115,7 +117,7 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
             k = ahead[0] + 1
             continue
         start, k = k, ahead[0] + 1
-        entries: list[Entry] = []
+        entries: list[ForceEntry] = []
         notes: list[str] = []
         faults: list[Fault] = []
         shape: set[int] = set()
@@ -140,16 +142,16 @@ def blocks(source: SourceText) -> Iterator[tuple[int, list[Entry], list[str], li
         yield start + 1, entries, notes, faults
 
 
-def _entries(zone: str, names: Sequence[tuple[str, str]], vectors: Sequence[list[float]]) -> Iterator[Entry]:
+def _entries(zone: str, names: Sequence[tuple[str, str]], vectors: Sequence[list[float]]) -> Iterator[ForceEntry]:
     for (name, unit), vector in zip(names, vectors, strict=True):
         for axis, value in zip("xyz" if len(vector) > 1 else ("",), vector, strict=False):
             head, along, tail = name.partition(" along ")
             suffix = f"_{unit}" if unit and head.endswith(f"_{unit}") else ""
             stem = head.removesuffix(suffix) if suffix else head
-            yield Entry(stem + (f"_{axis}" if axis else "") + suffix + along + tail, unit, zone, value)
+            yield ForceEntry(stem + (f"_{axis}" if axis else "") + suffix + along + tail, unit, zone, value)
 
 
-def _sums(entries: Sequence[Entry], damaged: bool, line: int) -> list[str]:
+def _sums(entries: Sequence[ForceEntry], damaged: bool, line: int) -> list[str]:
     """Check Net against the zones and Total against its parts: a shifted or damaged column shows here."""
     notes: list[str] = []
     table = {(e.name, e.zone): e.value for e in entries}
@@ -178,7 +180,7 @@ def _sums(entries: Sequence[Entry], damaged: bool, line: int) -> list[str]:
     return notes
 
 
-def _channels(entries: Sequence[Entry]) -> dict[str, Channel]:
+def _channels(entries: Sequence[ForceEntry]) -> dict[str, Channel]:
     """Make one channel of each number, its mean being the number."""
     names = unique([f"{e.name}({e.zone})" for e in entries])
     return {
@@ -190,7 +192,7 @@ def _channels(entries: Sequence[Entry]) -> dict[str, Channel]:
 def read_fluent_forces(path: str | os.PathLike[str]) -> Dataset:
     """Read a force report."""
     source = load_text(path)
-    entries: list[Entry] = []
+    entries: list[ForceEntry] = []
     notes: list[str] = []
     faults: list[Fault] = []
     zones: set[tuple[int, str]] = set()
@@ -242,9 +244,11 @@ _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 def sniff_fluent_transcript(head: bytes | str) -> bool:
     r"""Tell whether a text shows marks of a Fluent console.
 
-    >>> sniff("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9"), sniff("iteration,continuity")
-    (True, False)
-    >>> sniff("  Moment   [N m]\n------------ ----------\n  blade   -0.18\n")
+    >>> sniff_fluent_transcript("  iter  continuity  x-velocity  time/iter\n 1 1.0 1.0 0:00:01 9")
+    True
+    >>> sniff_fluent_transcript("iteration,continuity")
+    False
+    >>> sniff_fluent_transcript("  Moment   [N m]\n------------ ----------\n  blade   -0.18\n")
     True
     """
     lines = head_lines(head, 400)

@@ -247,7 +247,7 @@ _FLUENT_XY_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 def sniff_fluent_xy(head: bytes | str) -> bool:
     r"""Tell whether the file begins with a title and labels in parentheses.
 
-    >>> sniff('(title "a")\n(labels "x" "y")\n'), sniff('("Iteration" "drag")')
+    >>> sniff_fluent_xy('(title "a")\n(labels "x" "y")\n'), sniff_fluent_xy('("Iteration" "drag")')
     (True, False)
     """
     lines = head_lines(head, 6)

@@ -48,7 +48,7 @@ class PolarRow:
 def sniff_polar_csv(head: bytes | str) -> bool:
     r"""Tell whether the first line that is no comment is a header of alpha, cl and cd.
 
-    >>> sniff("alpha_deg,cl,cd"), sniff("# polar\nRe;alpha;CL;CD"), sniff("rpm,thrust_N")
+    >>> sniff_polar_csv("alpha_deg,cl,cd"), sniff_polar_csv("# polar\nRe;alpha;CL;CD"), sniff_polar_csv("rpm,thrust_N")
     (True, True, False)
     """
     for line in head_text(head).splitlines():
@@ -245,8 +245,10 @@ _TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
 def sniff_polar_xfoil(head: bytes | str) -> bool:
     r"""Tell whether a file begins like an XFOIL polar.
 
-    >>> sniff("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n"), sniff("alpha,cl,cd")
-    (True, False)
+    >>> sniff_polar_xfoil("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n")
+    True
+    >>> sniff_polar_xfoil("alpha,cl,cd")
+    False
     """
     text = head_text(head)
     return _TITLE.search(text) is not None or _SITE.match(text) is not None
@@ -357,8 +359,10 @@ _HINT = "C81 fields are 7 characters wide, nine values after the first field"
 def sniff_polar_c81(head: bytes | str) -> bool:
     r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
 
-    >>> sniff("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n"), sniff("alpha,cl,cd")
-    (True, False)
+    >>> sniff_polar_c81("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n")
+    True
+    >>> sniff_polar_c81("alpha,cl,cd")
+    False
     """
     lines = head_text(head).splitlines()
     if len(lines) < 2 or _counts(lines[0]) is None or lines[1][:WIDTH].strip():

@@ -47,7 +47,7 @@ _RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust", "Torque"}
 def sniff_jmajew(head: bytes | str) -> bool:
     r"""Tell whether the first line has this stand's headings.
 
-    >>> sniff("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff("th,tq,rpm\n")
+    >>> sniff_jmajew("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff_jmajew("th,tq,rpm\n")
     (True, False)
     """
     cells = first_cells(head)
@@ -177,7 +177,7 @@ _DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
 def sniff_coaxial_stand(head: bytes | str) -> bool:
     r"""Tell whether the first line names both sides of this stand.
 
-    >>> sniff("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
+    >>> sniff_coaxial_stand("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
     True
     """
     found = {m.groups() for c in first_cells(head) if (m := _HEAD.fullmatch(c))}
@@ -276,7 +276,7 @@ _KNOWN = {
 def sniff_drivecalc(head: bytes | str) -> bool:
     r"""Tell whether the first line has the headings of one of the two tables.
 
-    >>> sniff("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff("Name,Dia,Pitch\n")
+    >>> sniff_drivecalc("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff_drivecalc("Name,Dia,Pitch\n")
     (True, False)
     """
     cells = first_cells(head)

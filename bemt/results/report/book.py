@@ -26,7 +26,7 @@ Section = tuple[str, list[Part]]
 
 
 @dataclass(frozen=True)
-class Answer:
+class ShownAnswer:
     """A case in one sentence, with its badge and picture."""
 
     id: str
@@ -46,7 +46,7 @@ class Page:
     title: str
     top: Sequence[Part]  # Above the sections
     sections: Sequence[Section]
-    answers: Sequence[Answer] = ()
+    answers: Sequence[ShownAnswer] = ()
 
 
 def sections(*found: Section) -> list[Section]:
@@ -114,7 +114,7 @@ class Refinement:
     grid_study: GridStudy | None
 
 
-class Told(Documented):
+class ShownParameter(Documented):
     """Parameter of an effect: a number with its 90 % interval, or a form of the law; None is one of another form."""
 
     value: Any = None
@@ -128,7 +128,7 @@ class RankedEffect(Documented):
 
     effect: str = ""
     probability: float = math.nan
-    parameters: Mapping[str, Told] = field(default_factory=dict)
+    parameters: Mapping[str, ShownParameter] = field(default_factory=dict)
 
 
 class FitErrors(Documented):
@@ -160,7 +160,7 @@ class NextStep(Documented):
     commands: tuple[str, ...] = ()
 
 
-class Diagnosis(Documented):
+class ShownDiagnosis(Documented):
     """A diagnosis (schema ``bemt.diagnosis/1``) as far as a page shows it."""
 
     verdict: str = ""
@@ -179,7 +179,7 @@ class Diagnosed:
     """A diagnosis in the folder of results with its figures (name, content)."""
 
     name: str
-    told: Diagnosis
+    told: ShownDiagnosis
     figures: Sequence[tuple[str, bytes]] = ()
 
 

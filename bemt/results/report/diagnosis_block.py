@@ -10,7 +10,7 @@ from typing import Any
 from bemt.base.page import FIRST, Cell, num, table
 from bemt.data.recordings.audit import Audit
 from bemt.data.recordings.grid_study import LOADS, LoadStudy
-from bemt.results.report.book import CasePage, Diagnosed, Part, Told, picture
+from bemt.results.report.book import CasePage, Diagnosed, Part, ShownParameter, picture
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
 from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
 
@@ -67,7 +67,7 @@ FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth fit without phys
             "held out, after")  # fmt: skip
 
 
-def _parameters(told: Mapping[str, Told]) -> str:
+def _parameters(told: Mapping[str, ShownParameter]) -> str:
     words = []
     for name, p in told.items():
         if p.value is None:  # of another form of the law

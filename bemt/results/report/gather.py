@@ -26,10 +26,10 @@ from bemt.results.report.book import (
     CaseCurves,
     CasePage,
     Diagnosed,
-    Diagnosis,
     RadialCurves,
     Refinement,
     Reproduced,
+    ShownDiagnosis,
 )
 from bemt.results.report.plot import still
 from bemt.results.sweep.rows import Result
@@ -232,7 +232,7 @@ def attach_diagnoses(book: Book, out: Path) -> Book:
         for figure in safe_files(path.parent):
             room -= len(figure[1])
             figures += [figure] if room > 0 else []
-        item = Diagnosed(name, Diagnosis.from_document(document, lenient=True), figures)
+        item = Diagnosed(name, ShownDiagnosis.from_document(document, lenient=True), figures)
         if name in names and path.parent.name == "diagnosis":
             own[name] = item
         else:

@@ -145,7 +145,7 @@ class Row(Documented):
     k1k2_u_val: float | None = None
 
 
-class Conditions(Documented):
+class CaseConditions(Documented):
     """Operating point, air, rotor and model of a case."""
 
     rpm: float
@@ -233,7 +233,7 @@ class Fan(Documented):
     geometric_pitch_speed_m_s: float
 
 
-class Pair(Documented):
+class PairResult(Documented):
     """What a second rotor adds, at the case's own operating point; the upper rotor is the first."""
 
     z_over_D: float
@@ -299,12 +299,12 @@ class Result(Documented):
     comparisons: tuple[Comparison, ...] = ()
     audit: tuple[Audit, ...] = ()
     grid_studies: tuple[Mapping[str, Any], ...] = ()  # Documents of `LoadStudy`
-    conditions: Conditions | None = None
+    conditions: CaseConditions | None = None
     assumptions: tuple[AssumptionRow, ...] = ()
     references: tuple[Stated, ...] = ()
     drive: FullThrottle | None = None
     fan: Fan | None = None
-    pair: Pair | None = None
+    pair: PairResult | None = None
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     grid: GridResult | None = None
@@ -324,7 +324,7 @@ class Result(Documented):
         return self.rows + self.variants + self.other_rows
 
     @property
-    def at(self) -> Conditions:
+    def at(self) -> CaseConditions:
         """Conditions of a solved case."""
         assert self.conditions is not None
         return self.conditions

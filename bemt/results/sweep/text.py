@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bemt.base.tables import csv_text, number_of, number_text, text_table
-from bemt.results.sweep.rows import ROW_SOURCES, Fan, GridResult, Pair, Result, Row
+from bemt.results.sweep.rows import ROW_SOURCES, Fan, GridResult, PairResult, Result, Row
 
 WIDTH = 118
 CSV_COLUMNS = (
@@ -137,7 +137,7 @@ def _fan_lines(fan: Fan | None) -> list[str]:
     ]
 
 
-def _pair_lines(pair: Pair | None) -> list[str]:
+def _pair_lines(pair: PairResult | None) -> list[str]:
     if pair is None:
         return []
     turns = "turns against the first" if pair.turns == "opposite" else "turns as the first"

@@ -275,7 +275,7 @@ def _pe0_stations(folder: Path) -> tuple[dict[tuple[str, float, float], Stations
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredRotor(Sensed):
+class ComparedRotor(Sensed):
     """One measured propeller beside the solver at P readings; ``y`` (2, P) are CT and CP measured [1]."""
 
     name: str
@@ -288,7 +288,7 @@ class MeasuredRotor(Sensed):
     known_from: str = "stations"
 
 
-def law(p: Population, m: MeasuredRotor) -> Prior:
+def law(p: Population, m: ComparedRotor) -> Prior:
     """What is known of a propeller before it is measured."""
     return p.prior(m.known_from, m.diameter_m, m.gap_deg, m.family, m.section, blade_class=m.blade_class)
 
@@ -300,7 +300,7 @@ class Observed:
     propeller: UiucPropeller  # As read
     solve: Solver  # For other latent numbers
     drawn: Rows  # All points, the solver on the stations
-    record: MeasuredRotor  # The points that count, static ones first
+    record: ComparedRotor  # The points that count, static ones first
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,7 +329,7 @@ def observe(propeller: UiucPropeller, effects: Sequence[Effect], stations: Stati
     if propeller.pitch_in:
         gap = math.degrees(beta) - label_angle_deg(propeller.pitch_in, propeller.diameter_in)
     y = np.array([drawn.CT[here], drawn.CP[here]])
-    record = MeasuredRotor(
+    record = ComparedRotor(
         **vars(at), name=propeller.name, family=propeller.family, section=section_rule.source(propeller.family),
         gap_deg=gap, static=drawn.static[here], y=y, blade_class=class_of(propeller.family),
     )  # fmt: skip

@@ -25,7 +25,7 @@ from bemt.tools.cfd.openfoam.write import Run, RunTable
 __all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 
 
-class PointTable(RunTable):
+class PointOptions(RunTable):
     """[defaults], [[points]] and, as lists, [axes]: one CFD run; omitted values come from the case."""
 
     J: float | None = entry("advance ratio, with rpm and instead of airspeed_m_s", low=0, high=5)
@@ -46,7 +46,7 @@ def _listed(field: FieldInfo) -> Any:
 
 
 AxesTable: Any = create_model(
-    "AxesTable", __base__=Table, **{name: _listed(field) for name, field in PointTable.model_fields.items()}
+    "AxesTable", __base__=Table, **{name: _listed(field) for name, field in PointOptions.model_fields.items()}
 )
 
 
@@ -67,9 +67,9 @@ class CampaignFile(Table):
     title: str | None = entry("one-line title")
     case: str = entry("path to case.toml", required=True)
     grid_study: str | None = entry("folder of the campaign that gives the numerical uncertainty")
-    defaults: PointTable = PointTable()
+    defaults: PointOptions = PointOptions()
     axes: AxesTable = AxesTable()
-    points: tuple[PointTable, ...] = ()
+    points: tuple[PointOptions, ...] = ()
     duct: CampaignDuct | None = None
 
 
@@ -222,7 +222,7 @@ class RunRow(Documented):
         return self.converged == 1
 
 
-class LoadStudy(Documented):
+class StudyResult(Documented):
     """Grid study of one load, finest grid first; standard uncertainty by level, relative [1]."""
 
     values: tuple[float, ...]
@@ -253,12 +253,12 @@ class Study(Documented):
     cells: tuple[float, ...]
     ratios: tuple[float, ...]
     by_cells: tuple[float, ...]
-    thrust_N: LoadStudy
-    torque_Nm: LoadStudy
+    thrust_N: StudyResult
+    torque_Nm: StudyResult
 
-    def of(self, load: str) -> LoadStudy:
+    def of(self, load: str) -> StudyResult:
         """Study of ``thrust_N`` or ``torque_Nm``."""
-        found: LoadStudy = getattr(self, load)
+        found: StudyResult = getattr(self, load)
         return found
 
 

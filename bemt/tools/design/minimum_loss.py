@@ -152,7 +152,7 @@ TURN = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class BladeShape:
     """Blades around a start: ``ln(chord / R)`` is a cubic spline, the blade angle that of the start plus another."""
 
     # (N,) Blade elements [m]
@@ -166,7 +166,7 @@ class Shape:
     beta0: Array  # (N + 2,) Blade angle of the start there [rad]
 
     @staticmethod
-    def around(blade: Blade, elements: int) -> tuple[Shape, Array]:
+    def around(blade: Blade, elements: int) -> tuple[BladeShape, Array]:
         """Shape whose start is a blade, and the control values that are nearest to it, (2 K,)."""
         from scipy.interpolate import CubicSpline
 
@@ -179,7 +179,7 @@ class Shape:
         chord, beta = blade.at(x * R)
         weight = np.sqrt(np.r_[1e-3, s.dr / R, 1e-3])  # ends of no width
         fit = np.linalg.lstsq(basis * weight[:, None], np.log(chord / R) * weight, rcond=None)[0]
-        return Shape(s.r, s.dr, R, Rhub, nodes, basis, beta), np.r_[fit, np.zeros(CONTROLS)]
+        return BladeShape(s.r, s.dr, R, Rhub, nodes, basis, beta), np.r_[fit, np.zeros(CONTROLS)]
 
     @property
     def inner(self) -> Array:

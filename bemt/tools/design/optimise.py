@@ -17,7 +17,7 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.latents import NAMES, Prior, as_built
 from bemt.tools.design import rotor_loads
-from bemt.tools.design.minimum_loss import CONTROLS, MinimumLoss, Shape, minimum_loss
+from bemt.tools.design.minimum_loss import CONTROLS, BladeShape, MinimumLoss, minimum_loss
 from bemt.tools.design.problem import BladeProblem, Values, top_lift
 from bemt.tools.design.requirement import Requirement
 from bemt.tools.design.rotor_loads import RotorLoads
@@ -99,7 +99,7 @@ def first_speed(need: Requirement) -> float:
 
 def problem_of(model: Model, need: Requirement, blade: Blade, rpm0: float | None = None) -> tuple[BladeProblem, Array]:
     """Problem around a blade, and the variables of that blade."""
-    shape, x = Shape.around(blade, model.n_stations)
+    shape, x = BladeShape.around(blade, model.n_stations)
     guess = rpm0 or first_speed(need)
     rpm = np.array([float(p.rpm or guess) for p in need.points])
     fast = np.hypot(rpm.max() * math.pi / 30.0 * need.R, max(p.airspeed_m_s for p in need.points))

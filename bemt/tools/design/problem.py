@@ -34,7 +34,7 @@ from bemt.physics.bem.packing import blend_weights
 from bemt.physics.effects import Effect
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
 from bemt.tools.design import materials
-from bemt.tools.design.minimum_loss import CONTROLS, Shape
+from bemt.tools.design.minimum_loss import CONTROLS, BladeShape
 from bemt.tools.design.requirement import WIDEST, Requirement
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class BladeProblem:
 
     need: Requirement
     model: Model
-    shape: Shape
+    shape: BladeShape
     rpm0: Array
     variants: Sequence[Sequence[Effect]]
     scale_W: float

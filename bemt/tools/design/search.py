@@ -141,62 +141,13 @@ def choose(
     coaxial: bool = False,
     sure: float = 0.9,
 ) -> pd.DataFrame:
-    """Rank propellers and motors for a thrust or a mass.
+    """Rank propellers and motors for a thrust or a mass; arguments as those of :func:`bemt.choose`.
 
-    Parameters
-    ----------
-    thrust_N : float, optional
-        Thrust of one rotor at full throttle; twice the hover thrust if only `mass_kg` is given. [N]
-    cells : int
-        LiPo cells in series.
-    kv : float or (low, high)
-        Speed constant, or the range of which 72 are tried. [rev/min/V]
-    motors : sequence of KnownMotor, or path
-        Real motors instead of `kv`, or a CSV with ``name,kv,resistance_mohm,no_load_A``.
-    labels : str or sequence of str
-        Labels to try, as ``10x5`` or ``9x4.5x3``; standard sizes by default.
-    blades : int or sequence of int
-        Of the standard sizes.
-    mass_kg : float, optional
-        Mass of the vehicle; power, current and time are then those of hover instead of those at `thrust_N`. [kg]
-    rest_kg : float, optional
-        Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
-        this and what it weighs itself (:mod:`bemt.tools.design.motors_file`). [kg]
-    rotors : int
-        Rotors that carry the vehicle.
-    airspeed_m_s, max_diameter_in : float, optional
-        Flight speed [m/s], limit on size [in].
-    arm_mm : float, optional
-        From the middle of the frame to a shaft, or from the only shaft to what is next to it: limits the diameter. [mm]
-    max_tip_mach : float
-        Limit on the helical tip Mach number at `thrust_N`. [1]
-    capacity_Ah, minutes : optional
-        Battery capacity; with it, time in hover that is part of the target [min].
-    fan : bool
-        Ducted fans on sale, 30 to 120 mm, instead of propellers.
-    fluid : {"air", "water"}
-        What the propeller turns in; in water a blade area too small for the thrust is named (Keller's criterion).
-    coaxial : bool
-        Each propeller is one of a pair, one above the other; `rotors` counts both.
-    sure : float
-        Pairs that meet the target with this probability come first: the smallest within 5 % of the least power, the
-        one with the least power, then by power; at last the others, by probability.
+    A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
+    ``at_N`` the thrust of the power, ``why`` says why it is not the first. Pairs that meet the target with the
+    probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
+    power. `motors` may be a CSV with ``name,kv,resistance_mohm,no_load_A``.
 
-    Returns
-    -------
-    pandas.DataFrame
-        A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the
-        mass of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it
-        is not the first.
-
-    Raises
-    ------
-    InputError
-        With every fault of the request, or if no size can be tried.
-
-    Examples
-    --------
     >>> found = choose(8.0, 3, labels=["10x4.5", "9x6", "8x4"], kv=(700, 1500))
     >>> found.label.iloc[0], bool(found.probability.iloc[0] >= 0.9)
     ('10x4.5', True)

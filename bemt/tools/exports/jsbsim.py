@@ -34,7 +34,7 @@ STAND_IN_INERTIA = 0.3
 
 
 @dataclass(frozen=True)
-class Motor:
+class JsbsimMotor:
     """Motor, controller and battery of one rotor, and the inertia of what turns."""
 
     kv_rpm_V: float
@@ -83,17 +83,17 @@ class Motor:
         return self.inertia_kg_m2 / (self.k**2 / self.ohm + steepest)
 
 
-def motor_of(job: Job) -> Motor:
+def motor_of(job: Job) -> JsbsimMotor:
     """Motor of the case's drive; without one, a motor that turns the rotor at the greatest speed of the tables."""
     t, blades = job.performance, inertia_estimate(job)
     c: dict[str, Any] | None = plugins.part("circuit", job.case)
     if c is not None:
         rotor = blades if c["rotor_inertia_kg_m2"] is None else c["rotor_inertia_kg_m2"]
-        return Motor(c["kv_rpm_V"], c["volts"], c["ohm"], c["battery_ohm"], c["no_load_A"], c["exponent"],
+        return JsbsimMotor(c["kv_rpm_V"], c["volts"], c["ohm"], c["battery_ohm"], c["no_load_A"], c["exponent"],
                      c["limit_A"], rotor + c["motor_inertia_kg_m2"], True)  # fmt: skip
     kv = float(t.rpm[-1]) / (STAND_IN_V * (1.0 - DROP))
     amps = float(t.torque_Nm[-1, t.at_rest]) * math.pi * kv / 30.0 / (1.0 - IDLE)
-    return Motor(kv, STAND_IN_V, DROP * STAND_IN_V / amps, 0.0, IDLE * amps, 1.0, None,
+    return JsbsimMotor(kv, STAND_IN_V, DROP * STAND_IN_V / amps, 0.0, IDLE * amps, 1.0, None,
                  (1.0 + STAND_IN_INERTIA) * blades, False)  # fmt: skip
 
 
@@ -265,7 +265,7 @@ def _sum(*parts: str) -> str:
     return f"<sum>{''.join(parts)}</sum>"
 
 
-def _motor_channel(m: Motor, name: str) -> str:
+def _motor_channel(m: JsbsimMotor, name: str) -> str:
     """Channel of the system file: throttle with the battery's resistance and the current limit, see `motor`."""
     emf = f"<quotient><property>propulsion/engine[0]/propeller-rpm</property>{_value(m.kv_rpm_V)}</quotient>"
     duty = f"<pow><property>fcs/throttle-cmd-norm[0]</property>{_value(m.exponent)}</pow>"

@@ -14,7 +14,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.tools.flight.balance import axes_of, features
-from bemt.tools.flight.decision import Decision
+from bemt.tools.flight.decision import FlightDecision
 from bemt.tools.flight.identify import Constant, Identified, identify
 from bemt.tools.flight.inflow import Inflow, Wind, inflow, mass_faults, wind
 from bemt.tools.flight.judge import FALSE_ALARM, FlightVerdict, judge
@@ -176,7 +176,7 @@ def answer_on(
         why = "the log shows no flight with all motors running"
         if not log.rotors:
             why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
-        said = Decision("insufficient", (), NONE, 1.0, float("nan"), why, "no flight")
+        said = FlightDecision("insufficient", (), NONE, 1.0, float("nan"), why, "no flight")
         step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
                "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
         judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))

@@ -35,22 +35,7 @@ _MARGIN = 2.0  # of a logged power: a current sensor that nobody calibrated
 
 
 def mass_faults(log: FlightLog, mass_kg: float | None, name: str) -> list[Fault]:
-    """Why a flight cannot have had a mass; nothing where the log does not tell.
-
-    Parameters
-    ----------
-    log : FlightLog
-        The flight.
-    mass_kg : float or None
-        Mass that is stated [kg].
-    name : str
-        Option or argument that states it.
-
-    Returns
-    -------
-    list of Fault
-        One or none.
-    """
+    """Why a flight cannot have had a mass [kg] that is stated by `name`; nothing where the log does not tell."""
     if mass_kg is None:
         return []
     if not LEAST_KG <= mass_kg <= MOST_KG:

@@ -27,7 +27,7 @@ from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.judge.loss import CLAIMS
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND, axes_of, directions, healthy_flight
-from bemt.tools.flight.decision import GATE, Decision, decide
+from bemt.tools.flight.decision import GATE, FlightDecision, decide
 from bemt.tools.flight.rules import DAYS, RULES, BesideBalance, FlightEvidence, FlightQuery
 
 # What to do next with the vehicle: the step that tells the causes apart which a flight leaves open.
@@ -35,7 +35,7 @@ from bemt.tools.flight.rules import DAYS, RULES, BesideBalance, FlightEvidence, 
 _HOVER = "hover 30 s in still air and judge that flight"
 
 
-def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
+def next_flight(said: FlightDecision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
     """Choose the next step after a decision that compared with so many `given` healthy flights."""
     motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
     others = [i for i in said.effects if not i.startswith(BLADE)]
@@ -96,7 +96,7 @@ _LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforeha
 class FlightVerdict:
     """The answer of the judge on a flight."""
 
-    said: Decision  # As of a diagnosis
+    said: FlightDecision  # As of a diagnosis
     readings: Array  # (B,) Change of the log of each rotor's share of the drive [1]
     next: Suggestion  # What would decide, or confirm
     found: dict[Explanation, FlightEvidence] = field(default_factory=dict)  # All that is listed

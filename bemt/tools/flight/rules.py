@@ -26,7 +26,7 @@ from bemt.tools.flight.decision import (
     RARE,
     SMALL,
     SURE,
-    Decision,
+    FlightDecision,
     Rule,
     credible_sets,
 )
@@ -183,10 +183,10 @@ class FlightQuery:
     alarm: float
     given: int  # Healthy flights to compare with
     beside: BesideBalance = field(default_factory=BesideBalance)  # What else the log shows
-    steps: list[Decision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
+    steps: list[FlightDecision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
 
     @property
-    def said(self) -> Decision | None:
+    def said(self) -> FlightDecision | None:
         """Answer so far."""
         return self.steps[-1] if self.steps else None
 
@@ -239,13 +239,13 @@ class FlightQuery:
     def says(
         self, verdict: str, why: str, of: Sequence[Explanation] = (), more: tuple[str, ...] = (),
         sets: tuple[tuple[str, ...], ...] = (),
-    ) -> Decision:  # fmt: skip
+    ) -> FlightDecision:  # fmt: skip
         """Decision that gives the effects of some explanations, and more."""
         lead = of[0] if of else self.leading if verdict != "none" else NONE
         names = tuple(dict.fromkeys(i for e in of for i in e)) + more
         chance = self.share(of) if of else self.P[NONE] if verdict == "none" else self.P[lead]
         rest = self.log_bayes[UNKNOWN] - self.log_bayes[lead]
-        return Decision(verdict, names, lead, chance, rest, why, sets=sets)
+        return FlightDecision(verdict, names, lead, chance, rest, why, sets=sets)
 
     def share(self, of: Sequence[Explanation]) -> float:
         """Probability of some explanations among those of their kind, once something moved."""
@@ -254,14 +254,14 @@ class FlightQuery:
         return sum(self.P[e] for e in of) / sum(self.P[e] for e in kind)
 
 
-def _within(a: FlightQuery) -> Decision | None:
+def _within(a: FlightQuery) -> FlightDecision | None:
     """DIAGNOSIS 2.3: the p-value of the gate."""
     if a.p_value <= a.alarm or a.few:
         return None
     return a.says("none", "no more than healthy flights differ")
 
 
-def _few_and_within(a: FlightQuery) -> Decision | None:
+def _few_and_within(a: FlightQuery) -> FlightDecision | None:
     """Declared: without healthy flights of one vehicle nobody knows its trim."""
     if a.p_value <= a.alarm:
         return None
@@ -269,7 +269,7 @@ def _few_and_within(a: FlightQuery) -> Decision | None:
     return a.says("insufficient", why)
 
 
-def _few(a: FlightQuery) -> Decision | None:
+def _few(a: FlightQuery) -> FlightDecision | None:
     """The same."""
     if not a.few:
         return None
@@ -278,7 +278,7 @@ def _few(a: FlightQuery) -> Decision | None:
     return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
 
 
-def _day(a: FlightQuery) -> Decision | None:
+def _day(a: FlightQuery) -> FlightDecision | None:
     """Declared: what days do to a trim is no fault, and only a flight of the same day tells."""
     day = Explanation.of(DAY)
     if a.leading != day:
@@ -287,7 +287,7 @@ def _day(a: FlightQuery) -> Decision | None:
     return a.says("insufficient", why)
 
 
-def _rest(a: FlightQuery) -> Decision | None:
+def _rest(a: FlightQuery) -> FlightDecision | None:
     """As of a smooth rest in the diagnosis: a small share of what is explained is a detail of it."""
     rest = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading]
     if rest <= max(LEFT_OVER, SMALL * a.log_bayes[a.leading]):
@@ -295,7 +295,7 @@ def _rest(a: FlightQuery) -> Decision | None:
     return a.says("unknown", "the balance moved, but not as one or two rotors or one weight move it")
 
 
-def _another(a: FlightQuery) -> Decision | None:
+def _another(a: FlightQuery) -> FlightDecision | None:
     """As in the diagnosis: one is sure, another may be there."""
     lead = a.leading
     if len(lead) != 1 or a.share((lead,)) < NAMED or a.same or not a.partners:
@@ -305,7 +305,7 @@ def _another(a: FlightQuery) -> Decision | None:
     return a.says("class", why, (lead,), a.partners, sets=((name,), a.partners))
 
 
-def _one(a: FlightQuery) -> Decision | None:
+def _one(a: FlightQuery) -> FlightDecision | None:
     """As of a name in the diagnosis."""
     lead = a.leading
     if len(lead) != 1 or a.share((lead,)) < NAMED or a.same:
@@ -313,7 +313,7 @@ def _one(a: FlightQuery) -> Decision | None:
     return a.says("named", "one cause explains the balance, the others do not", (lead,), sets=(tuple(lead),))
 
 
-def _both(a: FlightQuery) -> Decision | None:
+def _both(a: FlightQuery) -> FlightDecision | None:
     """The same, of two: they are tried as one explanation, so their probability is that of both."""
     lead = a.leading
     if not lead.pair or a.share((lead,)) < NAMED:
@@ -322,7 +322,7 @@ def _both(a: FlightQuery) -> Decision | None:
     return a.says("named", why, (lead,), sets=tuple((i,) for i in lead))
 
 
-def _two(a: FlightQuery) -> Decision | None:
+def _two(a: FlightQuery) -> FlightDecision | None:
     """As of two at work in the diagnosis: a set for each."""
     lead = a.leading
     if not lead.pair:
@@ -335,7 +335,7 @@ def _two(a: FlightQuery) -> Decision | None:
     return a.says("class", "two damaged rotors, each with look-alikes", of, sets=sets)
 
 
-def _alike(a: FlightQuery) -> Decision | None:
+def _alike(a: FlightQuery) -> FlightDecision | None:
     """As of look-alikes in the diagnosis."""
     members = a.as_good[:LARGEST]
     if a.leading.pair or a.share(members) < SURE:
@@ -348,12 +348,12 @@ def _alike(a: FlightQuery) -> Decision | None:
     return a.says("class", why, members, more)
 
 
-def _many(a: FlightQuery) -> Decision | None:
+def _many(a: FlightQuery) -> FlightDecision | None:
     """The rest."""
     return a.says("insufficient", "several different explanations are possible")
 
 
-def _speed(a: FlightQuery) -> Decision | None:
+def _speed(a: FlightQuery) -> FlightDecision | None:
     """By definition: of the causes that look alike in the balance a damaged blade alone unloads its motor."""
     said = a.steps[-1]
     turned = [blade(k) for k in a.beside.faster if blade(k) in said.effects]
@@ -364,7 +364,7 @@ def _speed(a: FlightQuery) -> Decision | None:
                    sets=((turned[0],),))  # fmt: skip
 
 
-def _slow(a: FlightQuery) -> Decision | None:
+def _slow(a: FlightQuery) -> FlightDecision | None:
     """By definition: a blade that lost area does not load its motor more."""
     said = a.steps[-1]
     weak = [k for k in a.beside.slower if blade(k) in said.effects]
@@ -376,7 +376,7 @@ def _slow(a: FlightQuery) -> Decision | None:
     return replace(said, effects=names, why=f"{said.why}; motor {weak[0]} turns slower at its drive")
 
 
-def _changed(a: FlightQuery) -> Decision | None:
+def _changed(a: FlightQuery) -> FlightDecision | None:
     """By definition: the flight before the change is the healthy one."""
     said, change = a.steps[-1], a.beside.change
     if said.verdict not in ("none", "insufficient") or change is None:
@@ -388,7 +388,7 @@ def _changed(a: FlightQuery) -> Decision | None:
                    leading=Explanation.of(names[0]), probability=1.0 - GATE)  # fmt: skip
 
 
-def _shake(a: FlightQuery) -> Decision | None:
+def _shake(a: FlightQuery) -> FlightDecision | None:
     """Declared: what shakes and does not move the balance is an imbalance or a small damage."""
     said = a.steps[-1]
     if said.verdict != "none" or len(a.beside.shaken) != 1:

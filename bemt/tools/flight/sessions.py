@@ -63,17 +63,9 @@ class Sessions:
 
 
 def sessions(flight: FlightLog, healthy: Sequence[FlightLog], stated: Sequence[str] = (), day: str = "") -> Sessions:
-    """Group healthy flights, and place the judged one.
+    """Group healthy flights by `stated` sessions or by their dates, and place the judged one.
 
-    Parameters
-    ----------
-    flight, healthy : FlightLog and sequence of FlightLog
-        The judged flight and the healthy ones.
-    stated : sequence of str
-        Session of each healthy flight as the user groups them; empty for none, then dates tell where all have one.
-    day : str
-        "same": the judged flight is of the last session; "other": of none; or a session of `stated`; empty where the
-        user does not say: then its date tells.
+    `day` is "same" for the last session, "other" for none, or a session of `stated`; where it is empty, the date tells.
     """
     dates, mine = [_date(h) for h in healthy], ""
     if len(stated) == len(healthy) and len(set(stated)) > 1:

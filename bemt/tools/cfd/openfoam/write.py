@@ -28,8 +28,8 @@ from bemt.tools.cfd.openfoam.settings import (
     SECTORS,
     TURBULENCE,
     Body,
+    RunSweep,
     Settings,
-    Sweep,
     sector_choice,
 )
 from geometry.common import GeometryError
@@ -318,7 +318,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     tip = blade[np.hypot(blade[:, 0], blade[:, 1]) > 0.985 * rotor.R]
     azimuth = np.arctan2(tip[:, 1], tip[:, 0])
     first = np.abs(azimuth) < math.pi / max(rotor.B, 2)
-    sweep = Sweep(float(blade[:, 2].min()), float(blade[:, 2].max()), float(tip[:, 2].min()), float(tip[:, 2].max()),
+    sweep = RunSweep(float(blade[:, 2].min()), float(blade[:, 2].max()), float(tip[:, 2].min()), float(tip[:, 2].max()),
                   float(np.abs(azimuth[first]).max()))  # fmt: skip
     surfaces = [name for part in model.parts for name in part.names]
     around = None
