@@ -13,7 +13,7 @@ from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
-from bemt.physics.effects import compressibility, stall_delay
+from bemt.physics.effects import compressibility, stall
 from bemt.physics.effects.airspeed import AirspeedOffset
 from bemt.physics.effects.balance import CrossTalk, ThrustDrift, ThrustGain, ThrustZero
 from bemt.physics.effects.base import Effect, Flow, Loads, Reading
@@ -23,16 +23,14 @@ from bemt.physics.effects.lip_separation import LipSeparation
 from bemt.physics.effects.nacelle import Nacelle
 from bemt.physics.effects.oblique_inflow import ObliqueInflow
 from bemt.physics.effects.other_blade import PitchOffset
-from bemt.physics.effects.post_stall import PostStall
 from bemt.physics.effects.section import Section
-from bemt.physics.effects.stall_delay import StallDelay
+from bemt.physics.effects.stall import PostStall, StallDelay
 from bemt.physics.effects.supply import BatterySag, MotorHeating, SupplyVoltage
 from bemt.physics.effects.surroundings import FORMS, GroundEffect, Recirculation, TunnelBlockage
 from bemt.physics.effects.tip_gap import TipGap
 from bemt.physics.effects.transient import InflowLag, RotorInertia, slope
 from bemt.physics.effects.untwist import Untwist
-from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.physics.sections.polars import ALPHA_GRID, Polar, linear_polar
+from bemt.physics.sections.polars import ALPHA_GRID, ExtrapolatedTable, Polar, from_tables, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 
@@ -167,7 +165,7 @@ def test_stall_delay_forms_at_published_strength() -> None:
     x = np.array([0.25, 0.5, 0.75, 1.0])
     c = np.array([0.6, 0.4, 0.2, 0.05])
     beta = np.radians([40.0, 25.0, 16.0, 10.0])
-    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall_delay.FORMS)
+    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall.FORMS)
     np.testing.assert_allclose(whole, 2.2 * c * np.cos(beta) ** 4)
     np.testing.assert_allclose(snel, 3.0 * c**2)
     power = c ** (1.0 / x)
@@ -176,7 +174,7 @@ def test_stall_delay_forms_at_published_strength() -> None:
     np.testing.assert_allclose(StallDelay(1.5, form="du_selig").weight(c, x, beta), 0.5 * du_selig)
 
 
-@pytest.mark.parametrize("form", stall_delay.FORMS)
+@pytest.mark.parametrize("form", stall.FORMS)
 def test_stall_delay_lifts_stalled_sections_only(form: str) -> None:
     prep = [solver.prepare(rotor(), [(0.7, table())], e, n_stations=9) for e in ((StallDelay(form=form),), ())]
     gain = prep[0].tables[:, 0, 0, :, 0] - prep[1].tables[:, 0, 0, :, 0]

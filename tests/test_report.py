@@ -30,10 +30,10 @@ from bemt.base.page import render
 from bemt.physics.dataset import Dataset
 from bemt.results.report import book_html
 from bemt.results.report.book import About, Book
+from bemt.results.report.diagnosis_block import verdict
 from bemt.results.report.front import summary
 from bemt.results.report.gather import attach_diagnoses, gather, safe_files
 from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks, viewer
-from bemt.results.report.verdicts import verdict
 from bemt.results.sweep.rows import Comparison, Result, Row
 from bemt.tools.cfd.report import attach, cfd_runs, operating_run, report_pages
 from geometry.mesh import Surface

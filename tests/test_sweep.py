@@ -554,7 +554,7 @@ def test_no_flag_is_dropped_from_the_screen() -> None:
 
 
 def test_a_flagged_point_is_no_plain_agreement() -> None:
-    from bemt.results.report.verdicts import stand
+    from bemt.results.report.diagnosis_block import stand
 
     plain = Comparison(S=101.0, D=100.0, u_input=5.0, u_D=0.5)
     flagged = replace(plain, doubts=("supersonic tip",))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bemt.app import registry
-from bemt.app.terminal import complain, progress
+from bemt.app.registry import complain, progress
 from bemt.base.action import Declaration, about, check_counts, did_you_mean
 from bemt.base.errors import EXIT_OK
 

@@ -144,7 +144,7 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     """Prepare the rotor of the work."""
     from bemt.physics.bem import solver
     from bemt.physics.effects import standard
-    from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+    from bemt.physics.sections.polars import ExtrapolatedTable, from_tables
     from geometry.airfoil import naca
     from geometry.rotor import Rotor, Stations, from_stations
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.data.readers import Reader, SourceText, head_text, load_text, number
-from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.physics.sections.polars import Polar
+from bemt.physics.sections.polars import ExtrapolatedTable, Polar, from_tables
 
 POLAR_CSV = "polar_csv"
 

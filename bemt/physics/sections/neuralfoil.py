@@ -22,8 +22,7 @@ from bemt.base.arrays import Array
 from bemt.base.cache import Kept, shipped_arrays
 from bemt.base.errors import needs
 from bemt.physics.sections import rule
-from bemt.physics.sections.extrapolation import METHODS, extend, viterna_cd_max
-from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar, first_stall
+from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, METHODS, Polar, extend, first_stall, viterna_cd_max
 
 if TYPE_CHECKING:
     from geometry.airfoil import Airfoil

@@ -26,9 +26,8 @@ def _pages(book: Book) -> Iterator[Page]:
     """Pages in the order of the menu."""
     from bemt.results.report.book import Page, sections
     from bemt.results.report.case_page import case_sections, reproduction_table
-    from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
+    from bemt.results.report.diagnosis_block import diagnosis_parts, headline, page_verdict
     from bemt.results.report.front import answers, front_parts
-    from bemt.results.report.verdicts import headline
 
     names = [page.result.name for page in book.cases]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
@@ -53,7 +52,7 @@ def _pages(book: Book) -> Iterator[Page]:
 def book_html(book: Book) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
-    from bemt.results.report.verdicts import headline
+    from bemt.results.report.diagnosis_block import headline
 
     about, only = book.about, book.cases
     made = " · ".join(filter(None, (about.author, about.date, about.revision)))

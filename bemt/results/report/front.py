@@ -10,9 +10,8 @@ from typing import Any
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
-from bemt.results.report.diagnosis_block import diagnosis_verdict, page_verdict
+from bemt.results.report.diagnosis_block import answer, diagnosis_verdict, headline, page_verdict, verdict
 from bemt.results.report.plot import Mark, Plot, figure, points
-from bemt.results.report.verdicts import answer, headline, verdict
 
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28),

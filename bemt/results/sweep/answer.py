@@ -13,7 +13,7 @@ from bemt.base.errors import EXIT_UNCONVERGED
 from bemt.base.tables import number_text, text_table
 from bemt.results.sweep import batch
 from bemt.results.sweep.rows import ROW_SOURCES, Comparison, Result, State, Sweep
-from bemt.results.sweep.text import case_text, overview_text
+from bemt.results.sweep.store import case_text, overview_text
 from bemt.rotors.case import find_cases
 from bemt.rotors.validity import kind, serious
 

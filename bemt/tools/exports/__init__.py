@@ -23,7 +23,7 @@ __all__ = ["exports", "target_ids"]
 
 _SHARED = {
     "actions", "autopilots", "base", "blades", "design_codes", "flow_solvers", "folder", "offers", "parts",
-    "performance", "printing", "simulators", "solids",
+    "performance", "printing", "simulators", "solids", "tables",
 }  # fmt: skip
 """Files of this folder that are no target of their own; those with several have them in ``offers``."""
 

@@ -2,6 +2,9 @@
 
 ACTIONS = {"export": "bemt.tools.exports.actions:export"}
 EXPORTS = {
+    "c81": "bemt.tools.exports.blades:C81Export",
+    "table": "bemt.tools.exports.tables:TableExport",
+    "fmu": "bemt.tools.exports.tables:FmuExport",
     "stl": "bemt.tools.exports.solids:StlExport",
     "obj": "bemt.tools.exports.solids:ObjExport",
     "step": "bemt.tools.exports.solids:StepExport",
