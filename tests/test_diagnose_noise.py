@@ -17,7 +17,7 @@ from bemt.judge.diagnose.load import load
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.diagnose.repeats import conditions, noise_sizes, projected_out, spread_sizes
 from bemt.physics.dataset import Dataset
-from bemt.physics.effects.surroundings import GroundEffect
+from bemt.physics.effects.ground_effect import GroundEffect
 from bemt.rotors.latents import AsBuilt
 
 

@@ -13,8 +13,8 @@ from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
 from bemt.physics.dataset import Dataset
-from bemt.physics.effects.balance import ThrustGain
 from bemt.physics.effects.base import Effect
+from bemt.physics.effects.gain import ThrustGain
 from bemt.rotors.case import Case
 
 LACKS = left_out("compressibility", case())

@@ -13,23 +13,35 @@ from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
-from bemt.physics.effects import compressibility, stall
-from bemt.physics.effects.airspeed import AirspeedOffset
-from bemt.physics.effects.balance import CrossTalk, ThrustDrift, ThrustGain, ThrustZero
+from bemt.physics.effects import compressibility, drag_divergence, stall_delay
+from bemt.physics.effects.air_density import AirDensity
+from bemt.physics.effects.airspeed_offset import AirspeedOffset
 from bemt.physics.effects.base import Effect, Flow, Loads, Reading
-from bemt.physics.effects.compressibility import Compressibility, DragDivergence
-from bemt.physics.effects.entries import AirDensity, RpmScale, UnitSlip
+from bemt.physics.effects.battery_sag import BatterySag
+from bemt.physics.effects.compressibility import Compressibility
+from bemt.physics.effects.cross_talk import CrossTalk
+from bemt.physics.effects.drag_divergence import DragDivergence
+from bemt.physics.effects.drift import ThrustDrift
+from bemt.physics.effects.gain import ThrustGain
+from bemt.physics.effects.ground_effect import FORMS, GroundEffect
+from bemt.physics.effects.inflow_lag import InflowLag
 from bemt.physics.effects.lip_separation import LipSeparation
+from bemt.physics.effects.motor_heating import MotorHeating
 from bemt.physics.effects.nacelle import Nacelle
 from bemt.physics.effects.oblique_inflow import ObliqueInflow
-from bemt.physics.effects.other_blade import PitchOffset
+from bemt.physics.effects.pitch_offset import PitchOffset
+from bemt.physics.effects.post_stall import PostStall
+from bemt.physics.effects.recirculation import Recirculation
+from bemt.physics.effects.rotor_inertia import RotorInertia, slope
+from bemt.physics.effects.rpm_scale import RpmScale
 from bemt.physics.effects.section import Section
-from bemt.physics.effects.stall import PostStall, StallDelay
-from bemt.physics.effects.supply import BatterySag, MotorHeating, SupplyVoltage
-from bemt.physics.effects.surroundings import FORMS, GroundEffect, Recirculation, TunnelBlockage
+from bemt.physics.effects.stall_delay import StallDelay
+from bemt.physics.effects.supply_voltage import SupplyVoltage
 from bemt.physics.effects.tip_gap import TipGap
-from bemt.physics.effects.transient import InflowLag, RotorInertia, slope
+from bemt.physics.effects.tunnel_blockage import TunnelBlockage
+from bemt.physics.effects.unit_slip import UnitSlip
 from bemt.physics.effects.untwist import Untwist
+from bemt.physics.effects.zero import ThrustZero
 from bemt.physics.sections.polars import ALPHA_GRID, ExtrapolatedTable, Polar, from_tables, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
@@ -148,7 +160,7 @@ def test_form_and_amplitude_reach_the_thrust() -> None:
 
 
 def test_wave_drag_has_the_published_values_at_divergence() -> None:
-    lock, cubic = (DragDivergence(form=f) for f in compressibility.DRAG_DIVERGENCE_FORMS)
+    lock, cubic = (DragDivergence(form=f) for f in drag_divergence.FORMS)
     h = 1e-6
     slope = (float(lock.rise(0.75 + h, 0.75)) - float(lock.rise(0.75 - h, 0.75))) / (2.0 * h)
     assert slope == pytest.approx(0.1, rel=1e-6)  # the definition of M_dd behind 20 (M - M_cr)^4
@@ -156,7 +168,7 @@ def test_wave_drag_has_the_published_values_at_divergence() -> None:
     for e in (lock, cubic):
         assert float(e.rise(0.6, 0.75)) == 0.0
         assert np.all(np.diff(np.asarray(e.rise(np.linspace(0.7, 0.9, 30), 0.75))) > 0.0)
-    for form in compressibility.DRAG_DIVERGENCE_FORMS:
+    for form in drag_divergence.FORMS:
         early, late = (loads(DragDivergence(k, form), rpm=20000.0)[1] for k in (0.80, 0.95))
         assert early > 1.01 * late
 
@@ -165,7 +177,7 @@ def test_stall_delay_forms_at_published_strength() -> None:
     x = np.array([0.25, 0.5, 0.75, 1.0])
     c = np.array([0.6, 0.4, 0.2, 0.05])
     beta = np.radians([40.0, 25.0, 16.0, 10.0])
-    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall.FORMS)
+    whole, snel, du_selig = (np.asarray(StallDelay(form=f).weight(c, x, beta)) for f in stall_delay.FORMS)
     np.testing.assert_allclose(whole, 2.2 * c * np.cos(beta) ** 4)
     np.testing.assert_allclose(snel, 3.0 * c**2)
     power = c ** (1.0 / x)
@@ -174,7 +186,7 @@ def test_stall_delay_forms_at_published_strength() -> None:
     np.testing.assert_allclose(StallDelay(1.5, form="du_selig").weight(c, x, beta), 0.5 * du_selig)
 
 
-@pytest.mark.parametrize("form", stall.FORMS)
+@pytest.mark.parametrize("form", stall_delay.FORMS)
 def test_stall_delay_lifts_stalled_sections_only(form: str) -> None:
     prep = [solver.prepare(rotor(), [(0.7, table())], e, n_stations=9) for e in ((StallDelay(form=form),), ())]
     gain = prep[0].tables[:, 0, 0, :, 0] - prep[1].tables[:, 0, 0, :, 0]

@@ -17,7 +17,8 @@ from bemt.base import units
 from bemt.physics import air
 from bemt.physics.bem import kernel, oblique, packing, residual
 from bemt.physics.bem.duct import DuctFlow, duct_flow
-from bemt.physics.effects.compressibility import Compressibility, DragDivergence
+from bemt.physics.effects.compressibility import Compressibility
+from bemt.physics.effects.drag_divergence import DragDivergence
 from bemt.physics.effects.tip_gap import TipGap
 from bemt.physics.sections.polars import ALPHA_GRID
 from bemt.rotors import validity

@@ -353,11 +353,11 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
         ),
         ("bemt.physics.bem.model", "import bemt.rotors.case.prepare", "bemt.rotors.case.prepare is not below it"),
         (
-            "bemt.physics.effects.momentum",
+            "bemt.physics.effects.swirl",
             "import bemt.physics.effects.tip_loss",
             "an effect is one file, got bemt.physics.effects.tip_loss",
         ),
-        ("bemt.physics.effects.momentum", "from bemt.data.readers import read", "bemt.data.readers is not below it"),
+        ("bemt.physics.effects.swirl", "from bemt.data.readers import read", "bemt.data.readers is not below it"),
         (
             "bemt.results.sweep.batch",
             "from bemt.tools.cfd import worker",
@@ -386,7 +386,7 @@ def test_the_tree_keeps_the_rules(tree: dict[str, str]) -> None:
             "files in the pure core: Path('x').read_text",
         ),
         ("bemt.physics.air", "import os\nos.replace('a', 'b')", "files in the pure core: os.replace"),
-        ("bemt.physics.effects.momentum", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
+        ("bemt.physics.effects.swirl", "import numpy as np\nnp.load('x.npy')", "files in the pure core: np.load"),
         ("bemt.physics.bem.solver", "import os\nos.environ['X']", "environment in the pure core: os.environ"),
         ("bemt.rotors.case", "import os\nos.getenv('X')", "environment in the pure core: os.getenv"),
         ("bemt.physics.bem.solver", "def f():\n    import time", "clock in the pure core: import time"),

@@ -13,7 +13,8 @@ from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.effects import Effect, standard
-from bemt.physics.effects.momentum import HighInduction, Swirl
+from bemt.physics.effects.high_induction import HighInduction
+from bemt.physics.effects.swirl import Swirl
 from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import Polar, linear_polar
 from bemt.rotors.case import load_case

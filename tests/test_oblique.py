@@ -16,7 +16,7 @@ from bemt.base.errors import InputError
 from bemt.physics.air import Air
 from bemt.physics.bem import oblique, solver
 from bemt.physics.effects import Effect, standard
-from bemt.physics.effects.oblique_inflow import Flapping
+from bemt.physics.effects.flapping import Flapping
 from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import linear_polar
 from geometry.airfoil import naca4

@@ -19,7 +19,7 @@ from bemt.physics.bem import kernel, residual, solver, vecmath
 from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.effects import Effect, RotorBuild, standard, without
 from bemt.physics.effects.lifting_surface import LiftingSurface
-from bemt.physics.effects.momentum import Swirl
+from bemt.physics.effects.swirl import Swirl
 from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import Polar, linear_polar
 from geometry.rotor import Rotor, Stations

@@ -15,7 +15,7 @@ import bemt
 from bemt.base.cache import Kept
 from bemt.physics.bem import model as bem
 from bemt.physics.effects.compressibility import Compressibility
-from bemt.physics.effects.momentum import Swirl
+from bemt.physics.effects.swirl import Swirl
 from bemt.rotors.case import lattice
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate

@@ -1,4 +1,4 @@
-"""Physical effects, a file each or one a sensor; see :mod:`bemt.physics.effects.base` for what an effect is.
+"""Physical effects, one file each; see :mod:`bemt.physics.effects.base` for what an effect is.
 
 >>> from bemt.physics.effects import catalogue, standard
 >>> "tip_loss" in catalogue()

@@ -1,4 +1,4 @@
-"""Losses of finite blade count at tip and hub."""
+"""Prandtl tip loss."""
 
 from __future__ import annotations
 
@@ -43,30 +43,3 @@ class TipLoss(Effect):
         """Switch the tip factor on."""
         bake.num.tip = self.strength
         bake.num.far_wake = float(self.sheets == "wake")
-
-
-# Prandtl hub loss.
-
-
-@dataclass(frozen=True)
-class HubLoss(Effect):
-    """Trailing vortex at the blade root: F = (2/pi) acos(exp(-f)), f = strength B (r - Rhub) / (2 Rhub |sin phi|).
-
-    Notes
-    -----
-    Ning (2014), Wind Energy 17:1327, eq. 4 and 6, doi:10.1002/we.1636.  Multiplies the tip factor.  A ducted rotor has
-    none: its hub is one wall of an annulus, and the blade's lift goes on to it.
-    """
-
-    strength: float = 1.0
-
-    id = "hub_loss"
-    inviscid = True
-    title = "hub loss (lift loss at the blade root)"
-    sign = "less thrust and torque by constant shares, growing with loading; the root is so slow that it barely shows"
-    parameters = (Parameter("strength", "1", 0.5, 1.3, "shared effect table of the project; 1 is Prandtl", 3),)
-
-    def momentum(self, bake: RotorBuild) -> None:
-        """Switch the hub factor on."""
-        if not bake.ducted:
-            bake.num.hub = self.strength

@@ -5,7 +5,7 @@ The motor is a direct-current machine at the duty d of the ESC, k = 60/(2 pi K_v
     I = (d V_b - k Omega) / (R + X^2/R),   V_b = V_oc(SoC) - R_b (d I + I_e),   k (I - I_0) = Q(Omega)
 
 R = R_m + R_e, with the ESC's own current I_e and the copper's R_m and the magnets' k at the winding's temperature
-(coefficients of `bemt.physics.effects.supply`, so that model and diagnosis agree). X = p L Omega is the
+(coefficients of `bemt.physics.effects.motor_heating`, so that model and diagnosis agree). X = p L Omega is the
 reactance of the winding, which turns the current away from the EMF: at d = 0 this is the brake of a motor with shorted
 terminals, strongest at X = R and softer above. Firmware sets for which share of the time it shorts them at no throttle
 (`brake_on_stop`); at any throttle above it brakes fully. Above the current limit the ESC lowers d.
@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.physics.effects.supply import COPPER, MAGNET
+from bemt.physics.effects.motor_heating import COPPER, MAGNET
 from bemt.rotors.case import Case
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
 from bemt.rotors.case.lattice import SPEEDS
@@ -144,7 +144,7 @@ def from_loads(
     if case.ducted or np.count_nonzero(both) < 4:
         why = "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
         return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
-    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.physics.effects.transient)
+    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.physics.effects.inflow_lag)
     w = rpm[:half][both] * math.pi / 30.0
     dT_dV = (thrust_N[half:][both] - T[both]) / step
     v = table.induced(T[both])

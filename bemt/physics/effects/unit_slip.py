@@ -1,104 +1,13 @@
-"""What was entered wrongly: density, blades seen by the speed sensor, units."""
+"""Number written down in another unit than its label says."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cache
 
 from bemt.base import unit_errors
 from bemt.physics.effects.base import Effect, Flow, Parameter, Reading, choice
-
-
-@dataclass(frozen=True)
-class AirDensity(Effect):
-    """Air of another density: barometer not read, other altitude, warm or humid room.
-
-    Notes
-    -----
-    rho (1 + change). +-3 % is weather (CIPM-2007, Picard et al. 2008, Metrologia 45:149: 1 % per 3 K or 10 hPa); -30 %
-    is 3500 m of the U.S. Standard Atmosphere (1976). Viscosity and speed of sound stay the same: they depend on
-    temperature only.
-    """
-
-    change: float = -0.10
-
-    id = "air_density"
-    exact = True
-    title = "wrong air density"
-    check = "read barometer and thermometer at the stand and compute the density"
-    sign = (
-        "thrust and torque off by the same share at every speed and advance ratio; a cell gain moves only one of them"
-    )
-    parameters = (
-        Parameter("change", "1", -0.35, 0.5, "weather +-3 %; altitude to 3500 m, forgotten or wrongly stated", 7, 0.0),
-    )
-    on_by_default = False
-
-    def plausible(self, flow: Flow) -> bool:
-        """Whether there is such air: 0.66 kg/m3 at 6000 m (U.S. Standard Atmosphere), 1.42 at sea level and -25 C."""
-        rho = flow.rho * (1.0 + self.change)
-        return bool(rho.min() > 0.66 and rho.max() < 1.42)
-
-    def flow(self, flow: Flow) -> None:
-        """Change the density."""
-        flow.rho = flow.rho * (1.0 + self.change)
-
-
-# Speed of rotation that is not the indicated one.
-
-_EPS = tuple(e / 400.0 for e in range(-16, 17) if e)
-# Rarer ones are left to the scaling laws; nearer ones (11 : 12) are within what the level of a model may be off.
-_RATIOS = unit_errors.speed_ratios(rarest=1.0, nearest=Fraction(8, 7))
-
-
-@dataclass(frozen=True)
-class RpmScale(Effect):
-    """The indicated speed is factor (1 + eps) times the true one.
-
-    Notes
-    -----
-    Electronic speed controllers count electrical revolutions (pole pairs times mechanical), optical tachometers count
-    blades. A wrong setting gives a rational factor (`bemt.base.unit_errors`, declared). ``eps``: clock error of cheap
-    counters, +-1 % (declared). The rotor turns at the indicated speed over the factor.
-    """
-
-    factor: float = 1.0
-    eps: float = 0.01
-
-    id = "rpm_scale"
-    title = "wrong speed of rotation"
-    check = "count the revolutions with an optical tachometer; check the pole pairs or blades set in the counter"
-    sign = (
-        "thrust and torque off by the same square, and airspeed effects appear at another J; a rational ratio of "
-        "pole or blade counts; density does not change J"
-    )
-    kind = "stand"
-    fault = "scale"
-    sensor = "rpm"
-    discrete = ("factor",)
-    parameters = (
-        Parameter("factor", "1", 1.0 / 24.0, 24.0, "pole pairs and blade counts", 0, 1.0),
-        Parameter("eps", "1", -0.04, 0.04, "declared, clock of a counter", 0, 0.0, 0.01),
-    )
-    on_by_default = False
-
-    def flow(self, flow: Flow) -> None:
-        """Turn the rotor at its true speed."""
-        flow.rpm = flow.rpm / (self.factor * (1.0 + self.eps))
-
-    def variants(self) -> tuple[dict[str, float], ...]:
-        """Small errors, then the rational factors."""
-        small = [{"factor": 1.0, "eps": e} for e in _EPS]
-        return (*small, *({"factor": f, "eps": 0.0} for f in sorted(r.ratio for r in _RATIOS)))
-
-    def odds(self) -> float:
-        """Relative frequency of the ratio."""
-        return next((r.weight for r in _RATIOS if r.ratio == self.factor), 1.0)
-
-
-# Number written down in another unit than its label says.
 
 _SIGNED = ("thrust_N", "torque_Nm", "airspeed_m_s")
 _KINDS = {"thrust_N": "force", "torque_Nm": "torque", "rpm": "rotation", "airspeed_m_s": "airspeed",
