@@ -1,4 +1,4 @@
-"""The whole table of thrust and torque: CSV, JSON, C, Python; and the same as an FMU."""
+"""The whole table of thrust and torque: CSV, JSON, a C header with its lookup; and the same as an FMU."""
 
 from __future__ import annotations
 
