@@ -26,7 +26,7 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.schema import GROUPS, CaseFile
 from bemt.rotors.case.unknowns import completed
 from bemt.tools.cfd.schema import AxesTable, CampaignFile
-from bemt.tools.drive.motor_file import MotorToml
+from bemt.tools.drive.motor_result import MotorToml
 from bemt.tools.drive.thrusters_result import ThrustersFile
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")

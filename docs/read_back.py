@@ -29,8 +29,8 @@ from bemt.tools.drive import drive_result
 from bemt.tools.drive.drive_result import with_drive
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job, LoadsExport
-from bemt.tools.exports.manifest import entry
-from bemt.tools.exports.motor import motor_of
+from bemt.tools.exports.jsbsim import motor_of
+from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import oblique_loads, solve_points
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -233,8 +233,6 @@ TEXT = {
     "fan": "profile by its grammar, integrals of the rows",
     "flow360": "shapes and units",
     "px4": "formula of its source (sih.cpp), ranges of its parameters",
-    "simulink": "MAT file read by SciPy",
-    "su2-bem": "layout of its test case",
     "su2-disk": "layout of its test case, integrals of the rows",
 }
 """What the text of a target was checked with where its program was not run."""

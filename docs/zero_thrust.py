@@ -16,7 +16,7 @@ from bemt.base.tables import write_atomic
 from bemt.rotors.case import load_case
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import Job
-from bemt.tools.exports.motor import motor_of
+from bemt.tools.exports.jsbsim import motor_of
 from bemt.tools.exports.performance import solve_points
 
 CASE = Path(__file__).resolve().parent.parent / "cases/prop_10x5/case.toml"

@@ -17,10 +17,9 @@ import numpy as np
 from geometry.common import Array, Faults, GeometryError, needs
 from geometry.duct import Duct
 from geometry.mesh import Options, blade_volume, hub_profile, radii, wrapped_outline
-from geometry.mesh_duct import StatorPlan, centre_body, duct_profile, plan_stator
 from geometry.printed import HEXAGON, cutters, framed, root_depth
 from geometry.rotor import Rotor
-from geometry.solid import Mesh, profile_volume
+from geometry.solid import Mesh, StatorPlan, centre_body, duct_profile, plan_stator, profile_volume
 
 MM = 1000.0
 TOLERANCE = 5e-3
@@ -408,22 +407,10 @@ def _wall_name(duct: Duct, radius: Array, x: Array) -> str:
 def flow_domain(
     parts: Parts, rotor: Rotor, duct: Duct | None = None, wide: float = 10.0, ahead: float = 5.0, behind: float = 10.0
 ) -> tuple[Any, list[tuple[Any, str]]]:
-    """Air round a rotor and its duct as one solid, a box less the parts, and the names of its faces.
+    """Air round a rotor and its duct as one solid in millimetres, a box less the parts, and its faces with their names.
 
-    Parameters
-    ----------
-    parts : Parts
-        From `solids`; parts that touch leave no face where they do.
-    rotor, duct : Rotor, Duct
-        What the parts were made from.
-    wide, ahead, behind : float
-        Width of the box, and its reach from the rotor upstream (+z) and downstream, in diameters [1].
-
-    Returns
-    -------
-    cadquery solid, list of (face, str)
-        In millimetres; names as `named_faces` has them, and ``far_field_inlet``, ``far_field_outlet``,
-        ``far_field_side``.
+    `wide` is the width of the box, `ahead` and `behind` its reach upstream (+z) and downstream, in diameters [1].
+    Names as `named_faces` has them, and ``far_field_inlet``, ``far_field_outlet``, ``far_field_side``.
     """
     cq = needs("cadquery", "cad")
 

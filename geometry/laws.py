@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.airfoil import Airfoil
-from geometry.blade import Blade, from_stations
 from geometry.common import Array, Faults, GeometryError
+from geometry.rotor import Blade, from_stations
 
 
 @dataclass(frozen=True)

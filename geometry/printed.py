@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from geometry.blade import Blade
 from geometry.common import Array, Faults, GeometryError, offset
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor
 
 SHARPNESS = 12.0
 """p: the larger it is, the narrower the transition from strip to section; at its middle 6 % is added [1]."""

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.airfoil import Airfoil
 from geometry.common import Array, GeometryError
-from geometry.rotor_axis import PROBES, blades, frame, pick
-from geometry.section_fit import Cut, fit_section, nose_first
+from geometry.rotor_axis import PROBES, Cut, blades, fit_section, frame, nose_first, pick
 
 Faces = NDArray[np.int64]
 

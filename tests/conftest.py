@@ -113,7 +113,7 @@ def polar() -> Polar:
     """Cambered section with a stall, from closed forms: no network, no Reynolds dependence."""
     import numpy as np
 
-    from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+    from bemt.physics.sections.polars import ExtrapolatedTable, from_tables
 
     alpha = np.radians(np.arange(-20.0, 25.5, 0.5))
     linear = 5.9 * (alpha + np.radians(4.0))

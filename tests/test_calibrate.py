@@ -13,7 +13,7 @@ from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.physics import coefficients as co
 from bemt.rotors import k1k2_calibration as calibrate
-from bemt.rotors import k1k2_fit as fit
+from bemt.rotors import k1k2_calibration as fit
 from bemt.rotors import k1k2_points as gather
 from bemt.rotors.k1k2_points import FitPoints, MeasuredPropeller
 

@@ -24,14 +24,11 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.cfd_setup import GRID_FLOOR
 from bemt.tools.cfd.balance import BALANCE_LIMIT, balance_of
-from bemt.tools.cfd.campaign import run_campaign
+from bemt.tools.cfd.campaign import _Bemt, run_campaign, summary
 from bemt.tools.cfd.openfoam.write import settings_of
 from bemt.tools.cfd.record import CampaignRecord, grid_studies, grid_uncertainty
-from bemt.tools.cfd.rows import COLUMNS, RunRow, run_of
-from bemt.tools.cfd.schema import load_campaign
-from bemt.tools.cfd.start import StartField, splice
-from bemt.tools.cfd.summary import _Bemt, summary
-from bemt.tools.cfd.worker import point_key, radial_of
+from bemt.tools.cfd.schema import COLUMNS, RunRow, load_campaign, run_of
+from bemt.tools.cfd.worker import StartField, point_key, radial_of, splice
 
 pytestmark = pytest.mark.usefixtures("equal_solids_once")
 

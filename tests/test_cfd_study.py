@@ -22,7 +22,7 @@ from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all
 from bemt.judge.import_files import import_
 from bemt.physics.dataset import Dataset
-from bemt.results.report.audit_block import study_parts
+from bemt.results.report.diagnosis_block import study_parts
 from bemt.rotors.case import load_case
 
 SPEEDS, LOADS = (0.0, 5.0, 10.0, 15.0), (7.6, 6.0, 4.0, 1.5)

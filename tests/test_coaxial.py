@@ -20,13 +20,11 @@ from bemt.physics.bem.coaxial import Pair
 from bemt.physics.effects import standard, without
 from bemt.physics.effects.coaxial_neighbour import CoaxialNeighbour
 from bemt.physics.sections.polars import linear_polar
-from bemt.physics.vortex_cylinder import ahead
-from bemt.physics.wake import contracted
+from bemt.physics.wake import ahead, contracted
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.propagate import prepared
-from geometry.blade import from_stations
 from geometry.laws import helix
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 
 Array = NDArray[np.float64]
 AIR = Air.from_density()

@@ -16,8 +16,8 @@ import pytest
 from bemt.app import cli
 from bemt.base import cache, folders
 from bemt.base.errors import InputError
-from bemt.data.recordings import archive as data_archive
 from bemt.data.recordings import database as data
+from bemt.data.recordings import database as data_archive
 
 GEOM = "r/R c/R beta\n0.15 0.11 30.0\n0.50 0.16 20.0\n0.75 0.13 13.0\n1.00 0.05 8.0\n"
 STATIC = "RPM CT CP\n3000 0.095 0.040\n4000 0.096 0.041\n"

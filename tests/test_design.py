@@ -15,11 +15,10 @@ from bemt.base.units import INCH
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.design import design_answer
-from bemt.tools.design.best_label import standard
 from bemt.tools.design.blade_design import design_blade
-from bemt.tools.design.optimise import optimise
+from bemt.tools.design.minimum_loss import CONTROLS
+from bemt.tools.design.optimise import optimise, standard
 from bemt.tools.design.requirement import DesignPoint, point_of
-from bemt.tools.design.shape import CONTROLS
 
 T, V, RPM, D_IN = 6.0, 15.0, 7000.0, 10.0
 

@@ -17,11 +17,9 @@ from bemt.physics.sections.polars import linear_polar
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.tools.design import optimise as search
-from bemt.tools.design.materials import MATERIALS, SectionStrength, stress
-from bemt.tools.design.minimum_loss import actuator_disk, minimum_loss, without_drag
+from bemt.tools.design.minimum_loss import CONTROLS, actuator_disk, minimum_loss, without_drag
 from bemt.tools.design.problem import _CL, _W, BladeProblem
-from bemt.tools.design.requirement import DesignPoint, required
-from bemt.tools.design.shape import CONTROLS
+from bemt.tools.design.requirement import MATERIALS, DesignPoint, SectionStrength, required, stress
 from geometry.airfoil import naca
 from geometry.laws import from_laws
 from geometry.rotor import Rotor

@@ -16,9 +16,9 @@ from bemt.base.errors import InputError
 from bemt.judge.compare.one_run import compare_run
 from bemt.judge.diagnose import assemble, record
 from bemt.physics.dataset import Dataset
-from bemt.results.report import curves
+from bemt.results.report import gather
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.grid.run import Grid, GridSolver
+from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.rotors.case import Case, load_case
 from bemt.rotors.case.estimate import document as estimate
 from bemt.rotors.case.prepare import k1k2_case
@@ -113,8 +113,8 @@ def _export(case: Case, rpm: Any, V: Any) -> Answer:
 
 def _report(case: Case, rpm: Any, V: Any) -> Answer:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(curves, "_grids", lambda *_: (np.array(rpm), np.array(V), 0))
-        found = curves.case_curves(case)
+        patch.setattr(gather, "_grids", lambda *_: (np.array(rpm), np.array(V), 0))
+        found = gather.case_curves(case)
     at = found.over_rpm
     words = propagate(case, rpm, V, bands=False).points.flags
     assert all(any(kind in told for told in found.flags) for f in words for kind in f) or len(words) > 1
@@ -196,7 +196,7 @@ AXIAL: Mapping[str, Callable[[Case, Path], Any]] = {
     "performance table": lambda case, _: performance_of(case, 6000.0),
     "airspeed of an export": lambda case, _: Job(case).airspeed,
     "openfoam": lambda case, _: settings_of(case, Run()),
-    "along the blade": lambda case, _: curves.radial_curves(case),
+    "along the blade": lambda case, _: gather.radial_curves(case),
     "gradient": lambda case, _: bemt.load(case.path).gradient(6000.0),
     "diagnose": lambda case, _: assemble.build([record.from_series(READING, case)], [case]),
 }

@@ -18,8 +18,8 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
-from bemt.tools.drive import bench_map, map_export, map_scatter
-from bemt.tools.drive.map_points import join, map_points, points
+from bemt.tools.drive import bench_map, map_result
+from bemt.tools.drive.bench_map import join, map_points, points
 
 
 def made(pulse: np.ndarray, volts: np.ndarray | float = 12.0, noise: float = 0.0, seed: int = 0) -> Dataset:
@@ -105,11 +105,11 @@ def test_scatter_of_the_readings_is_told_from_that_of_the_esc() -> None:
         return map_points(pulse, {"thrust_N": T, "rpm": rpm})
 
     assert bench_map.held_out(points_of(thrust)).rms > 0.02
-    assert np.max(np.abs(map_scatter.speed_known(points_of(thrust)))) < 1e-12
+    assert np.max(np.abs(map_result.speed_known(points_of(thrust)))) < 1e-12
     noise = 0.01 * full * rng.standard_normal(pulse.size)
-    rms = map_scatter.document(points_of(thrust + noise))["rms_of_full_thrust"]
+    rms = map_result.scatter_document(points_of(thrust + noise))["rms_of_full_thrust"]
     assert 0.007 < rms < 0.025  # the level's own reading and its two neighbours'
-    assert map_scatter.document(map_points(pulse, {"thrust_N": thrust})) == {
+    assert map_result.scatter_document(map_points(pulse, {"thrust_N": thrust})) == {
         "points": 0,
         "worst_of_full_thrust": None,
         "rms_of_full_thrust": None,
@@ -148,7 +148,7 @@ def test_command_writes_tables_that_agree(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.parametrize("batteries", [1, 2])
 def test_the_c_header_compiles_and_gives_the_map(tmp_path: Path, batteries: int) -> None:
     chart = bench_map.fit(join([made(LEVELS, 12.0 + 4.0 * k) for k in range(batteries)]))
-    (tmp_path / "map.h").write_text(map_export.c_header(chart, "2 fans", 101))
+    (tmp_path / "map.h").write_text(map_result.c_header(chart, "2 fans", 101))
     volts = chart.voltage_ref if batteries == 2 else None
     arg = f", {volts}f" if volts else ""
     calls = "".join(
@@ -206,7 +206,7 @@ def test_where_a_round_trip_misses_the_readings_themselves_scatter(shared_data: 
     for file in files:
         got = points(importers.read(file), file.name)
         assert bench_map.held_out(got).worst > 0.01, file.name
-        assert map_scatter.document(got)["worst_of_full_thrust"] > 0.01, file.name
+        assert map_result.scatter_document(got)["worst_of_full_thrust"] > 0.01, file.name
 
 
 def test_five_runs_on_one_emptying_battery_tell_the_voltage(shared_data: Path) -> None:

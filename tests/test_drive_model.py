@@ -18,19 +18,19 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.physics import effects
 from bemt.rotors.case import load_case
-from bemt.tools.drive import drive_result, mission, rotor_table, transient
+from bemt.tools.drive import drive_model, drive_result, mission
+from bemt.tools.drive.bench_map import map_points
 from bemt.tools.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
-from bemt.tools.drive.map_points import map_points
-from bemt.tools.drive.thrusters import Thruster, allocate, attainable, effectiveness, moment_at
+from bemt.tools.drive.thrusters_result import Thruster, allocate, attainable, effectiveness, moment_at
 
 FLAT = dict(soc_table=(0.0, 1.0), ocv_V=(3.7, 3.7))
 PULSE = np.linspace(1050.0, 2000.0, 20)
 
 
-def coefficients(CT: float, CQ: float, D: float, *more: float) -> rotor_table.RotorMap:
+def coefficients(CT: float, CQ: float, D: float, *more: float) -> drive_model.RotorMap:
     """Rotor of constant coefficients in 1.225 kg/m3; more: inertia, solidity."""
     turn = (2.0 * math.pi) ** 2
-    return rotor_table.quadratic(1.225 * CT * D**4 / turn, 1.225 * CQ * D**5 / turn, D, 1.225, *more)
+    return drive_model.quadratic(1.225 * CT * D**4 / turn, 1.225 * CQ * D**5 / turn, D, 1.225, *more)
 
 
 def drive(**changes: object) -> Drive:
@@ -46,7 +46,7 @@ def drive(**changes: object) -> Drive:
 
 def test_without_load_the_motor_turns_at_kv_times_voltage() -> None:
     free = drive(
-        battery=Battery(4, 0.0, **FLAT), motor=Motor(1000.0, 0.1, 0.0), rotor=rotor_table.quadratic(0.0, 0.0, 0.2)
+        battery=Battery(4, 0.0, **FLAT), motor=Motor(1000.0, 0.1, 0.0), rotor=drive_model.quadratic(0.0, 0.0, 0.2)
     )
     assert np.allclose(free.steady(PULSE).rpm, 1000.0 * 14.8 * (PULSE - 1000.0) / 1000.0, rtol=1e-9)
 
@@ -104,12 +104,12 @@ def test_speed_without_load_rises_with_the_motor_time_constant() -> None:
         battery=Battery(4, 0.0, **FLAT),
         esc=Esc(),
         motor=Motor(1100.0, 0.06, 0.0, J),
-        rotor=rotor_table.quadratic(0.0, 0.0, 0.2),
+        rotor=drive_model.quadratic(0.0, 0.0, 0.2),
     )
     tau = J * 0.06 / float(free.motor.k()) ** 2
     t = np.linspace(0.0, 12.0 * tau, 6001)
-    got = transient.simulate(free, [(0.0, 1200.0), (2.0 * tau, 1800.0)], t[-1], t)
-    assert transient.time_to(t, got.rpm, 2.0 * tau) == pytest.approx(tau, rel=2e-3)
+    got = mission.simulate(free, [(0.0, 1200.0), (2.0 * tau, 1800.0)], t[-1], t)
+    assert mission.time_to(t, got.rpm, 2.0 * tau) == pytest.approx(tau, rel=2e-3)
 
 
 def test_a_rotor_without_brake_coasts_down_on_its_drag() -> None:
@@ -119,31 +119,31 @@ def test_a_rotor_without_brake_coasts_down_on_its_drag() -> None:
         battery=Battery(4, 0.0, **FLAT),
         esc=Esc(brake_on_stop=0.0),
         motor=Motor(1100.0, 0.06, 0.0, J),
-        rotor=rotor_table.quadratic(1e-6, kQ, 0.2),
+        rotor=drive_model.quadratic(1e-6, kQ, 0.2),
     )
     stop = [(0.0, 1600.0), (0.1, 1000.0)]
-    got = transient.simulate(coasting, stop, 0.5, t)
+    got = mission.simulate(coasting, stop, 0.5, t)
     start = got.rpm[0] * np.pi / 30.0
     expected = got.rpm[0] / (1.0 + kQ * start * np.maximum(t - 0.1, 0.0) / J)
     assert got.rpm == pytest.approx(expected, rel=1e-4)
-    idle = transient.simulate(coasting, [stop[0], (0.1, 1000.001)], 0.5, t)
-    braked = transient.simulate(replace(coasting, esc=Esc()), stop, 0.5, t)
+    idle = mission.simulate(coasting, [stop[0], (0.1, 1000.001)], 0.5, t)
+    braked = mission.simulate(replace(coasting, esc=Esc()), stop, 0.5, t)
     assert idle.rpm[-1] < 0.1 * got.rpm[-1]
     assert idle.rpm[150:400] == pytest.approx(braked.rpm[150:400], rel=1e-2, abs=20)
-    half = transient.simulate(replace(coasting, esc=Esc(brake_on_stop=0.5)), stop, 0.5, t)
+    half = mission.simulate(replace(coasting, esc=Esc(brake_on_stop=0.5)), stop, 0.5, t)
     assert braked.rpm[150] < half.rpm[150] < got.rpm[150]
 
 
 def test_a_long_step_ends_in_the_steady_state() -> None:
     d = replace(drive(), off=frozenset({"motor_heating"}), battery=Battery(4, 0.02))
-    got = transient.simulate(d, [(0.0, 1300.0), (0.2, 1700.0)], 1.5)
+    got = mission.simulate(d, [(0.0, 1300.0), (0.2, 1700.0)], 1.5)
     assert got.converged and got.thrust_N[-1] == pytest.approx(d.steady(1700.0).thrust_N[0], rel=1e-5)
     assert got.thrust_N[0] == pytest.approx(d.steady(1300.0).thrust_N[0], rel=1e-9)
 
 
 def test_charge_heat_and_energy_are_conserved() -> None:
     d = drive()
-    got = transient.simulate(d, [(0.0, 1600.0)], 30.0, np.linspace(0.0, 30.0, 601))
+    got = mission.simulate(d, [(0.0, 1600.0)], 30.0, np.linspace(0.0, 30.0, 601))
     drawn = np.trapezoid(got.battery_A, got.time_s) / 3600.0 / 2.2
     assert 1.0 - got.soc[-1] == pytest.approx(drawn, rel=1e-4)
     loss = d.motor.resistance(got.temperature_C) * got.motor_A**2
@@ -156,12 +156,12 @@ def test_each_effect_does_what_its_name_says_and_nothing_when_off() -> None:
     d = drive()
     steps, end = [(0.0, 1200.0), (0.05, 1700.0)], 3.0
     t = np.linspace(0.0, end, 3001)
-    full = transient.simulate(d, steps, end, t)
-    off = {name: transient.simulate(d.without(name), steps, end, t) for name in EFFECTS}
+    full = mission.simulate(d, steps, end, t)
+    off = {name: mission.simulate(d.without(name), steps, end, t) for name in EFFECTS}
     early, late = (t > 0.05) & (t < 0.12), t > 2.5
     assert np.all(off["battery_sag"].thrust_N[late] > full.thrust_N[late]) and np.all(off["battery_sag"].soc == 1.0)
     assert np.all(off["motor_heating"].temperature_C == 25.0) and full.temperature_C[-1] > 26.0
-    assert transient.time_to(t, off["rotor_inertia"].thrust_N, 0.05) < 0.1 * transient.time_to(t, full.thrust_N, 0.05)
+    assert mission.time_to(t, off["rotor_inertia"].thrust_N, 0.05) < 0.1 * mission.time_to(t, full.thrust_N, 0.05)
     # the inflow comes late: thrust at a given speed is higher while it rises
     over = full.thrust_N - d.rotor.thrust(full.rpm * math.pi / 30.0)
     none = off["inflow_lag"].thrust_N - d.rotor.thrust(off["inflow_lag"].rpm * math.pi / 30.0)
@@ -222,7 +222,7 @@ def test_a_planted_inertia_is_found_from_a_step() -> None:
     d = drive(motor=Motor(1100.0, 0.06, 0.8, 3e-5))
     t = np.arange(0.0, 1.0, 0.01)
     rotor = replace(d.rotor, inertia_kg_m2=0.0)
-    got = transient.simulate(replace(d, rotor=rotor), [(0.0, 1200.0), (0.305, 1600.0)], t[-1], t)
+    got = mission.simulate(replace(d, rotor=rotor), [(0.0, 1200.0), (0.305, 1600.0)], t[-1], t)
     inertia, _ = drive_identify.fit_inertia(d, t, got.thrust_N, 1200.0, 1600.0)
     assert inertia == pytest.approx(3e-5, rel=0.03)
 
@@ -233,9 +233,9 @@ def test_the_rotor_of_a_case_is_the_solver_s(project: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5" / "case.toml")
     rpm = np.array([4000.0, 9000.0, 20000.0])
     points = prepare_case(case).solve(rpm, 0.0, case.air())
-    at, V = rotor_table.points(case.diameter_m, 20000.0, 0.0)
+    at, V = drive_model.points(case.diameter_m, 20000.0, 0.0)
     loads = prepare_case(case).solve(at, V, case.air())
-    table = rotor_table.from_loads(case, at, V, loads.thrust_N, loads.torque_Nm, 1.225)
+    table = drive_model.from_loads(case, at, V, loads.thrust_N, loads.torque_Nm, 1.225)
     assert np.allclose(table.thrust(rpm * math.pi / 30.0), points.thrust_N, rtol=5e-3)
     assert np.allclose(table.torque(rpm * math.pi / 30.0), points.torque_Nm, rtol=5e-3)
     assert table.slope_law is not None and np.all(table.slope_law(rpm * math.pi / 30.0) < 0.0)
@@ -281,7 +281,7 @@ def test_faults_of_the_drive_come_all_at_once(
 def test_steps_need_something_that_turns() -> None:
     with pytest.raises(InputError, match="inertia_kg_m2"):
         still = drive(motor=Motor(1100.0, 0.06), rotor=coefficients(0.1, 0.01, 0.2))
-        transient.simulate(still, [(0.0, 1200.0)], 1.0)
+        mission.simulate(still, [(0.0, 1200.0)], 1.0)
 
 
 def test_through_diodes_the_current_stops_and_power_is_still_accounted_for() -> None:

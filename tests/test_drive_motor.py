@@ -7,14 +7,15 @@ import json
 import math
 from pathlib import Path
 
+import motor_trials
 import numpy as np
 import pytest
 from PIL import Image
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
+from bemt.tools.drive import motor_constant, motor_result, outputs
 from bemt.tools.drive import motor_constant as mc
-from bemt.tools.drive import motor_errors, motor_file, motor_generate, picture
 
 S32, S3 = math.sqrt(1.5), math.sqrt(3.0)
 
@@ -77,22 +78,22 @@ def test_oscilloscope_files_of_three_kinds(tmp_path: Path) -> None:
     )
     for name, text in (("k", keysight), ("p", plain), ("t", tek)):
         (tmp_path / name).write_text(text)
-        got_t, got_v = motor_file.read_waveform(tmp_path / name)
+        got_t, got_v = motor_result.read_waveform(tmp_path / name)
         assert np.allclose(got_t, t, atol=1e-8) and np.allclose(got_v, v, atol=1e-5), name
     (tmp_path / "none").write_text("a,b\n1,2\n2,3\n")
     with pytest.raises(InputError, match="no units"):
-        motor_file.read_waveform(tmp_path / "none")
+        motor_result.read_waveform(tmp_path / "none")
 
 
 def folder(tmp_path: Path, seed: int, planted: dict[str, float] | None = None) -> Path:
-    for name, text in motor_generate.generate(seed, planted).items():
+    for name, text in motor_trials.generate(seed, planted).items():
         (tmp_path / name).write_text(text)
     return tmp_path
 
 
 def verdict(tmp_path: Path, seed: int, planted: dict[str, float] | None = None):  # noqa: ANN201
-    trials = motor_file.read(folder(tmp_path, seed, planted))
-    return trials, motor_errors.judge(trials.measured)
+    trials = motor_result.read(folder(tmp_path, seed, planted))
+    return trials, motor_constant.judge(trials.measured)
 
 
 def test_clean_trials_name_no_error(tmp_path: Path) -> None:
@@ -124,11 +125,11 @@ def test_planted_offsets_and_resistors_are_named_and_measured(tmp_path: Path, na
     assert right >= 11 and inside >= 11 and constant >= 11
 
 
-@pytest.mark.parametrize("method", motor_errors.METHODS)
-@pytest.mark.parametrize("word", motor_errors.FACTORS)
+@pytest.mark.parametrize("method", motor_constant.METHODS)
+@pytest.mark.parametrize("word", motor_constant.FACTORS)
 def test_planted_convention_factors_are_named(tmp_path: Path, method: str, word: str) -> None:
     for seed in range(1, 4):
-        trials, got = verdict(tmp_path, seed, {f"{method}.factor": motor_errors.FACTORS[word]})
+        trials, got = verdict(tmp_path, seed, {f"{method}.factor": motor_constant.FACTORS[word]})
         assert got.named == (f"{method}.factor {word}",)
         best = got.explanations[0]
         assert abs(best.ke * trials.to_kt - 0.0311) <= 3.0 * best.u_ke * trials.to_kt
@@ -144,7 +145,7 @@ def test_what_cannot_be_told_apart_is_not_named(tmp_path: Path) -> None:
     path = folder(tmp_path, 4, {"torque.factor": 2.0}) / "motor.toml"
     text = path.read_text()
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("kv_")))
-    got = motor_errors.judge(motor_file.read(path).measured)
+    got = motor_constant.judge(motor_result.read(path).measured)
     found = {e.names for e in got.explanations}
     assert not got.named and {("torque.factor 2",), ("back_emf.factor 1/2",)} <= found
 
@@ -159,7 +160,8 @@ def test_a_scale_that_is_no_convention_is_called_a_gain(tmp_path: Path) -> None:
 
 def test_command_shows_the_case_and_labels_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = tmp_path / "made"
-    assert main(["motor", "--generate", str(made)]) == 0
+    made.mkdir()
+    folder(made, 0)
     assert all(
         "generated, not measured" in (made / n).read_text() for n in ("motor.toml", "back_emf.csv", "torque.csv")
     )
@@ -172,7 +174,7 @@ def test_command_shows_the_case_and_labels_it(tmp_path: Path, capsys: pytest.Cap
     assert by["torque"]["interval95"][0] < 0.0311 < by["torque"]["interval95"][1]
     assert "generated" in doc["data"] and doc["agree"] and doc["stated"]["thesis, adopted (28 trials)"] == 0.0311
     assert (tmp_path / "out" / "motor.png").read_bytes()[:4] == b"\x89PNG"
-    assert main(["motor", "--generate", str(made), "--plant", "torque.shunt=1.05"]) == 0
+    folder(made, 0, {"torque.shunt": 1.05})
     assert main(["motor", str(made)]) == 1
     assert "torque.shunt 1.0" in capsys.readouterr().out
 
@@ -196,7 +198,7 @@ def test_waveforms_stand_for_trials(tmp_path: Path) -> None:
         'winding = "delta"', 'winding = "delta"\npole_pairs = 12'
     )
     (path / "motor.toml").write_text(text)
-    trials = motor_file.read(path)
+    trials = motor_result.read(path)
     assert trials.measured.back_emf is not None
     assert trials.measured.back_emf.slope == pytest.approx(ke, rel=1e-3)
 
@@ -210,7 +212,7 @@ def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.Ca
     assert main(["motor", str(path)]) == 2
     words = capsys.readouterr().err
     assert all(w in words for w in ("motor.winding", "torque.shunt", "torque.shunt_ohm", "back_emf.measure"))
-    path.write_text(motor_generate.generate(1)["motor.toml"].replace("shunt_ohm = 250.0", "shunt_ohm = 2.5"))
+    path.write_text(motor_trials.generate(1)["motor.toml"].replace("shunt_ohm = 250.0", "shunt_ohm = 2.5"))
     assert main(["motor", str(path)]) == 2
     assert "mA" in capsys.readouterr().err
     (tmp_path / "torque.csv").write_text("trial,current_A,shunt\n1,2,3\n")
@@ -218,56 +220,6 @@ def test_faults_of_motor_toml_come_all_at_once(tmp_path: Path, capsys: pytest.Ca
     assert main(["motor", str(path)]) == 2
     words = capsys.readouterr().err
     assert "column in V" in words and "no column trial" in words
-    assert main(["motor", "--generate", str(tmp_path), "--plant", "torque.shnt=1.0"]) == 2
-
-
-def test_measured_trials_are_never_replaced_by_generated_ones(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    for name in ("torque.csv", "back_emf.csv"):
-        (mine / name).write_text("trial,current_A,shunt_V\n1,0,1.0\n")
-    assert main(["motor", "--generate", str(mine)]) == 2
-    words = capsys.readouterr().err
-    assert f"{(mine / 'torque.csv').as_posix()}: got a file that was not generated" in words and "back_emf.csv" in words
-    assert {p.name: p.read_text()[:5] for p in mine.iterdir()} == {"torque.csv": "trial", "back_emf.csv": "trial"}
-    # what was generated may be generated again; a mixed folder stays whole
-    made = tmp_path / "made"
-    assert main(["motor", "--generate", str(made)]) == 0
-    assert main(["motor", "--generate", str(made), "--seed", "4"]) == 0
-    assert (made / "motor.toml").read_text() == motor_generate.generate(4)["motor.toml"]
-    (made / "back_emf.csv").write_text("trial,rpm,v_V\n1,2,3\n")
-    before = {p.name: p.read_text() for p in made.iterdir()}
-    assert main(["motor", "--generate", str(made), "--seed", "5"]) == 2
-    assert {p.name: p.read_text() for p in made.iterdir()} == before
-    # trials that are judged in the same run are not replaced, even where they are generated
-    other = folder(made, 6) / "motor.toml"
-    text = before["motor.toml"] = other.read_text()
-    text = text.replace('"torque.csv"', '"made/torque.csv"').replace('"back', '"made/back')
-    (tmp_path / "mine.toml").write_text(text)
-    capsys.readouterr()
-    assert main(["motor", str(tmp_path / "mine.toml"), "--generate", str(made), "--seed", "7"]) == 2
-    assert "which this run reads" in capsys.readouterr().err and other.read_text() == before["motor.toml"]
-
-
-def test_options_that_would_be_ignored_are_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made, out = str(tmp_path / "made"), str(tmp_path / "out")
-    assert main(["motor", "--generate", made, "--out", out]) == 2
-    assert "--out" in capsys.readouterr().err
-    assert main(["motor", "--generate", made, "--seed", "-1", "--plant", "x=1"]) == 2
-    words = capsys.readouterr().err
-    assert "--seed: got -1; expected a whole number of 0 or more." in words and "--plant: got 'x=1'" in words
-    assert main(["motor", "--plant", "torque.shunt=1.1", "--seed", "3"]) == 2
-    words = capsys.readouterr().err
-    assert all(w in words for w in ("--plant", "--seed: got 3; expected none without --generate", "FILE: got nothing"))
-    assert not list(tmp_path.iterdir())
-    assert main(["motor", "--generate", made, "--json", "--seed", "3", "--plant", "torque.shunt=1.1"]) == 0
-    doc = json.loads(capsys.readouterr().out)
-    assert doc["schema"] == "bemt.motor.generated/1" and (doc["seed"], doc["planted"]) == (3, {"torque.shunt": 1.1})
-    assert doc["folder"] == Path(made).as_posix() and {p.name for p in Path(made).iterdir()} == set(doc["files"])
-    assert main(["motor", made, "--generate", made, "--out", out, "--json"]) == 0  # both at once: judged and written
-    assert json.loads(capsys.readouterr().out) == json.loads((Path(out) / "motor.json").read_text())
 
 
 @pytest.mark.parametrize("link", [False, True])
@@ -292,6 +244,6 @@ def test_results_never_replace_trials(tmp_path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("title", ["Motor", "Motor MN4006 KV380: generated trials, seed 0: nobody measured them, " * 3])
 def test_no_title_is_cut(title: str) -> None:
     trials = {"data sheet": np.array([0.0308]), "torque sensor": np.linspace(0.03, 0.032, 5)}
-    with Image.open(io.BytesIO(picture.box_plot(trials, {"adopted": 0.031}, "constant [N m/A]", title))) as page:
+    with Image.open(io.BytesIO(outputs.box_plot(trials, {"adopted": 0.031}, "constant [N m/A]", title))) as page:
         edges = np.asarray(page.convert("L"))[:, [0, -1]]
     assert edges.min() == 255, "ink on the edge"

@@ -24,8 +24,7 @@ from bemt.physics.bem import kernel as K
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
 from bemt.physics.effects.base import Array, Effect, Flow, Parameter, Reading, RotorBuild
-from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.physics.sections.polars import Polar
+from bemt.physics.sections.polars import ExtrapolatedTable, Polar, from_tables
 from bemt.results.report import effects_list
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case

@@ -42,8 +42,7 @@ from bemt.physics.effects.tunnel_blockage import TunnelBlockage
 from bemt.physics.effects.unit_slip import UnitSlip
 from bemt.physics.effects.untwist import Untwist
 from bemt.physics.effects.zero import ThrustZero
-from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.physics.sections.polars import ALPHA_GRID, Polar, linear_polar
+from bemt.physics.sections.polars import ALPHA_GRID, ExtrapolatedTable, Polar, from_tables, linear_polar
 from geometry.laws import helix
 from geometry.rotor import Rotor
 

@@ -24,9 +24,9 @@ from bemt.rotors.case import Case, load_case
 from bemt.tools.cfd.openfoam.write import Run, settings_of
 from bemt.tools.exports import exports, target_ids
 from bemt.tools.exports.base import FEATURES, Files, Job, LoadsExport
-from bemt.tools.exports.fan import read_profile
+from bemt.tools.exports.flow_solvers import read_profile
 from bemt.tools.exports.folder import export_case
-from bemt.tools.exports.manifest import entry
+from bemt.tools.exports.parts import entry
 from bemt.tools.exports.performance import solve_points
 from geometry import export as module
 from geometry.airfoil import naca4
@@ -40,7 +40,7 @@ from geometry.slicing import find_rotor
 
 NUMBERS = [word for word in target_ids() if word not in ("stl", "obj", "step", "flow", "openfoam")]
 LOADS = [word for word in NUMBERS if exports()[word].kind == "loads"]
-TABLES = ("jsbsim", "mujoco", "simulink", "table", "fmu")
+TABLES = ("jsbsim", "mujoco", "table", "fmu")
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +112,8 @@ def save(files: Files, folder: Path) -> Path:
 
 
 def test_every_target_says_what_it_holds() -> None:
-    assert {"jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "simulink", "table", "fmu", "rotor-disk",
-            "su2-disk", "su2-bem", "flow360", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
+    assert {"jsbsim", "mujoco", "rotorpy", "gazebo", "px4", "ardupilot", "table", "fmu", "rotor-disk",
+            "su2-disk", "flow360", "xrotor", "qprop", "dfdc", "c81"} <= set(exports())  # fmt: skip
     for word, target in exports().items():
         assert target.id == word and target.title and target.holds and target.source and target.conventions
         assert target.kind in ("solid", "loads", "disk", "blade") and target.features <= set(FEATURES)
@@ -421,7 +421,7 @@ def test_the_direction_of_rotation_is_held_or_said(word: str, job: Job, fan: Job
 
 def test_px4_commands_what_its_simulator_gives(project: Path, job: Job) -> None:
     """The controller inverts THR_MDL_FAC, the simulated rotor gives T_MAX u: together, the thrust asked for."""
-    from bemt.tools.exports.px4 import parameters
+    from bemt.tools.exports.autopilots import parameters
 
     files = written("px4", job)
     sih, vehicle = (parameters(str(next(t for n, t in files.items() if n.endswith(end))))
@@ -521,7 +521,7 @@ def test_rotor_disk_in_openfoam(project: Path, tmp_path: Path, speed: float, han
 @pytest.mark.parametrize("name", ["prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8", "ds30"])
 def test_every_case_becomes_every_disk(project: Path, name: str) -> None:
     asked = Job(load_case(project / f"cases/{name}/case.toml"), airspeed_m_s=25.0)
-    for word in ("rotor-disk", "su2-disk", "su2-bem", "flow360", "fan"):
+    for word in ("rotor-disk", "su2-disk", "flow360", "fan"):
         files = written(word, asked)
         assert files and all(len(data) > 50 for data in files.values())
         assert "nan" not in " ".join(str(data).lower() for data in files.values() if isinstance(data, str))
@@ -578,20 +578,20 @@ def test_a_fan_that_dfdc_holds_comes_back_with_its_duct(fan: Job, tmp_path: Path
 
 def test_dfdc_puts_the_rotor_where_the_case_has_it(fan: Job, tmp_path: Path) -> None:
     """Behind the lip, wherever the origin of the file lies; a third of the length unless the case says more."""
-    from bemt.data.readers import dfdc
+    from bemt.data.readers import blade
 
     for stated, x in ((None, 20.0), (25.0, 25.0)):
         case = fan.case if stated is None else fan.case.replaced({"duct.rotor_position_mm": stated})
         text = str(exports()["dfdc"].write(Job(case, fan.rpm, 20.0))["ds30.case"])
         (tmp_path / "a.case").write_text(text)
-        duct = dfdc.read(tmp_path / "a.case").duct
+        duct = blade.read_dfdc(tmp_path / "a.case").duct
         assert duct is not None and duct["rotor_position_mm"] == pytest.approx(x, abs=1e-6)
         head, geometry = text.split("GEOM\n", 1)
         name, *rows = geometry.split("ENDGEOM")[0].splitlines()
         moved = [row if "999" in row else f" {float(row.split()[0]) + 0.5:.10f} {row.split()[1]}" for row in rows]
         head = re.sub(r"(Nblds\s+NRPdef\n )([\d.]+)", lambda m: f"{m[1]}{float(m[2]) + 0.5:.9g}", head)
         (tmp_path / "b.case").write_text(head + "\n".join(["GEOM", name, *moved, "ENDGEOM", ""]))
-        assert dfdc.read(tmp_path / "b.case").duct == pytest.approx(duct, abs=1e-5)
+        assert blade.read_dfdc(tmp_path / "b.case").duct == pytest.approx(duct, abs=1e-5)
 
 
 def test_what_dfdc_holds_of_a_fan_is_near_the_fan(fan: Job, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ABSENT = ("cadquery", "OCP", "trimesh", "manifold3d", "pyvista", "vtk", "vtkmodules", "dask", "distributed", "pyarrow",
+ABSENT = ("cadquery", "OCP", "trimesh", "manifold3d", "pyvista", "vtk", "vtkmodules", "dask", "distributed",
           "xarray", "psutil", "sklearn")  # fmt: skip
 
 
@@ -41,7 +41,6 @@ def bemt(env: dict[str, str], cwd: Path, *words: str) -> subprocess.CompletedPro
         (("export", "cases/prop_8x5", "--out", "o", "--format", "step"), "cad"),
         (("stations", "lump.stl", "--unit", "mm"), "cad"),
         (("new", "mine", "--scan", "lump.stl", "--unit", "mm"), "cad"),
-        (("sweep", "cases/prop_8x5", "--out", "o", "--grid-format", "parquet"), "dask"),
         (("sweep", "cases/prop_8x5", "--engine", "dask"), "dask"),
     ],
 )

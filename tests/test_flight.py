@@ -20,19 +20,15 @@ from bemt.rotors.case import load_case
 from bemt.rotors.propeller import rotor_of
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import axes_of, blade, features
-from bemt.tools.flight.change import change_in
 from bemt.tools.flight.decision import decide
 from bemt.tools.flight.identify import identify
-from bemt.tools.flight.inflow import inflow
+from bemt.tools.flight.inflow import inflow, mass_faults, wind
 from bemt.tools.flight.judge import judge, weighed
-from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
-from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.mass import mass_faults
+from bemt.tools.flight.log import LAYOUTS, FlightLog, effect_matrix, layout_of
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
-from bemt.tools.flight.rules import BUILD, RULES
+from bemt.tools.flight.rules import BUILD, RULES, change_in
 from bemt.tools.flight.simulator import motor_lag, simulator_constants
-from bemt.tools.flight.wind import wind
 
 
 @pytest.fixture(scope="module")

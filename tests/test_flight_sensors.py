@@ -16,13 +16,12 @@ from bemt.tools.flight.answer import answer_on
 from bemt.tools.flight.balance import DAY, SESSION, axes_of, features, healthy_flight
 from bemt.tools.flight.identify import identify
 from bemt.tools.flight.judge import judge
-from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
-from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.log import LAYOUTS, FlightLog, layout_of, mixed
 from bemt.tools.flight.read import kind_of, read_log
 from bemt.tools.flight.sessions import sessions
+from bemt.tools.flight.simulator import thrust_curve
 from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.text import pilot
-from bemt.tools.flight.thrust_curve import thrust_curve
 
 
 def hover(layout: str = "quad-x", **more: object) -> FlightLog:
@@ -79,7 +78,7 @@ def test_a_motor_that_stands_is_no_sensor() -> None:
     """Eight rotors fly on seven: the loads balance without the one that reads nothing."""
     log, layout = hover("octo-x"), layout_of("octo-x", 8)
     assert log.rpm is not None and layout is not None
-    from bemt.tools.flight.layout import effect_matrix
+    from bemt.tools.flight.log import effect_matrix
 
     A = effect_matrix(layout)
     rest = np.delete(np.arange(8), 4)
@@ -220,7 +219,7 @@ def test_leaving_sessions_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize("layout", ["quad-x", "quad-plus", "hexa-x", "x8"])
 def test_commands_of_a_mixer_balance_its_demands(layout: str) -> None:
     """A demand in one axis moves the loads of that axis alone, to the side it asks for."""
-    from bemt.tools.flight.layout import effect_matrix
+    from bemt.tools.flight.log import effect_matrix
 
     placed = layout_of(layout, len(LAYOUTS[layout].split()))
     assert placed is not None

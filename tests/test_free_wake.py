@@ -15,9 +15,8 @@ from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.effects import standard
 from bemt.physics.sections.polars import linear_polar
-from geometry.blade import from_stations
 from geometry.laws import chord_over_R
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 
 pytestmark = pytest.mark.slow
 

@@ -15,14 +15,12 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator  # type: ignore[import-untyped]
 
 from bemt.physics.sections import rule as section_rule
-from geometry.airfoil import Airfoil, blend, naca, naca4, parse_dat, plate
-from geometry.blade import Blade, from_stations
+from geometry.airfoil import PUBLISHED, Airfoil, blend, naca, naca4, parse_dat, plate, published, thickened
 from geometry.common import GeometryError, pchip
 from geometry.designation import parse_designation
 from geometry.duct import Duct, Stator, around
 from geometry.laws import CHORD_LAWS, PITCH_LAWS, chord_over_R, from_laws, helix
-from geometry.published import PUBLISHED, published, thickened
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor, from_stations
 
 INCH = 0.0254
 PITCH = {

@@ -16,12 +16,11 @@ from geometry.airfoil import naca4
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws, helix
-from geometry.mesh import MeshModel, Options, build, rotor_mesh
+from geometry.mesh import MeshModel, Options, build, rotor_mesh, surfaces
 from geometry.rotor import Rotor
 from geometry.rotor_axis import blades
 from geometry.slicing import FoundRotor, find_rotor
 from geometry.solid import check_closed
-from geometry.surface import surfaces
 
 CASES = ("ds30", "prop_8x5", "prop_10x5", "prop_12x6", "prop_14x8")
 

@@ -71,22 +71,3 @@ def test_effects_around_the_rotor_are_refused(project: Path) -> None:
     ready = prepare_case(case)
     with pytest.raises(InputError, match="ground_effect"):
         gradient(ready, (*ready.effects, from_text("ground_effect")), 8000.0, 0.0, case.air())
-
-
-def test_openmdao_component(project: Path) -> None:
-    om = pytest.importorskip("openmdao.api")
-    from bemt.physics.bem.openmdao import rotor_component
-
-    case = load_case(project / "cases/prop_10x5/case.toml")
-    ready = prepare_case(case)
-    problem = om.Problem(reports=False)
-    problem.model.add_subsystem("rotor", rotor_component(ready, ready.effects, case.air()), promotes=["*"])
-    problem.setup()
-    problem.set_val("rpm", 9000.0)
-    problem.set_val("airspeed", 6.0)
-    problem.run_model()
-    T, Q = problem.get_val("thrust")[0], problem.get_val("torque")[0]
-    points = ready.solve(9000.0, 6.0, case.air())
-    assert (T, Q) == pytest.approx((points.thrust_N[0], points.torque_Nm[0]), rel=1e-9)
-    total = problem.compute_totals(of=["thrust"], wrt=["chord", "rpm", "beta"])
-    assert total["thrust", "beta"].shape == (1, 40) and total["thrust", "rpm"][0, 0] > 0

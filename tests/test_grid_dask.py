@@ -16,19 +16,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_sweep import make_case, read_grid, tree
+from test_sweep import make_case, tree
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import json_text
+from bemt.results.sweep import grid as grid_module
 from bemt.results.sweep import sweep
-from bemt.results.sweep.grid import run as grid_module
-from bemt.results.sweep.grid.run import Grid, GridSolver
+from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.rotors.case import load_case
-from bemt.rotors.case.prepare import prepare_case
 
 needs_dask = pytest.mark.skipif(
-    any(__import__("importlib.util").util.find_spec(name) is None for name in ("distributed", "pyarrow")),
+    any(__import__("importlib.util").util.find_spec(name) is None for name in ("distributed",)),
     reason="needs the extra 'dask'",
 )
 # Dask's own sockets and event loops are closed when the garbage collector comes, which is no matter of ours
@@ -61,14 +60,13 @@ def cluster() -> Iterator[Any]:
 
 
 @needs_dask
-@pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_a_cluster_gives_the_bytes_of_this_machine(tmp_path: Path, cluster: Any, small: None, form: str) -> None:
+def test_a_cluster_gives_the_bytes_of_this_machine(tmp_path: Path, cluster: Any, small: None) -> None:
     make_case(tmp_path / "cases", "a", extra=GRID)
     make_case(tmp_path / "cases", "b")
-    here = sweep([tmp_path / "cases"], tmp_path / "here", grid_format=form)
-    there = sweep([tmp_path / "cases"], tmp_path / "there", grid_format=form, engine="dask",
+    here = sweep([tmp_path / "cases"], tmp_path / "here")
+    there = sweep([tmp_path / "cases"], tmp_path / "there", engine="dask",
                   scheduler=cluster.scheduler_address)  # fmt: skip
-    assert here.cases[0].grid.file == f"a/grid.{form}" and here.exit_code == 0
+    assert here.cases[0].grid.file == "a/grid.csv" and here.exit_code == 0
     assert json_text(here.document()) == json_text(there.document())
     assert tree(tmp_path / "here") == tree(tmp_path / "there")
 
@@ -151,7 +149,7 @@ def test_a_worker_that_gives_other_bits_is_refused(
     tmp_path: Path, cluster: Any, monkeypatch: pytest.MonkeyPatch, what: str, words: str
 ) -> None:
     path = make_case(tmp_path / "cases", extra=GRID)
-    monkeypatch.setattr(f"bemt.results.sweep.grid.dask_engine.{what}", lambda *_: "0123456789abcdef")
+    monkeypatch.setattr(f"bemt.results.sweep.dask_engine.{what}", lambda *_: "0123456789abcdef")
     found = sweep([path], tmp_path / "out", engine="dask", scheduler=cluster.scheduler_address).cases[0]
     assert found.exit_code == 2 and len(found.faults) == 1
     assert found.faults[0].startswith("worker tcp://") and f": {words}: got other bits" in found.faults[0]
@@ -160,7 +158,7 @@ def test_a_worker_that_gives_other_bits_is_refused(
 
 @needs_dask
 def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
-    from bemt.results.sweep.grid.dask_engine import _portable
+    from bemt.results.sweep.dask_engine import _portable
 
     path = make_case(tmp_path / "cases", extra=GRID)
     (tmp_path / "shared").mkdir()
@@ -186,44 +184,6 @@ def test_a_worker_needs_no_file_of_this_machine(tmp_path: Path) -> None:
         assert np.array_equal(column, there.columns[name], equal_nan=True), name
 
 
-@needs_dask
-def test_parquet_keeps_every_bit_in_the_order_of_csv(tmp_path: Path) -> None:
-    import pyarrow.parquet as pq
-
-    extra = "[sweep]\nrpm = [3000, 6000]\naltitude_m = [0, 2000]\npitch_in = [4, 5, 6]\nairspeed_m_s = [0, 5, 40]\n"
-    case = load_case(make_case(tmp_path / "cases", extra=extra))
-    sweep([case.path], tmp_path / "csv")
-    sweep([case.path], tmp_path / "parquet", grid_format="parquet")
-    names, rows = read_grid(tmp_path / "csv" / "one" / "grid.csv")
-    table = pq.read_table(tmp_path / "parquet" / "one" / "grid.parquet")
-    assert table.column_names == names and table.num_rows == len(rows) == 36
-    columns = {name: table[name].to_numpy() for name in names}
-    for i, row in enumerate(rows):
-        overrides = {"blade.pitch_in": columns["pitch_in"][i], "air.altitude_m": columns["altitude_m"][i]}
-        single = prepare_case(case, overrides).solve(columns["rpm"][i], columns["airspeed_m_s"][i], case.air(overrides))
-        for name, value in zip(names, row, strict=True):
-            exact = columns[name][i]
-            assert value == pytest.approx(float(exact), rel=1e-6, abs=1e-90, nan_ok=True), name
-            if name in names[4:]:
-                assert np.array_equal(exact, getattr(single, name)[0], equal_nan=True), name
-    summary = json.loads((tmp_path / "parquet" / "sweep.json").read_text())["cases"][0]["grid"]
-    assert (summary["file"], summary["points"]) == ("one/grid.parquet", 36)
-
-
-@needs_dask
-def test_small_chunks_are_put_together_and_one_grid_is_kept(tmp_path: Path, small: None) -> None:
-    import pyarrow.parquet as pq
-
-    path = make_case(tmp_path / "cases", extra=GRID)
-    first = sweep([path], tmp_path / "out")
-    assert sweep([path], tmp_path / "out", grid_format="parquet").cases[0].grid.file == "one/grid.parquet"
-    assert [p.name for p in (tmp_path / "out" / "one").glob("grid*")] == ["grid.parquet"]
-    found = pq.ParquetFile(tmp_path / "out" / "one" / "grid.parquet").metadata
-    assert (found.num_rows, found.num_row_groups) == (2400, 1)  # of six chunks
-    assert json_text(sweep([path], tmp_path / "out").document()) == json_text(first.document())
-    assert [p.name for p in (tmp_path / "out" / "one").glob("grid*")] == ["grid.csv"]
-
-
 def test_states_of_the_air_are_forgotten_and_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     extra = "[sweep]\nrpm = [3000, 6000]\naltitude_m = {start = 0, stop = 3000, num = 40}\npitch_in = [4, 5, 6]\n"
     case = load_case(make_case(tmp_path / "cases", extra=extra))
@@ -236,32 +196,29 @@ def test_states_of_the_air_are_forgotten_and_made_again(tmp_path: Path, monkeypa
     assert 0 < len(few._airs) <= 7
 
 
-@pytest.mark.parametrize(
-    ("options", "module"), [(["--engine", "dask"], "distributed"), (["--grid-format", "parquet"], "pyarrow")]
-)
 def test_without_the_extra_the_answer_is_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: list[str], module: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = make_case(tmp_path / "cases", extra=GRID)
-    monkeypatch.setitem(sys.modules, module, None)
-    assert main(["sweep", str(path), "--out", str(tmp_path / "out"), *options]) == 2
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main(["sweep", str(path), "--out", str(tmp_path / "out"), "--engine", "dask"]) == 2
     error = capsys.readouterr().err
-    assert error.startswith(" ".join(options)) and module in error and "pip install 'bemt[dask]'" in error
+    assert error.startswith("--engine dask") and "distributed" in error and "pip install 'bemt[dask]'" in error
     assert not (tmp_path / "out").exists()
 
 
 def test_options_that_contradict_are_refused_together(tmp_path: Path) -> None:
     path = make_case(tmp_path)
     with pytest.raises(InputError) as error:
-        sweep([path], jobs=2, engine="local", scheduler="tcp://host:1", grid_format="xlsx")
-    assert [fault.where for fault in error.value.faults] == ["--grid-format", "--scheduler", "--jobs"]
+        sweep([path], jobs=2, engine="local", scheduler="tcp://host:1")
+    assert [fault.where for fault in error.value.faults] == ["--scheduler", "--jobs"]
 
 
 @needs_dask
 def test_a_scheduler_that_does_not_answer_is_a_fault_of_the_input(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("bemt.results.sweep.grid.dask_engine.PATIENCE", 0.5)
+    monkeypatch.setattr("bemt.results.sweep.dask_engine.PATIENCE", 0.5)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -277,7 +234,7 @@ def test_ten_million_points_stay_below_two_gigabytes(tmp_path: Path, engine: str
 
     path = make_case(tmp_path / "cases", extra=MILLION.replace("1000}\na", "10000}\na"))
     command = [sys.executable, "-m", "bemt", "sweep", str(path), "--out", str(tmp_path / "out"), "--quiet",
-               "--grid-format", "parquet", "--engine", engine]  # fmt: skip
+               "--engine", engine]  # fmt: skip
     process = psutil.Popen(command, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])})
     peak = 0
     while process.poll() is None:

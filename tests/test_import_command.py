@@ -195,14 +195,14 @@ def test_the_published_screw(shared_data: Path, capsys: pytest.CaptureFixture[st
 def test_a_reader_that_fails_loses_its_own_file_only(
     put: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bemt.data.readers import fluent_report
+    from bemt.data.readers import histories
 
-    def broken(path: object) -> None:
+    def broken(self: object, path: object) -> None:
         raise IndexError("list index out of range")
 
     other = put("log.csv", "rpm,thrust_N\n8000,3.2\n10000,5.0\n")
     paths = [put("q.out", history()), other, put("absent", "") / "x"]
-    monkeypatch.setattr(fluent_report, "read", broken)
+    monkeypatch.setattr(histories.Layout, "read", broken)
     code, found = call(capsys, *paths)
     assert code == 3  # the worst of all: a failure of ours, a file that was read, a path that is none
     first, second, third = found["files"]

@@ -15,9 +15,8 @@ from bemt.physics.effects import Effect, standard, without
 from bemt.physics.sections.polars import Polar, linear_polar
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
-from geometry.blade import Blade, from_stations
 from geometry.laws import helix
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor, from_stations
 
 AIR = Air.from_density(1.2)
 FIELDS = ("T", "Q", "P", "CT", "CQ", "CP", "J", "T_rotor", "T_duct", "T_stator", "V_exit", "converged")

@@ -18,9 +18,8 @@ from bemt.physics.effects import standard
 from bemt.physics.effects.lifting_surface import LiftingSurface, slope_ratio
 from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import ALPHA_GRID, linear_polar
-from geometry.blade import from_stations
 from geometry.laws import helix
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 
 HUB, AIR = 0.15, Air.from_density(1.2)
 

@@ -19,9 +19,8 @@ from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import Polar, linear_polar
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
-from geometry.blade import Blade, Stations, from_stations
 from geometry.laws import helix
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor, Stations, from_stations
 
 AIR = Air.from_density(1.2)
 R, RHUB, RPM = 0.5, 0.1, 2400.0

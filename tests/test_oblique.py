@@ -20,9 +20,8 @@ from bemt.physics.effects.flapping import Flapping
 from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import linear_polar
 from geometry.airfoil import naca4
-from geometry.blade import Blade
 from geometry.laws import helix
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor
 
 Array = NDArray[np.float64]
 

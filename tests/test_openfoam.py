@@ -20,12 +20,12 @@ from hypothesis import strategies as st
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
-from bemt.tools.cfd.openfoam import Body, Settings, Sweep, case_files
+from bemt.tools.cfd.openfoam import Body, RunSweep, Settings, case_files
 from bemt.tools.cfd.openfoam.grid import extent, mrf_zone
 from bemt.tools.cfd.openfoam.write import Run, settings_of, write_openfoam
 from bemt.tools.cfd.worker import history_of
 from geometry.mesh import Options
-from geometry.mesh_duct import plan_stator
+from geometry.solid import plan_stator
 
 COARSE = Options(n=41, segments=48)
 TOKEN = re.compile(r'"[^"]*"|[{}();]|[^\s{}();"]+(?:\([^\s;]*\))?')
@@ -35,7 +35,7 @@ def settings(**changes: Any) -> Settings:
     """Two-bladed propeller of 0.2 m at 12,000 rev/min."""
     base: dict[str, Any] = {
         "R": 0.1, "Rhub": 0.015, "B": 2, "rotation": 1, "rotor": Body(-0.008, 0.008, 0.1),
-        "blades": Sweep(-0.007, 0.007, -0.001, 0.002, 0.05), "rpm": 12000.0, "rho": 1.225, "mu": 1.79e-5,
+        "blades": RunSweep(-0.007, 0.007, -0.001, 0.002, 0.05), "rpm": 12000.0, "rho": 1.225, "mu": 1.79e-5,
         "a_sound": 340.3, "temperature": 288.15,
     }  # fmt: skip
     return Settings(**{**base, **changes})
@@ -434,7 +434,7 @@ def test_the_rotating_zone_ends_on_the_base_grid(kind: str, level: float, R: flo
     rotor = Body(-0.08 * deep * R, 0.08 * R, R)
     if "plate_z" in change:
         change["plate_z"] = rotor.low - 0.3 * deep * R
-    blades = Sweep(rotor.low, rotor.high, -0.01 * R, 0.02 * R, 0.05)
+    blades = RunSweep(rotor.low, rotor.high, -0.01 * R, 0.02 * R, 0.05)
     s = settings(**change, R=R, Rhub=hub * R, rotor=rotor, blades=blades, level=level)
     files = case_files(s)
     zone = re.search(r"p1 \(0 0 (\S+)\); p2 \(0 0 (\S+)\); radius (\S+);", files["system/topoSetDict"])

@@ -23,13 +23,12 @@ from bemt.tools.exports.base import Job
 from bemt.tools.exports.folder import export_case
 from bemt.tools.exports.printing import Print
 from geometry.airfoil import naca4
-from geometry.blade import from_stations
 from geometry.common import GeometryError
 from geometry.export import read_solid
 from geometry.laws import helix
 from geometry.mesh import Options, build, wrapped_outline
 from geometry.printed import ADAPTERS, Printed
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 from geometry.slicing import find_rotor
 from geometry.solid import Mesh, check_closed
 

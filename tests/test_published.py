@@ -19,9 +19,8 @@ from bemt.physics.effects import Effect, standard
 from bemt.physics.effects.lifting_surface import LiftingSurface
 from bemt.physics.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from geometry.airfoil import Airfoil, naca, naca4, parse_dat
-from geometry.blade import from_stations
 from geometry.duct import Duct
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, from_stations
 
 
 def _table(path: Path, **kw: object) -> np.ndarray:

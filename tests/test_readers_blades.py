@@ -9,7 +9,7 @@ import pytest
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.data.readers import aerodyn, detect, dfdc, qprop, xrotor
+from bemt.data.readers import blade, detect
 from bemt.data.readers.stations import read_stations
 from bemt.physics.sections.parametric import QpropSection, XrotorSection, fit_qprop, fit_xrotor
 from bemt.rotors.case import load_case
@@ -116,7 +116,7 @@ walls
 ENDGEOM
 """
 FILES = {"qprop": QPROP, "xrotor": XROTOR, "dfdc": DFDC}
-READERS = {"qprop": qprop, "xrotor": xrotor, "dfdc": dfdc}
+READERS = {reader.KIND: reader for reader in blade.READERS}
 
 
 @pytest.fixture
@@ -140,15 +140,15 @@ def test_a_file_is_known_by_its_content_and_becomes_a_case(
 
 
 def test_numbers_and_units_of_each_file(files: dict[str, Path]) -> None:
-    q = qprop.read(files["qprop"])
+    q = blade.read_qprop(files["qprop"])
     assert (q.blades, q.R_m, q.r_m[0], q.chord_m[1]) == pytest.approx((2, 0.0762, 0.01905, 0.69 * 0.0254))
     assert np.degrees(q.beta_rad[[0, -1]]) == pytest.approx([27.5, 4.2])
     assert q.sections == [(0.0, QpropSection(0.5, 5.8, -0.4, 1.2, 0.028, 0.05, 0.02, 0.5, 70000.0, -0.7))]
-    x = xrotor.read(files["xrotor"])
+    x = blade.read_xrotor(files["xrotor"])
     assert (x.blades, x.R_m, x.Rhub_m) == (3, 0.1, pytest.approx(0.015))
     assert x.rpm == pytest.approx(10.0 / (0.1 * 0.1) * 30.0 / np.pi) and x.airspeed_m_s == 10.0
     assert x.sections[0][1].a0 == pytest.approx(np.radians(-1.5)) and x.sections[0][1].reexp == -0.4
-    d = dfdc.read(files["dfdc"])
+    d = blade.read_dfdc(files["dfdc"])
     assert (d.blades, d.rpm, d.airspeed_m_s) == (5, 8000.0, 5.0)
     assert (d.R_m, d.Rhub_m) == pytest.approx((0.15, 0.04))  # walls at Xdisk, not the outermost stations
 
@@ -212,81 +212,6 @@ def test_a_cut_file_is_refused_and_never_half_read(word: str, files: dict[str, P
         except InputError:
             continue
         assert cut.r_m.size <= whole.r_m.size and np.all(cut.chord_m > 0) and cut.blades == whole.blades
-
-
-# ---------------------------------------------------------------- AeroDyn: a driver and the files that it names
-
-AERODYN = {
-    "rotor.dvr": """----- AeroDyn Driver Input File -----
-a small turbine
------ Environmental Conditions -----
-1.2   FldDens - Density (kg/m^3)
-6.0   HWindSpeed - Steady wind (m/s)
-"sub/AD.dat"  AeroFile - AeroDyn input file
-3     NumBlades(1)
-0.05  HubRad(1)  - Hub radius (m)
-900   RotSpeed(1) - (rpm)
-""",
-    "sub/AD.dat": """------- AERODYN INPUT FILE -------
-2    NumAFfiles - Number of airfoil files used (-)
-"root.dat"   AFNames - Airfoil file names (NumAFfiles lines)
-"tip.dat"
-"blade.dat"  ADBlFile(1) - Name of file containing distributed aerodynamic properties
-""",
-    "sub/blade.dat": """------- AERODYN BLADE DEFINITION INPUT FILE -------
-====== Blade Properties ======
-4  NumBlNds - Number of blade nodes used in the analysis (-)
-BlSpn BlCrvAC BlSwpAC BlCrvAng BlTwist BlChord BlAFID
-(m) (m) (m) (deg) (deg) (m) (-)
-0.00 0 0 0 22.0 0.08 1
-0.10 0 0 0 12.0 0.07 1
-0.25 0 0 0  5.0 0.05 2
-0.45 0 0 0  1.0 0.03 2
-""",
-}
-
-
-def _airfoil(slope: float) -> str:
-    rows = [f"{a:.1f} {slope * np.sin(2 * np.radians(a)):.5f} {0.02 + np.sin(np.radians(a)) ** 2:.5f} 0.0"
-            for a in np.arange(-180.0, 180.1, 5.0)]  # fmt: skip
-    head = ["! AirfoilInfo v1.01.x Input File", "1 NumTabs", "0.2 Re", "0 UserProp", "False InclUAdata"]
-    return "\n".join([*head, f"{len(rows)} NumAlf", *rows]) + "\n"
-
-
-@pytest.fixture
-def turbine(tmp_path: Path) -> Path:
-    (tmp_path / "sub").mkdir()
-    for name, text in AERODYN.items():
-        (tmp_path / name).write_text(text)
-    for name, slope in (("root", 1.5), ("tip", 2.5)):
-        (tmp_path / f"sub/{name}.dat").write_text(_airfoil(slope))
-    return tmp_path / "rotor.dvr"
-
-
-def test_an_aerodyn_turbine_brakes_the_flow_and_drives_its_shaft(
-    turbine: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    blade = aerodyn.read(turbine)
-    assert (blade.blades, blade.Rhub_m, blade.R_m) == (3, 0.05, pytest.approx(0.5))
-    assert [x for x, _ in blade.sections] == pytest.approx([0.1, 0.3, 0.6, 1.0])
-    assert main(["stations", str(turbine), "--out", str(tmp_path / "case")]) == 0
-    capsys.readouterr()
-    case = load_case(tmp_path / "case/case.toml")
-    assert (case.rpm, case.air().rho) == (900.0, 1.2)
-    points = prepare_case(case).solve(case.rpm, 6.0, case.air())
-    # by hand at 0.7 R: phi = atan(6 / 33) = 10.3, twist near 4.3: 6 degrees of incidence that drive the rotor
-    assert points.converged.all() and points.thrust_N[0] < 0 and points.torque_Nm[0] < 0
-    # no more than all of the wind's power
-    assert -points.power_W[0] < 16 / 27 * 0.5 * 1.2 * 6.0**3 * np.pi * 0.5**2
-
-
-def test_parts_of_an_aerodyn_model_are_told_apart(turbine: Path) -> None:
-    with pytest.raises(InputError, match="driver"):
-        aerodyn.read(turbine.parent / "sub/blade.dat")
-    blade = turbine.parent / "sub/blade.dat"
-    blade.write_text(blade.read_text().replace("0.03 2", "0.03 7"))
-    with pytest.raises(InputError, match="BlAFID"):
-        aerodyn.read(turbine)
 
 
 _ROWS = ((0.2, 0.16, 30.0), (0.6, 0.18, 15.0), (1.0, 0.06, 8.0))  # r/R, c/R, beta [deg]

@@ -11,10 +11,10 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
-from bemt.data.readers import polar_aerodyn, polar_c81, polar_csv, polar_xfoil
+from bemt.data.readers import polars
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
-KINDS = {m.KIND: m for m in (polar_aerodyn, polar_c81, polar_csv, polar_xfoil)}
+KINDS = {reader.KIND: reader for reader in polars.READERS}
 ALPHA = np.arange(-12.0, 16.5, 1.0)
 
 
@@ -75,35 +75,6 @@ def c81(alpha: np.ndarray, machs: np.ndarray, machs_d: np.ndarray | None = None)
     return "\n".join(out) + "\n"
 
 
-def aerodyn15(re_list: list[float], alpha: np.ndarray = ALPHA) -> str:
-    """AirfoilInfo file with one table per Reynolds number."""
-    out = ["! ------------ AirfoilInfo v1.01.x Input File ------", '"DEFAULT"   InterpOrd  ! order',
-           "1  NonDimArea ! area", "0  NumCoords  ! none",
-           f"{len(re_list)}   NumTabs    ! Number of airfoil tables in this file."]  # fmt: skip
-    for k, Re in enumerate(re_list):
-        out += [f"! data for table {k + 1}", f"{Re / 1e6:g}   Re   ! Reynolds number in millions", "0  UserProp ! none",
-                "True  InclUAdata ! yes", "-2.0  alpha0 ! deg", "6.2  C_nalpha ! 1/rad", f"{len(alpha)}  NumAlf ! rows",
-                "! Alpha Cl Cd Cm"]  # fmt: skip
-        out += [f"{a:10.3f} {cl_of(a, Re):10.4f} {cd_of(a, Re):10.4f} {-0.09:10.4f}" for a in alpha]
-    return "\n".join(out) + "\n"
-
-
-def aerodyn13(re_list: list[float], alpha: np.ndarray = ALPHA) -> str:
-    """Version 13 file as AirfoilPrep and CCBlade write it."""
-    out = ["AeroDyn airfoil file.  Compatible with AeroDyn v13.0.", "NACA 4412", "made for a test",
-           f"{len(re_list):<10d}\tNumber of airfoil tables in this file"]  # fmt: skip
-    labels = ("Control setting", "Stall angle (deg)", "Angle of attack for zero Cn for linear Cn curve (deg)",
-              "Cn slope for zero lift for linear Cn curve (1/rad)", "Cn at stall value for positive angle of attack",
-              "Cn at stall value for negative angle of attack", "Angle of attack for minimum CD (deg)",
-              "Minimum CD value")  # fmt: skip
-    for Re in re_list:
-        out.append(f"{Re / 1e6:<10g}\tReynolds number in millions.")
-        out += [f"{0.5:<10f}\t{label}" for label in labels]
-        out += [f"{a:g}\t{cl_of(a, Re):g}\t{cd_of(a, Re):g}\t-0.09" for a in alpha]
-        out.append("EOT")
-    return "\n".join(out) + "\n"
-
-
 @pytest.fixture
 def put(tmp_path: Path) -> Callable[[str], Path]:
     """Write text to a file whose extension says nothing."""
@@ -129,7 +100,6 @@ SAMPLES = {
     "polar_csv": csv([5e4, 2e5]),
     "polar_xfoil": xfoil(),
     "polar_c81": c81(ALPHA, np.array([0.0, 0.3, 0.6])),
-    "polar_aerodyn": aerodyn15([5e4, 1e6]),
 }
 
 
@@ -149,7 +119,7 @@ def test_no_polar_importer_claims_other_text() -> None:
 
 @pytest.mark.parametrize("mark", [",", ";", "\t"])
 def test_csv_round_trip(mark: str, put: Callable[[str], Path]) -> None:
-    p = polar_csv.read(put(csv([5e4, 2e5], mark=mark)))
+    p = polars.read_polar_csv(put(csv([5e4, 2e5], mark=mark)))
     assert p.Re.tolist() == [5e4, 2e5]
     for Re in (5e4, 2e5):
         same_data(p, Re)
@@ -161,7 +131,7 @@ def test_csv_round_trip(mark: str, put: Callable[[str], Path]) -> None:
 
 
 def test_csv_in_radians_equals_csv_in_degrees(put: Callable[[str], Path]) -> None:
-    degrees, radians = (polar_csv.read(put(csv(unit=unit))) for unit in ("deg", "rad"))
+    degrees, radians = (polars.read_polar_csv(put(csv(unit=unit))) for unit in ("deg", "rad"))
     at = np.linspace(-math.pi, math.pi, 721)
     np.testing.assert_allclose(radians.lookup(at, 1e5), degrees.lookup(at, 1e5), atol=1e-9)
 
@@ -170,7 +140,7 @@ def test_csv_full_circle_is_taken_as_it_is(put: Callable[[str], Path]) -> None:
     text = "alpha_deg,cl,cd\n" + "".join(
         f"{a:g},{math.sin(2 * math.radians(a)):.6f},{0.02 + math.sin(math.radians(a)) ** 2:.6f}\n" for a in FULL
     )
-    p = polar_csv.read(put(text))
+    p = polars.read_polar_csv(put(text))
     cl, cd = p.lookup(np.deg2rad(FULL), 1e5)
     np.testing.assert_allclose(cl, np.round(np.sin(2 * np.deg2rad(FULL)), 6), atol=2e-6)
     np.testing.assert_allclose(cd, np.round(0.02 + np.sin(np.deg2rad(FULL)) ** 2, 6), atol=2e-6)
@@ -178,19 +148,19 @@ def test_csv_full_circle_is_taken_as_it_is(put: Callable[[str], Path]) -> None:
 
 
 def test_extension_is_announced(put: Callable[[str], Path]) -> None:
-    p = polar_csv.read(put(csv()))
+    p = polars.read_polar_csv(put(csv()))
     assert any("Viterna" in n for n in p.notes) and "the source states no Reynolds number" in p.notes
     assert any("one Reynolds number" in n for n in p.on_grid().notes)
-    unstalled = polar_csv.read(put(csv(alpha=np.arange(-6.0, 8.5, 1.0))))
+    unstalled = polars.read_polar_csv(put(csv(alpha=np.arange(-6.0, 8.5, 1.0))))
     assert any("before the stall" in n for n in unstalled.notes)
 
 
 def test_xfoil_round_trip_and_several_files(put: Callable[[str], Path]) -> None:
-    p = polar_xfoil.read(put(xfoil(2e5, mach=0.1)))
+    p = polars.read_polar_xfoil(put(xfoil(2e5, mach=0.1)))
     assert p.name == "NACA 4412" and p.Re.tolist() == pytest.approx([2e5]) and p.M.tolist() == [0.1]
     assert "Ncrit 7" in p.notes
     np.testing.assert_allclose(p.lookup(np.deg2rad(ALPHA), 2e5, 0.1)[0], cl_of(ALPHA, 2e5), atol=1e-9)
-    both = polar_xfoil.read_many([put(xfoil(2e5)), put(xfoil(5e4))])
+    both = polars.read_many([put(xfoil(2e5)), put(xfoil(5e4))])
     assert both.Re == pytest.approx(np.array([5e4, 2e5]))
     for Re in (5e4, 2e5):
         same_data(both, Re)
@@ -199,7 +169,7 @@ def test_xfoil_round_trip_and_several_files(put: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize("count", [2, 9, 11])
 def test_c81_round_trip(count: int, put: Callable[[str], Path]) -> None:
     machs = np.round(np.linspace(0.0, 0.8, count), 2)
-    p = polar_c81.read(put(c81(ALPHA, machs)))
+    p = polars.read_polar_c81(put(c81(ALPHA, machs)))
     assert p.name == "NACA 4412 TEST" and p.Re.size == 1
     np.testing.assert_allclose(p.M, machs)
     for m in machs:
@@ -207,25 +177,11 @@ def test_c81_round_trip(count: int, put: Callable[[str], Path]) -> None:
 
 
 def test_c81_tables_with_other_mach_numbers_are_joined(put: Callable[[str], Path]) -> None:
-    p = polar_c81.read(put(c81(ALPHA, np.array([0.0, 0.4, 0.8]), np.array([0.0, 0.8]))))
+    p = polars.read_polar_c81(put(c81(ALPHA, np.array([0.0, 0.4, 0.8]), np.array([0.0, 0.8]))))
     assert p.M.tolist() == [0.0, 0.4, 0.8] and "lift and drag interpolated to one grid" in p.notes
     cl, cd = p.lookup(np.deg2rad(ALPHA), 1e5, 0.4)
     np.testing.assert_allclose(cl, cl_of(ALPHA, 1e5, 0.4), atol=1e-9)
     np.testing.assert_allclose(cd, 0.5 * (cd_of(ALPHA) + cd_of(ALPHA, 1e5, 0.8)), atol=1e-9)
-
-
-@pytest.mark.parametrize("write", [aerodyn13, aerodyn15])
-@pytest.mark.parametrize("re_list", [[7.5e5], [5e4, 2e5, 1e6]])
-def test_aerodyn_round_trip(write: Callable[..., str], re_list: list[float], put: Callable[[str], Path]) -> None:
-    p = polar_aerodyn.read(put(write(re_list)))
-    assert p.Re == pytest.approx(np.array(re_list))
-    for Re in p.Re:
-        same_data(p, float(Re))
-
-
-def test_aerodyn_zero_reynolds_of_a_single_table_means_not_stated(put: Callable[[str], Path]) -> None:
-    p = polar_aerodyn.read(put(aerodyn13([1e5]).replace("0.1       \tReynolds", "0.0       \tReynolds")))
-    assert "the source states no Reynolds number" in p.notes
 
 
 BASE = csv()
@@ -253,12 +209,6 @@ FAULTY: dict[str, tuple[str, str, list[str]]] = {
     "cut": ("polar_c81", "\n".join(SAMPLES["polar_c81"].splitlines()[:20]), ["end of the file in the lift table"]),
     "shifted": ("polar_c81", SAMPLES["polar_c81"].replace("    0.0 ", "   0.0x "), ["7 characters wide"]),
     "disordered": ("polar_c81", c81(ALPHA, np.array([0.3, 0.0])), ["ascending Mach numbers"]),
-    "count": ("polar_aerodyn", aerodyn15([1e5]).replace("29  NumAlf", "31  NumAlf"), ["29 rows after NumAlf = 31"]),
-    "tables": ("polar_aerodyn", aerodyn15([1e5]).replace("1   NumTabs", "2   NumTabs"), ["1 tables after NumTabs"]),
-    "not millions": ("polar_aerodyn", aerodyn15([1e11]), ["Re = 100000", "in millions"]),
-    "control": ("polar_aerodyn", aerodyn15([1e5, 1e5]).replace("0  UserProp", "5  UserProp", 1), ["control setting"]),
-    "id": ("polar_aerodyn", aerodyn13([1e5, 2e5]).replace("Reynolds number in millions.", "Table ID parameter"),
-           ["a table without Re"]),
 }  # fmt: skip
 
 
@@ -277,7 +227,7 @@ def test_faults_name_the_place_and_the_cure(fault: str, put: Callable[[str], Pat
 def test_all_faults_of_a_file_come_at_once(put: Callable[[str], Path]) -> None:
     text = "alpha_deg,cl,cd,Re\n-5,-0.3,0.02,1e5\n0,x,0.01,1e5\n2,0.4,0,1e5\n9,7,0.02,0.1\n"
     with pytest.raises(InputError) as caught:
-        polar_csv.read(put(text))
+        polars.read_polar_csv(put(text))
     message = str(caught.value)
     for part in ("3:2: got 'x'", "4: got cd = 0", "5: got cl = 7", "5: got Re = 0.1"):
         assert part in message, message
@@ -287,7 +237,7 @@ def test_bench_table_is_read_with_its_own_numbers(shared_data: Path) -> None:
     path = shared_data / "bench" / "polar_naca4412_multiRe.csv"
     if not path.exists():
         pytest.skip("no bench polar in the shared data")
-    p = polar_csv.read(path)
+    p = polars.read_polar_csv(path)
     table = np.genfromtxt(path, delimiter=",", names=True)
     cl, cd = p.lookup(np.deg2rad(table["alpha_deg"]), table["Re"])
     inside = np.abs(table["alpha_deg"]) < 180.0

@@ -18,10 +18,8 @@ from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.duct import DuctFlow
 from bemt.physics.effects import catalogue, standard, without
-from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
-from bemt.physics.sections.polars import Polar, linear_polar
-from geometry.blade import from_stations
-from geometry.rotor import Rotor
+from bemt.physics.sections.polars import ExtrapolatedTable, Polar, from_tables, linear_polar
+from geometry.rotor import Rotor, from_stations
 
 ROTORS, CONDITIONS = 200, 500
 

@@ -22,13 +22,12 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate, solve_at
 from bemt.rotors.conditioning import condition
 from bemt.rotors.latents import NAMES, Prior, Sensed
-from bemt.rotors.mixture import LEVELS, half_width, inside, pair_half_width
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import WEIGHTS, Population, population, sizes
-from bemt.rotors.predict import Prediction, predict
+from bemt.rotors.predict import LEVELS, Prediction, half_width, inside, pair_half_width, predict
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
-from bemt.rotors.validate import built
-from bemt.rotors.validate.built import MeasuredRotor
+from bemt.rotors.validate import points
+from bemt.rotors.validate.points import ComparedRotor
 from bemt.rotors.validity import Validity
 
 K = len(NAMES)
@@ -264,13 +263,13 @@ def test_widths_are_those_of_the_prior() -> None:
     assert p.widths("label", 0.254)[1][0] < p.widths("stations", 0.254)[1][0]  # labels err more heavily
 
 
-def _family(name: str, angle_deg: float, n: int, seed: int) -> list[MeasuredRotor]:
+def _family(name: str, angle_deg: float, n: int, seed: int) -> list[ComparedRotor]:
     """Rotors whose blades all stand off their drawings by the same angle."""
     out = []
     for k in range(n):
         at = _sensed(10, seed + k)
         y = at.f + angle_deg * at.T[:, NAMES.index("angle_deg")]
-        out.append(MeasuredRotor(**vars(at), name=f"{name}{k}", family=name, section="rule", gap_deg=math.nan,
+        out.append(ComparedRotor(**vars(at), name=f"{name}{k}", family=name, section="rule", gap_deg=math.nan,
                                  static=at.J == 0.0, y=y))  # fmt: skip
     return out
 
@@ -296,7 +295,7 @@ def test_likelihood_of_all_rotors_at_once_is_that_of_a_mixture_of_normal_laws() 
     rotors[1] = replace(rotors[1], **short, static=rotors[1].static[:6], y=rotors[1].y[:, :6])
     together = Rotors(rotors).log_likelihood(p)
     for m, value in zip(rotors, together, strict=True):
-        at, law = m.part(fit.counted(m)), built.law(p, m)
+        at, law = m.part(fit.counted(m)), points.law(p, m)
         top = np.abs(at.top).reshape(-1)
         T = np.moveaxis(at.T, 1, 2).reshape(top.size, K) / top[:, None]
         N = (p.rest(at) + np.diag(p.noise_sd(at).reshape(-1) ** 2)) / np.outer(top, top)

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from bemt.physics.sections import four_digit, neuralfoil
+from bemt.physics.sections import neuralfoil
 from bemt.physics.sections.rule import FAMILIES, RuleSection, airfoil
 from geometry.airfoil import Airfoil, naca, naca4
 
@@ -22,10 +22,10 @@ def unknown(section: Airfoil) -> Airfoil:
 @pytest.mark.parametrize("at", [(0, 2, 3, 1), (0, 0, 0, 4), (1, 4, 6, 0), (0, 6, 2, 3)])
 def test_the_table_holds_what_neuralfoil_answers(at: tuple[int, ...]) -> None:
     pytest.importorskip("neuralfoil")
-    p, m, t, n = (axis[i] for axis, i in zip(four_digit.table().axes, at, strict=True))
+    p, m, t, n = (axis[i] for axis, i in zip(neuralfoil.table().axes, at, strict=True))
     section = naca4(m, p, t)
-    held = four_digit.raw_polar((m, p, t), n)
-    asked = neuralfoil.ask(section, four_digit.table().Re, n)
+    held = neuralfoil.raw_polar((m, p, t), n)
+    asked = neuralfoil.ask(section, neuralfoil.table().Re, n)
     assert np.abs(held.cl - asked.cl).max() <= 1.01e-4
     assert np.abs(np.log(held.cd / asked.cd)).max() <= 2.6e-4
     assert np.array_equal(held.confidence >= neuralfoil.CONFIDENCE_MIN, asked.confidence >= neuralfoil.CONFIDENCE_MIN)
@@ -46,12 +46,12 @@ def test_between_the_nodes_attached_flow_is_met(shape: tuple[float, ...]) -> Non
 def test_the_rule_and_its_ranges_need_no_network() -> None:
     for section in (RuleSection(0.75, 0.035, 0.4, 0.09), *(s for one in FAMILIES.values() for s in one)):
         if section.shape == "naca4":
-            assert four_digit.covers(airfoil(section).four_digit, 3.0)
+            assert neuralfoil.covers(airfoil(section).four_digit, 3.0)
     for ends in ((0.02, 0.4, 0.06), (0.07, 0.4, 0.12), (0.03, 0.45, 0.12)):
-        assert four_digit.covers(naca4(*ends).four_digit, 1.0) and four_digit.covers(naca4(*ends).four_digit, 9.0)
+        assert neuralfoil.covers(naca4(*ends).four_digit, 1.0) and neuralfoil.covers(naca4(*ends).four_digit, 9.0)
     assert naca("4412").four_digit == (0.04, 0.4, 0.12)
     assert naca4(0.04, 0.4, 0.12, te_gap=0.0).four_digit is None  # another shape
-    assert not four_digit.covers((0.04, 0.42, 0.10), 3.0) and not four_digit.covers((0.04, 0.4, 0.10), 9.5)
+    assert not neuralfoil.covers((0.04, 0.42, 0.10), 3.0) and not neuralfoil.covers((0.04, 0.4, 0.10), 9.5)
 
 
 _WITHOUT = """

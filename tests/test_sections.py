@@ -10,9 +10,17 @@ import numpy as np
 import pytest
 
 from bemt.physics.sections import polars as P
-from bemt.physics.sections.extrapolation import METHODS, ExtrapolatedTable, extend, from_tables, viterna_cd_max
 from bemt.physics.sections.neuralfoil import tunnel_polar
-from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
+from bemt.physics.sections.polars import (
+    ALPHA_GRID,
+    DEFAULT_RE,
+    METHODS,
+    ExtrapolatedTable,
+    Polar,
+    extend,
+    from_tables,
+    viterna_cd_max,
+)
 from geometry.airfoil import Airfoil, naca, naca4
 
 pytestmark = pytest.mark.usefixtures("own_cache")

@@ -22,8 +22,7 @@ from bemt.physics.effects.lifting_surface import LiftingSurface
 from bemt.physics.effects.swirl import Swirl
 from bemt.physics.effects.tip_loss import TipLoss
 from bemt.physics.sections.polars import Polar, linear_polar
-from geometry.blade import Stations
-from geometry.rotor import Rotor
+from geometry.rotor import Rotor, Stations
 
 AIR = Air.from_density(1.2)
 DUCT = DuctFlow(0.95, 0.05, 0.2, 0.8, 0.001, 0.08, 0.01, contraction=1.02, capture=0.9, bend=-0.2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib.util
 import json
 import math
 import multiprocessing
@@ -28,11 +27,10 @@ from bemt.physics.bem import Model
 from bemt.physics.k1k2 import U_MEASURED
 from bemt.results.sweep import batch, fingerprint
 from bemt.results.sweep import batch as sweep_module
+from bemt.results.sweep import grid as grid_module
+from bemt.results.sweep.answer import summary as summary_of
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.comparison import Comparison
-from bemt.results.sweep.grid import run as grid_module
-from bemt.results.sweep.rows import Result
-from bemt.results.sweep.summary import summary as summary_of
+from bemt.results.sweep.rows import Comparison, Result
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 
@@ -556,7 +554,7 @@ def test_no_flag_is_dropped_from_the_screen() -> None:
 
 
 def test_a_flagged_point_is_no_plain_agreement() -> None:
-    from bemt.results.report.verdicts import stand
+    from bemt.results.report.diagnosis_block import stand
 
     plain = Comparison(S=101.0, D=100.0, u_input=5.0, u_D=0.5)
     flagged = replace(plain, doubts=("supersonic tip",))
@@ -616,7 +614,6 @@ def test_the_formula_has_its_measured_error_and_none_where_nobody_measured_it(so
 
 AXES = "[sweep]\nrpm = {start = 3000, stop = 9000, num = 50}\n"
 needs_sigkill = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
-needs_parquet = pytest.mark.skipif(importlib.util.find_spec("pyarrow") is None, reason="needs the extra 'dask'")
 
 
 @pytest.fixture
@@ -664,8 +661,6 @@ def other_thrust(data: bytes) -> bytes:
         ("grid.csv", cut, True),
         ("grid.csv", other_digit, True),
         ("grid.csv", lambda data: data + b"\n", True),
-        pytest.param("grid.parquet", cut, True, marks=needs_parquet),
-        pytest.param("grid.parquet", other_digit, True, marks=needs_parquet),
         ("result.json", other_thrust, True),
         ("result.json", without_rows, True),
         ("result.json", lambda data: b"[]", True),
@@ -677,8 +672,7 @@ def test_what_was_damaged_is_made_again(
     tmp_path: Path, counted: list[str], name: str, damage: Callable[[bytes], bytes] | None, again: bool
 ) -> None:
     path = make_case(tmp_path / "cases", extra=AXES)
-    form = "parquet" if name.endswith("parquet") else "csv"
-    sweep([path], tmp_path / "out", grid_format=form)
+    sweep([path], tmp_path / "out")
     whole = tree(tmp_path / "out")
     counted.clear()
     victim = tmp_path / "out" / "one" / name
@@ -687,7 +681,7 @@ def test_what_was_damaged_is_made_again(
     else:
         victim.write_bytes(damage(victim.read_bytes()))
         assert victim.read_bytes() != whole[f"one/{name}"]
-    sweep([path], tmp_path / "out", grid_format=form)
+    sweep([path], tmp_path / "out")
     assert tree(tmp_path / "out") == whole
     assert counted == ["one"] * again
 

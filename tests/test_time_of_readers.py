@@ -12,8 +12,8 @@ import pytest
 from test_recordings_mutated import BASES
 
 from bemt.base.errors import InputError
+from bemt.data.recordings.adapt import is_recording, reduction_of
 from bemt.data.recordings.load import import_file
-from bemt.data.recordings.overview import is_recording, reduction_of
 
 LINES = 600
 """Lines, or words of a line, before the doublings."""

@@ -16,7 +16,7 @@ from bemt.base.checkout import commit
 from bemt.base.errors import InputError
 from bemt.base.tables import csv_text
 from bemt.rotors.case import load_case
-from bemt.tools.drive import motor_file
+from bemt.tools.drive import motor_result
 
 CASES = Path(__file__).resolve().parents[1] / "cases"
 HASH = "0123456789abcdef0123456789abcdef01234567"
@@ -132,7 +132,7 @@ def test_a_motor_names_no_file_outside_its_folder(tmp_path: Path) -> None:
     text = text.replace('"back_emf.csv"', '"../emf.csv"').replace('"torque.csv"', '"/etc/t.csv"')
     (own / "motor.toml").write_text(text)
     with pytest.raises(InputError) as caught:
-        motor_file.read(own)
+        motor_result.read(own)
     assert [f.where for f in caught.value.faults] == ["back_emf.file", "torque.file"]
 
 

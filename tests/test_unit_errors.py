@@ -12,7 +12,7 @@ from bemt.base import unit_errors
 from bemt.base import units as u
 from bemt.data.recordings.slips import slips
 from bemt.physics import effects
-from bemt.tools.drive.motor_errors import FACTORS
+from bemt.tools.drive.motor_constant import FACTORS
 
 KINDS = ("force", "torque", "rotation", "airspeed", "density", "power", "electrical_power", "current", "voltage",
          "length", "diameter", "efficacy", "pressure", "temperature", "time", "angle", "fraction",

@@ -16,8 +16,7 @@ from bemt import __version__
 from bemt.app import registry
 from bemt.app.face import Parser, described, parser_of, run, values
 from bemt.app.face import parsed as read_words
-from bemt.app.old_names import COMMANDS
-from bemt.app.terminal import coloured, complain
+from bemt.app.registry import COMMANDS, coloured, complain
 from bemt.base import plugins
 from bemt.base.action import about, did_you_mean, options_of
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault

@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bemt.app import old_names
-from bemt.app.terminal import complain, progress
+from bemt.app import registry
+from bemt.app.registry import complain, progress
 from bemt.base.action import Declaration, about, check_counts, did_you_mean
 from bemt.base.errors import EXIT_OK
 
@@ -24,7 +24,7 @@ PROGRESS = "progress"
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Option:
     """One parameter of an action, as both doors know it."""
 
     name: str
@@ -77,7 +77,7 @@ def described(function: Callable[..., Any]) -> tuple[str, dict[str, str]]:
     return doc.partition("\n")[0], told
 
 
-def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
+def parameters(function: Callable[..., Any]) -> tuple[Option, ...]:
     """Parameters of an action in the order of its signature."""
     told = described(function)[1]
     found = []
@@ -93,7 +93,7 @@ def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
         )  # fmt: skip
         words = tuple(re.findall(r"[\"']([^\"']+)[\"']", choices[1])) if choices else ()
         many = re.search(r"Sequence|(?<!str, )ArrayLike", kind) is not None
-        found.append(Parameter(name, what, many, given.default, words, told.get(name, "")))
+        found.append(Option(name, what, many, given.default, words, told.get(name, "")))
     return tuple(found)
 
 
@@ -167,7 +167,7 @@ def parser_of(function: Callable[..., Any], prog: str = "bemt", everything: bool
     return parser
 
 
-def _add(parser: Parser, one: Parameter, told: Declaration, visible: bool) -> None:
+def _add(parser: Parser, one: Option, told: Declaration, visible: bool) -> None:
     """Option or bare word of a parameter."""
     said = f"Do not {one.help[:1].lower()}{one.help[1:]}" if one.option.startswith("--no-") else one.help
     words = said.replace("%", "%%") if visible else argparse.SUPPRESS
@@ -216,7 +216,7 @@ def values(function: Callable[..., Any], args: argparse.Namespace) -> dict[str, 
     return out
 
 
-def _mapping(one: Parameter, given: Sequence[str]) -> dict[str, str]:
+def _mapping(one: Option, given: Sequence[str]) -> dict[str, str]:
     """``NAME=VALUE ...`` as a mapping; a word without a name belongs to the empty one."""
     out: dict[str, str] = {}
     for word in given:
@@ -227,7 +227,7 @@ def _mapping(one: Parameter, given: Sequence[str]) -> dict[str, str]:
     return out
 
 
-def _pair(one: Parameter, given: Sequence[str]) -> tuple[float, float]:
+def _pair(one: Option, given: Sequence[str]) -> tuple[float, float]:
     """``LOW:HIGH``, two numbers, or one."""
     try:
         found = [float(part) for word in given for part in word.split(":")]
@@ -238,7 +238,7 @@ def _pair(one: Parameter, given: Sequence[str]) -> tuple[float, float]:
     return found[0], found[-1]
 
 
-def _fault(one: Parameter, got: str, expected: str) -> Exception:
+def _fault(one: Option, got: str, expected: str) -> Exception:
     from bemt.base.errors import Fault, InputError
 
     return InputError(Fault("", one.option, got, expected))
@@ -246,7 +246,7 @@ def _fault(one: Parameter, got: str, expected: str) -> Exception:
 
 def parsed(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -> argparse.Namespace:
     """Words of a command line, by the parameters of its action."""
-    typed = old_names.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
+    typed = registry.renamed(about(function).command, argv, {p.option for p in parameters(function)}, complain)
     if "--help-all" in typed:
         parser_of(function, prog, everything=True).print_help()
         raise SystemExit(EXIT_OK)

@@ -22,17 +22,7 @@ ABOUT = (
 
 
 def made(label: str, chord: float, pitch: float) -> bemt.Propeller:
-    """Propeller of a label; a chord or pitch that was moved from the label's is taken as measured.
-
-    Parameters
-    ----------
-    label : str
-        As on the propeller.
-    chord : float
-        Largest chord over radius; 0: not measured. [1]
-    pitch : float
-        Pitch at 0.75 R over that of the label. [1]
-    """
+    """Propeller of a label; a chord over radius (0: not measured) or a share of its pitch is taken as measured."""
     found = bemt.propeller(label)
     changes: dict[str, Any] = {}
     if chord > 0.0:

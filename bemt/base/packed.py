@@ -37,28 +37,9 @@ def packed(head: bytes) -> bool:
 
 
 def gunzip(raw: bytes, name: str, most: int | None = None) -> tuple[bytes, str]:
-    """Unpack gzip piece by piece.
+    """Unpack gzip piece by piece: what could be unpacked, and what is damaged, empty for a whole file.
 
-    Parameters
-    ----------
-    raw : bytes
-        The file, of one member or more.
-    name : str
-        Path, for faults.
-    most : int or None
-        Bytes after which to stop; None: all, and more than :data:`MAX_BYTES` are refused.
-
-    Returns
-    -------
-    bytes
-        What could be unpacked.
-    str
-        What is damaged; empty for a whole file.
-
-    Raises
-    ------
-    InputError
-        If there is more than :data:`MAX_BYTES` in it.
+    It stops after `most` bytes; without it, more than :data:`MAX_BYTES` are refused.
     """
     out = io.BytesIO()
     damage = gunzip_stream(io.BytesIO(raw), out, name, most)
@@ -90,24 +71,10 @@ def gunzip_stream(source: IO[bytes], out: IO[bytes], name: str, most: int | None
 
 
 def unpacked(raw: bytes, name: str, most: int | None = None, depth: int = 0) -> bytes:
-    """Text of a packed file; other files as they are.
+    """Text of a packed file, or its first `most` bytes; other files as they are.
 
-    Parameters
-    ----------
-    raw : bytes
-        The file. Of a workbook the one sheet that holds a table of numbers counts, as comma-separated values.
-    name : str
-        Path, for faults.
-    most : int or None
-        Bytes that are enough, for a look at the head; None: all.
-    depth : int
-        How many times it was unpacked so far.
-
-    Raises
-    ------
-    InputError
-        For damaged files, for more than :data:`MAX_BYTES` or :data:`MAX_CELLS`, for a zip of several files, and for
-        workbooks in which no sheet, or more than one, holds a table.
+    Of a workbook the one sheet that holds a table of numbers counts, as comma-separated values. Refused: damaged files,
+    more than :data:`MAX_BYTES` or :data:`MAX_CELLS`, a zip of several files, workbooks with no such sheet or several.
     """
     if most is None and len(raw) > MAX_BYTES:
         raise InputError(_too_large(name, f"{len(raw)} bytes"))

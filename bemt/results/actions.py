@@ -24,7 +24,7 @@ __all__ = ["effects", "report", "sweep"]
 def sweep(
     cases: Path | Sequence[Path] = ".", *, out: Path | None = None, jobs: Count | None = None, strict: bool = False,
     tolerance_pct: float = 15.0, resume: bool = True, engine: Literal["local", "dask"] = "local",
-    scheduler: str | None = None, grid_format: Literal["csv", "parquet"] = "csv",
+    scheduler: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> SweepAnswer:  # fmt: skip
     """Solve cases and compare them with recorded values.
@@ -47,8 +47,6 @@ def sweep(
         Where to solve grids: this machine or a Dask cluster; the results are identical.
     scheduler : str, optional
         With dask: an existing cluster such as tcp://host:8786; processes on this machine by default.
-    grid_format : {"csv", "parquet"}
-        csv with 7 digits, or parquet with full precision.
     progress : callable, optional
         Called with a line of text.
 
@@ -77,7 +75,7 @@ def sweep(
         raise InputError(Fault("", "--tolerance-pct", f"{tolerance_pct:g}", "a finite number of 0 or more"))
     return run(
         paths_text("cases", cases), None if out is None else path_text("out", out), jobs=jobs, resume=resume,
-        progress=progress or (lambda line: None), engine=engine, scheduler=scheduler, grid_format=grid_format,
+        progress=progress or (lambda line: None), engine=engine, scheduler=scheduler,
         tolerance=tolerance_pct if strict else None,
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from bemt.rotors.case.estimate import Estimate
+    from bemt.rotors.case.estimate import RotorEstimate
     from bemt.rotors.case.sources import Sources
     from bemt.rotors.propeller import Propeller
 
@@ -27,7 +27,7 @@ def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
     density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0, reading: str | None = None,
-) -> Estimate:  # fmt: skip
+) -> RotorEstimate:  # fmt: skip
     """Estimate thrust and power from a label such as 10x5, with bands; K1/K2 for comparison.
 
     Every speed of rotation is solved with every airspeed at every angle.
@@ -179,7 +179,7 @@ def stations(
     Parameters
     ----------
     file : str or path
-        STL, OBJ, STEP; XROTOR, QPROP, DFDC or an AeroDyn driver.
+        STL, OBJ, STEP; XROTOR, QPROP, DFDC.
     unit : {"mm", "m", "in"}, optional
         Unit of an STL or OBJ that does not state it.
     out : str or path, optional
@@ -204,15 +204,15 @@ def stations(
     """
     from pathlib import Path
 
-    from bemt.rotors.case import from_blade_file, from_solid
+    from bemt.rotors.case import from_solid
 
     path, folder = Path(file), None if out is None else Path(out)
-    blade = from_blade_file.read_blade(path, unit)
+    blade = from_solid.read_blade(path, unit)
     told = None if folder is None else str(folder)
     if blade is not None:
         if folder is not None:
-            from_blade_file.write(blade, path, folder)
-        return Told(from_blade_file.document(blade, path), from_blade_file.text(blade, path, told))
+            from_solid.write_blade(blade, path, folder)
+        return Told(from_solid.blade_document(blade, path), from_solid.blade_text(blade, path, told))
     found, scale, words = from_solid.find_stations(path, unit)
     if folder is not None:
         from_solid.write(found, scale, path, folder)

@@ -20,7 +20,7 @@ from bemt.base.tables import number_of
 from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
-from bemt.rotors.case.asked import conditions, turned
+from bemt.rotors.case.lattice import conditions, turned
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -144,10 +144,9 @@ def prepare(work: Work, effects: tuple[str, ...] | None = PEER_EFFECTS) -> Prepa
     """Prepare the rotor of the work."""
     from bemt.physics.bem import solver
     from bemt.physics.effects import standard
-    from bemt.physics.sections.extrapolation import ExtrapolatedTable, from_tables
+    from bemt.physics.sections.polars import ExtrapolatedTable, from_tables
     from geometry.airfoil import naca
-    from geometry.blade import Stations, from_stations
-    from geometry.rotor import Rotor
+    from geometry.rotor import Rotor, Stations, from_stations
 
     R = 0.5 * DIAMETER
     r, chord, beta = work.r_R * R, work.c_R * R, np.radians(work.beta_deg)

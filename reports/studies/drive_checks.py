@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.physics.dataset import Dataset
-from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.tools.drive.rotor_table import quadratic
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor, quadratic
 
 Array = NDArray[np.float64]
 

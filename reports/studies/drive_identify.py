@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.physics.dataset import Dataset
-from bemt.tools.drive import transient
-from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor
-from bemt.tools.drive.rotor_table import RotorMap, quadratic
+from bemt.tools.drive import mission
+from bemt.tools.drive.drive_model import Battery, Drive, Esc, Motor, RotorMap, quadratic
 
 Array = NDArray[np.float64]
 FREE: dict[str, tuple[float, float, float]] = {
@@ -236,7 +235,7 @@ def step_constant(
     motor = replace(drive.motor, inertia_kg_m2=inertia_kg_m2)
     rotor = RotorMap(**{**vars(drive.rotor), "inertia_kg_m2": 0.0})
     t = times_s - times_s[0]
-    got = transient.simulate(
+    got = mission.simulate(
         replace(drive, motor=motor, rotor=rotor),
         [(0.0, before_us), (step_s - float(times_s[0]), after_us)],
         float(t[-1]),

@@ -22,7 +22,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, number_text, text_table, write_atomic
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
-from bemt.tools.drive import map_points, picture
+from bemt.tools.drive import bench_map, outputs
 from bemt.tools.drive.drive_model import Drive
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ MIT = f"{ESC} and I0; K_v 775 by its motor's name, 12 V assumed, no voltage reco
 def _read(path: Path, sign: int = 1) -> tuple[Dataset, Array | None]:
     """Points of a map and their torque, where each row is a point."""
     got = importers.read(path)
-    points = map_points.points(got, path.as_posix(), sign)
+    points = bench_map.points(got, path.as_posix(), sign)
     torque = got.values.get("torque_Nm")
     return points, sign * torque if torque is not None and len(torque) == len(points) else None
 
@@ -51,7 +51,7 @@ def _read(path: Path, sign: int = 1) -> tuple[Dataset, Array | None]:
 def _mit(path: Path) -> tuple[Dataset, Array]:
     """Columns without headings: pulse width [us], torque [N m], thrust [N], speed [rev/min], current [A]."""
     c = list(importers.read(path).values.values())
-    return map_points.map_points(c[0], {"thrust_N": c[2], "rpm": c[3], "current_A": c[4]}), c[1]
+    return bench_map.map_points(c[0], {"thrust_N": c[2], "rpm": c[3], "current_A": c[4]}), c[1]
 
 
 def maps(folder: Path) -> list[validation.MapCheck]:
@@ -60,7 +60,7 @@ def maps(folder: Path) -> list[validation.MapCheck]:
     bare = folder / "jmajew" / "grp01__mn2206_noprop_3s.csv"
     if bare.is_file():
         log = importers.read(bare)
-        kv, i0 = identify.no_load(map_points.map_points(1000.0 + 1000.0 * log["throttle"], log.values))
+        kv, i0 = identify.no_load(bench_map.map_points(1000.0 + 1000.0 * log["throttle"], log.values))
         for path in sorted(bare.parent.glob("grp01__mn2206_*_table1.csv")):
             points, torque = _read(path)
             fit = identify.fit_map(points, {"kv_rpm_V": kv, "no_load_A": i0}, torque)
@@ -167,7 +167,7 @@ def compare(path: str, out: str | None = None) -> tuple[dict[str, Any], str]:
             }
             for m in shown
         ]
-        write_atomic(results / "maps.png", picture.curves(panels))
+        write_atomic(results / "maps.png", outputs.curves(panels))
     return document, text
 
 

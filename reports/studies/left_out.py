@@ -24,8 +24,20 @@ from bemt.rotors.conditioning import condition
 from bemt.rotors.latents import Prior
 from bemt.rotors.population import WEIGHTS, Population
 from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
-from bemt.rotors.validate.built import Expected, Observed, Pool, expect, law, lying, observe
-from bemt.rotors.validate.points import J_SHARE, KINDS, Folder, counted, read_folders
+from bemt.rotors.validate.points import (
+    J_SHARE,
+    KINDS,
+    Expected,
+    Folder,
+    Observed,
+    Pool,
+    counted,
+    expect,
+    law,
+    lying,
+    observe,
+    read_folders,
+)
 from bemt.rotors.validate.propellers import effects_without, where
 from bemt.rotors.validity import Validity
 

@@ -27,8 +27,7 @@ from bemt.rotors.measured import MeasuredRotor
 from bemt.rotors.population import Population, population
 from bemt.rotors.predict import predict
 from bemt.rotors.reference import apart
-from bemt.rotors.validate.built import Observed, counted
-from bemt.rotors.validate.points import read_folders
+from bemt.rotors.validate.points import Observed, counted, read_folders
 from bemt.rotors.validate.propellers import effects_without, where
 
 STILL, FLIGHT = 3, 9

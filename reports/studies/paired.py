@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from bemt.base.tables import json_text, write_atomic
 from bemt.physics.sections.neuralfoil import neuralfoil_polar, tunnel_polar
 from bemt.rotors.population import population
-from bemt.rotors.validate.built import Observed, expect
-from bemt.rotors.validate.points import KINDS, counted, read_folders
+from bemt.rotors.validate.points import KINDS, Observed, counted, expect, read_folders
 from bemt.rotors.validate.propellers import effects_without, where
 
 Array = NDArray[np.float64]

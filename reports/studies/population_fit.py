@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bemt.rotors.latents import NAMES, Sensed
 from bemt.rotors.population import SHARED, WEIGHTS, Family, Population, bias_columns, sizes
-from bemt.rotors.validate.built import MeasuredRotor, law
+from bemt.rotors.validate.points import ComparedRotor, law
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ _STEP = 1e-5
 _GAP_NU = 4.0
 
 
-def counted(m: MeasuredRotor) -> NDArray[np.intp]:
+def counted(m: ComparedRotor) -> NDArray[np.intp]:
     """Readings that a rotor counts by."""
     chosen = []
     for kind, order, most in ((m.static, m.Re, STATIC), (~m.static, None, FORWARD)):
@@ -74,7 +74,7 @@ def counted(m: MeasuredRotor) -> NDArray[np.intp]:
 class Rotors:
     """The readings of many rotors, padded to one number of points P: (R, ...)."""
 
-    def __init__(self, rotors: Sequence[MeasuredRotor]) -> None:
+    def __init__(self, rotors: Sequence[ComparedRotor]) -> None:
         self.rotors = tuple(rotors)
         chosen = [counted(m) for m in rotors]
         P = max(c.size for c in chosen)
@@ -168,7 +168,7 @@ def _population(theta: Array) -> Population:
     return Population(**found)
 
 
-def _gaps(p: Population, rotors: Sequence[MeasuredRotor]) -> float:
+def _gaps(p: Population, rotors: Sequence[ComparedRotor]) -> float:
     """Logarithm of the probability of the labels' gaps, families together, Student's t."""
     families: dict[str, list[float]] = {}
     for m in rotors:
@@ -192,7 +192,7 @@ def objective(theta: Array, rows: Rotors) -> float:
 
 
 def fit(
-    rotors: Sequence[MeasuredRotor],
+    rotors: Sequence[ComparedRotor],
     start: Array | None = None,
     most: int = 40,
     provenance: Mapping[str, Any] | None = None,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base import cache
-from bemt.physics.sections import four_digit, neuralfoil
+from bemt.physics.sections import neuralfoil
 from bemt.physics.sections.polars import DEFAULT_RE
 from geometry.airfoil import naca4
 
@@ -34,14 +34,14 @@ def run(camber: float, position: float, thickness: float, n_crit: float) -> np.n
 
 def write(path: Path) -> None:
     """Make the table."""
-    shape = tuple(len(NODES[name]) for name in four_digit.AXES)
+    shape = tuple(len(NODES[name]) for name in neuralfoil.AXES)
     values = np.empty((*shape, 3, neuralfoil.RAW_DEG.size, RE.size))
     for at in np.ndindex(shape):
-        p, m, t, n = (NODES[name][i] for name, i in zip(four_digit.AXES, at, strict=True))
+        p, m, t, n = (NODES[name][i] for name, i in zip(neuralfoil.AXES, at, strict=True))
         values[at] = run(m, p, t, n)
-    nodes = {name: np.array(NODES[name]) for name in four_digit.AXES}
+    nodes = {name: np.array(NODES[name]) for name in neuralfoil.AXES}
     made_with = f"NeuralFoil {cache.installed_version('neuralfoil')} xlarge"
-    np.savez_compressed(path, packed=four_digit.pack(values), alpha_deg=neuralfoil.RAW_DEG, Re=RE,
+    np.savez_compressed(path, packed=neuralfoil.pack(values), alpha_deg=neuralfoil.RAW_DEG, Re=RE,
                         made_with=np.array(made_with), **nodes)  # fmt: skip
     print(f"{path}: {values.shape}, {path.stat().st_size / 1e6:.2f} MB, {made_with}")
 
@@ -86,7 +86,7 @@ def main() -> None:
     parser.add_argument("--sections", type=int, default=60)
     args = parser.parse_args()
     if args.task == "write":
-        write(Path(four_digit.__file__).with_name(four_digit.FILE))
+        write(Path(neuralfoil.__file__).with_name(neuralfoil.FILE))
     else:
         check(args.sections)
 

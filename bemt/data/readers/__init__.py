@@ -5,10 +5,12 @@ A reader is a module of this package that defines
 * ``KIND`` : str, the name used in ``format = "..."``;
 * ``sniff(head) -> bool`` : True if the head of a file (:data:`HEAD_BYTES` bytes, or text) has this format;
 * ``read(path) -> Dataset`` : the rows of the file, samples or points, in SI, or :class:`bemt.base.errors.InputError`
-  with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.columns.dataset`.
+  with all its faults. Use :class:`bemt.data.readers.recording.Builder` or :func:`bemt.data.readers.samples.dataset`.
   Readers of blades and polars return the object of their own package instead;
 * optionally ``sniff_folder(path) -> bool`` : True if ``read`` also takes that folder;
 * optionally ``FALLBACK = True`` : used only if no other reader claims the file.
+
+or ``READERS``, a tuple of :class:`Reader` or of objects like it, where several formats share a file.
 
 The file extension is ignored. If two readers claim a file, that is an error that asks for ``format =``.
 """
@@ -21,11 +23,11 @@ import math
 import os
 import pkgutil
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -35,12 +37,33 @@ from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
 
-__all__ = ["HEAD_BYTES", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read"]
+__all__ = [
+    "HEAD_BYTES",
+    "Reader",
+    "SourceText",
+    "decode",
+    "detect",
+    "head_text",
+    "importers",
+    "load_text",
+    "number",
+    "read",
+]
 
 HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader among several of one file."""
+
+    KIND: str
+    sniff: Callable[[bytes | str], bool]
+    read: Callable[[str | os.PathLike[str]], Any]
+    BLADE: bool = False
 
 
 @dataclass(eq=False)
@@ -238,12 +261,12 @@ def number(token: str) -> float | None:
 
 
 @cache
-def importers() -> Mapping[str, ModuleType]:
+def importers() -> Mapping[str, Any]:
     """Find the readers in this folder.
 
     Returns
     -------
-    mapping of str to module
+    mapping of str to module (or an object like one)
         By kind, sorted; read-only.
 
     Raises
@@ -251,17 +274,18 @@ def importers() -> Mapping[str, ModuleType]:
     TypeError
         If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
     """
-    found: dict[str, ModuleType] = {}
+    found: dict[str, Any] = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
-        kind = getattr(module, "KIND", None)
-        if kind is None:  # what readers share
-            continue
-        if not isinstance(kind, str) or not callable(getattr(module, "sniff", None)) or not hasattr(module, "read"):
-            raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
-        if kind in found:
-            raise TypeError(f"{module.__name__} repeats the kind {kind!r} of {found[kind].__name__}")
-        found[kind] = module
+        for reader in getattr(module, "READERS", (module,)):
+            kind = getattr(reader, "KIND", None)
+            if kind is None:  # what readers share
+                continue
+            if not isinstance(kind, str) or not callable(getattr(reader, "sniff", None)) or not hasattr(reader, "read"):
+                raise TypeError(f"{module.__name__} is no importer: it needs KIND, sniff(head) and read(path)")
+            if kind in found:
+                raise TypeError(f"{module.__name__} repeats the kind {kind!r}")
+            found[kind] = reader
     return MappingProxyType(dict(sorted(found.items())))
 
 

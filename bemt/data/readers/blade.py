@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.data.readers import SourceText, load_text, number
+from bemt.base.tables import number_of
+from bemt.data.readers import Reader, SourceText, head_text, load_text, number
 from bemt.physics.sections.parametric import QpropSection, XrotorSection
 from bemt.physics.sections.polars import DEFAULT_RE, Polar
 
@@ -169,3 +170,258 @@ density_kg_m3 = {rho:.9g}
 
 {chr(10).join(tables)}"""
     return files
+
+
+# XROTOR: saved rotors of version 6.9 and later.
+
+XROTOR = "xrotor"
+_XROTOR_HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)
+
+
+def sniff_xrotor(head: bytes | str) -> bool:
+    r"""Tell whether a file begins as XROTOR's SAVE writes it.
+
+    >>> sniff_xrotor("XROTOR VERSION:  7.55\nblade\n"), sniff_xrotor("DFDC Version 0.55\n")
+    (True, False)
+    """
+    return _XROTOR_HEAD.match(head_text(head)) is not None
+
+
+_SECTION = (
+    (1, "r/R of a section"), (4, "A0deg dCLdA CLmax CLmin"), (4, "dCLdAstall dCLstall Cmconst Mcrit"),
+    (3, "CDmin CLCDmin dCDdCL^2"), (2, "REref REexp"),
+)  # fmt: skip
+
+
+def read_section(rows: Cursor) -> tuple[float, XrotorSection]:
+    """Five lines of a section, of XROTOR and of DFDC: r/R, lift, stall, drag, Reynolds number."""
+    line = rows.rows[min(rows.at, len(rows.rows) - 1)][0]
+    (x,), (a0, slope, top, bottom), (stall, span, cm, mcrit), (least, middle, bend), (reref, reexp) = (
+        rows.take(*what) for what in _SECTION
+    )
+    if not 0.5 <= slope <= 15.0:
+        rows.add(line, f"a lift slope of {slope:g}", "0.5 to 15 per radian", "Per degree?")
+    if not (span > 0.0 and reref > 0.0 and least > 0.0):
+        rows.add(line, f"dCLstall {span:g}, REref {reref:g}, CDmin {least:g}", "values above 0")
+    numbers = (slope, top, bottom, stall, span, least, middle, bend, reref, reexp, cm, mcrit)
+    return x, XrotorSection(math.radians(a0), *numbers)
+
+
+def read_xrotor(path: str | os.PathLike[str]) -> BladeFile:
+    """Read one saved rotor."""
+    rows = Cursor(path, "!#")
+    if len(rows.rows) < 9 or not sniff_xrotor(rows.text):
+        rows.refuse(1, repr(rows.text[:30]), "XROTOR VERSION, a title and the rotor")
+    name, rows.at = rows.rows[1][1].strip(), 2
+    rho, *_ = rows.take(4, "Rho Vso Rmu Alt")
+    R, V, adv, rake = rows.take(4, "Rad Vel Adv Rake")
+    hub, _ = rows.take(2, "XI0 XIW")
+    (count,) = rows.take(1, "Naero")
+    rows.check()
+    if not 1 <= count <= 50:
+        rows.refuse(rows.rows[5][0], f"{count:g} sections", "1 to 50")
+    sections = [read_section(rows) for _ in range(as_count(count))]
+    if rows.at + 1 >= len(rows.rows):
+        rows.refuse("", "the end of the file", "flags, stations")
+    flags = rows.rows[rows.at][1].split()
+    rows.at += 1
+    n, blades = rows.take(2, "II Nblds")
+    left = len(rows.rows) - rows.at
+    if min(left, as_count(n)) < n:
+        rows.add(rows.rows[-1][0], number_of(min(left, as_count(n)), "station"), f"{n:g}")
+    table = rows.table(as_count(n), 4, "r/R C/R Beta0deg Ubody")
+    rows.check()
+    notes = ["compressibility: effects of the case instead of XROTOR's Mcrit"]
+    if len(flags) > 1 and flags[1].upper().startswith("T"):
+        notes.append("the file has XROTOR's duct option on: read as an open rotor")
+    if rake != 0.0:
+        notes.append(f"rake {rake:g} is left out")
+    if np.any(table[:, 3] != 0.0):
+        notes.append("the velocity of a body (Ubody) is left out")
+    rpm = V / (R * adv) * 30.0 / math.pi if adv > 0.0 and V > 0.0 else None
+    air = rho if 0.01 < rho < 10.0 else None
+    x = np.array([s[0] for s in sections])
+    if np.any(np.diff(x) <= 0.0):
+        rows.add("sections", f"r/R {x.tolist()}", "ascending")
+    r, c, beta = table[:, 0] * R, table[:, 1] * R, np.radians(table[:, 2])
+    point = (rpm, V if rpm else None, air)
+    return rows.finish(
+        BladeFile(name, "XROTOR", as_count(blades), R, hub * R, r, c, beta, sections, *point, tuple(notes))
+    )
+
+
+# QPROP: propeller files.
+
+QPROP = "qprop"
+HEAD = (
+    (1, "Nblades R"), (2, "CL0 CL_a"), (2, "CLmin CLmax"), (4, "CD0 CD2u CD2l CLCD0"), (2, "REref REexp"),
+    (3, "Rfac Cfac Bfac"), (3, "Radd Cadd Badd"),
+)  # fmt: skip
+
+
+def sniff_qprop(head: bytes | str) -> bool:
+    r"""Tell whether a file has a title and the seven lines of numbers of a propeller file, then stations.
+
+    >>> head = "6x3\n 2 .0762\n0.5 5.8\n-0.4 1.2\n.028 .05 .05 .5\n70000 -.7\n.0254 .0254 1\n0 0 0\n"
+    >>> sniff_qprop(head + ".75 .66 27.5\n1 .69 22\n")
+    True
+    """
+    rows = [t for t in head_text(head).splitlines() if t.strip() and t.lstrip()[0] not in "#!"]
+    if len(rows) < 10:
+        return False
+
+    def count(text: str) -> int:
+        words = text.split("!")[0].replace(",", " ").split()
+        try:
+            [float(w.replace("D", "e").replace("d", "e")) for w in words]
+        except ValueError:
+            return -1
+        return len(words)
+
+    wanted = [count(t) for t in rows[1:10]]
+    fits = ((1, 2, 3), (2,), (2,), (3, 4), (2,), (3,), (3,))  # a short line of drag is told by `read`
+    titled = not 1 <= count(rows[0]) <= 3
+    return titled and all(n in fit for n, fit in zip(wanted, fits, strict=False)) and min(wanted[7:]) >= 3
+
+
+def read_qprop(path: str | os.PathLike[str]) -> BladeFile:
+    """Read one propeller file."""
+    rows = Cursor(path, "#!")
+    if len(rows.rows) < 10:
+        rows.refuse("", number_of(len(rows.rows), "line"), "a title, seven lines of numbers, two stations")
+    rows.at, line = 1, rows.rows[1][0]
+    got = [rows.take(n, what, max(n, 2)) for n, what in HEAD]
+    body = [rows.take(3, "r c beta", 13) for _ in rows.rows[8:]]
+    rows.check()
+    (blades, *given), (cl0, cla), (low, high), drag, reynolds, factor, offset = got
+    basic = [cl0, cla, low, high, *drag, *reynolds]
+    r, c, b = (np.array([row[:3] for row in body]) * factor + offset).T
+    stated = bool(given and given[0] > 0.0)
+    R = given[0] if stated else float(r[-1])
+    notes = [] if stated else ["no tip radius in the file: that of the last station"]
+    notes.append("the file has no hub radius: that of the first station; compressibility: effects of the case")
+    sections: list[tuple[float, QpropSection]] = [(0.0, QpropSection(*basic))]
+    if {len(row) for row in body} != {3}:
+        full = [row[3:] + basic[len(row) - 3 :] for row in body]
+        sections = [(float(x / R), QpropSection(*row)) for x, row in zip(r, full, strict=True)]
+    for k, (_, s) in enumerate(sections):
+        if not (0.5 <= s.cla <= 15.0 and s.reref > 0.0 and s.cd0 > 0.0 and s.clmin < s.clmax):
+            told = f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}"
+            rows.add(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
+    last = f"{r[-1]:g} m"
+    if math.isfinite(R) and R > 1.5 * r[-1]:
+        rows.add(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
+    if blades != as_count(blades):
+        rows.add(line, f"{blades:g} blades", "a whole number")
+    if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
+        rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
+    name, beta = rows.rows[0][1].strip(), np.radians(b)
+    return rows.finish(
+        BladeFile(name, "QPROP", as_count(blades), R, float(r[0]), r, c, beta, sections, notes=tuple(notes))
+    )
+
+
+# DFDC: case files with a bladed rotor in a duct (the centre body gives the hub).
+
+DFDC = "dfdc"
+_DFDC_HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
+
+
+def sniff_dfdc(head: bytes | str) -> bool:
+    r"""Tell whether a file begins as a DFDC case.
+
+    >>> sniff_dfdc("DFDC Version 0.55\nduct\n"), sniff_dfdc("XROTOR VERSION: 7.55\n")
+    (True, False)
+    """
+    return _DFDC_HEAD.match(head_text(head)) is not None
+
+
+def read_dfdc(path: str | os.PathLike[str]) -> BladeFile:
+    """Read the rotor of one case."""
+    rows = Cursor(path, "!#")
+    words = [text.split()[0].split("!")[0].upper() for _, text in rows.rows]
+    if "ROTOR" not in words:
+        got = "an actuator disk without blades" if "ACTDISK" in words else "no ROTOR"
+        rows.refuse("", got, "a case with a ROTOR block", "A disk has no blade to read")
+    notes = ["the blade ends at the wall: the file has no tip gap"]
+    name = rows.rows[1][1].strip() if len(rows.rows) > 1 else ""
+    V = rpm = rho = None
+    if "OPER" in words:
+        rows.at = words.index("OPER") + 1
+        V, _, turning = rows.take(3, "Vinf Vref RPM")
+        air, *_ = rows.take(4, "Rho Vso Rmu Alt")
+        rpm, rho = abs(turning) or None, air if 0.01 < air < 10.0 else None
+    sections = []
+    if "AERO" in words:
+        rows.at = words.index("AERO") + 1
+        sections = [read_section(rows) for _ in range(as_count(rows.take(1, "#sections")[0]))]
+    else:
+        rows.add("AERO", "nothing", "sections of the blade")
+    rows.at = words.index("ROTOR") + 1
+    if words.count("ROTOR") > 1:
+        notes.append("the file has several rotors: the first is read")
+    x_disk, blades, _ = rows.take(3, "Xdisk Nblds NRsta")
+    n = as_count(rows.take(1, "#stations")[0])
+    body = rows.table(n, 3, "r chord beta")
+    if len(body) < n:
+        rows.add("ROTOR", number_of(len(body), "station"), f"{n}")
+    rows.check()
+    r, c, b = body.T
+    hub, tip, duct = _walls(rows, words, x_disk)
+    if hub is None or not 0.0 < hub <= r[0]:
+        hub = float(r[0])
+        notes.append("no centre body at the rotor: the hub is that of the first station")
+    if tip is None or tip < r[-1]:
+        tip = float(r[-1])
+        notes.append("no duct at the rotor: the tip is that of the last station")
+    blade = BladeFile(
+        name, "DFDC", as_count(blades), tip, hub, r, c, np.radians(b), sections, rpm, V, rho, tuple(notes), duct
+    )
+    return rows.finish(blade)
+
+
+def _walls(rows: Cursor, words: list[str], x: float) -> tuple[float | None, float | None, dict[str, float] | None]:
+    """Radii of centre body and bore at the rotor, None where there is no outline; the duct's keys of a case."""
+    if "GEOM" not in words or "ENDGEOM" not in words:
+        return None, None, None
+    parts: list[list[list[float]]] = [[]]
+    rows.at = words.index("GEOM") + 2
+    while rows.at < words.index("ENDGEOM"):
+        pair = rows.take(2, "x r")
+        if pair[0] > 900.0:
+            parts.append([])
+        else:
+            parts[-1].append(pair)
+    outlines = [np.array(part).reshape(-1, 2) for part in parts]
+    body = max(_crossings(outlines[0], x), default=None)
+    if len(outlines) < 2 or not (bores := _crossings(outlines[1], x)):
+        return body, None, None
+    wall, bore = outlines[1], min(bores)
+    lip = int(np.argmin(wall[:, 0]))
+    inside = wall[lip:] if wall[lip:, 1].mean() < wall[: lip + 1, 1].mean() else wall[lip::-1]
+    x_lip, (x_exit, r_exit) = wall[lip, 0], inside[-1]
+    duct = {
+        "inner_diameter_mm": 2e3 * bore,
+        "length_mm": 1e3 * (x_exit - x_lip),
+        "lip_radius_mm": 1e3 * max(wall[lip, 1] - bore, 0.0),
+        "rotor_position_mm": 1e3 * (x - x_lip),
+        "exit_diameter_mm": 2e3 * r_exit,
+        "exit_hub_diameter_mm": 2e3 * max(_crossings(outlines[0], x_exit - 1e-6 * abs(x_exit)), default=0.0),
+    }
+    return body, bore, duct
+
+
+def _crossings(outline: np.ndarray, x: float) -> list[float]:
+    """Radii at which an outline passes an axial position."""
+    out = []
+    for (x0, r0), (x1, r1) in zip(outline[:-1], outline[1:], strict=True):
+        if min(x0, x1) <= x <= max(x0, x1) and x0 != x1:
+            out.append(float(abs(r0 + (x - x0) / (x1 - x0) * (r1 - r0))))
+    return out
+
+
+READERS = (
+    Reader(XROTOR, sniff_xrotor, read_xrotor, BLADE=True),
+    Reader(QPROP, sniff_qprop, read_qprop, BLADE=True),
+    Reader(DFDC, sniff_dfdc, read_dfdc, BLADE=True),
+)

@@ -7,10 +7,9 @@ for NaN becomes NaN with a warning; a last row that may be cut is left out; noth
 
 from __future__ import annotations
 
-import os
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,8 +20,8 @@ from bemt.base.arrays import Array
 from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
-from bemt.data.readers import SourceText, head_text, load_text, number
-from bemt.data.readers.columns import Channel, dataset
+from bemt.data.readers import SourceText, head_text, number
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 _NAN = re.compile(r"[+-]?(nan|n/a|-?1\.#(qnan|snan|ind|inf)\w*|inf(inity)?|null|\*+)(\(\w*\))?", re.IGNORECASE)
@@ -236,81 +235,6 @@ def numeric_table(
         if missing:
             warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
     return ExportTable(array, tuple(good), tuple(warnings))
-
-
-def _none(line: str) -> bool:
-    """No line is skipped."""
-    return False
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How one program writes a history; reading it is the same for all."""
-
-    kind: str  # of the reader
-    example: str  # of a header, for messages
-    header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
-    cells: Callable[[str], tuple[str, ...]]  # of a row
-    column: Callable[[str], Column]  # of a name
-    skip: Callable[[str], bool] = _none  # lines that are neither headings nor rows
-    notes: tuple[str, ...] = ()
-    commas: bool = True  # whether a decimal comma is possible
-    hint: str = "Is the header damaged?"  # where a row comes before the headings
-    finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
-    within: int = 1  # first lines that may be the header, for the sniffer
-
-    def sniff(self, head: bytes | str) -> bool:
-        """Tell whether one of the first lines is a header of this program."""
-        return any(self.header(line) is not None for line in head_lines(head, self.within))
-
-    def read(self, path: str | os.PathLike[str]) -> Dataset:
-        """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
-        source = load_text(path)
-        names: list[str] = []
-        title, rows, repeated, early = "", list[ExportRow](), list[int](), False
-        for line, raw in enumerate(source.lines, 1):
-            text = raw.strip()
-            found = self.header(text) if text else None
-            if found is not None:
-                if names and list(found) != names:
-                    got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
-                    source.add(line, got, expected, "Split the file there")
-                    break
-                repeated += [line] if names else []
-                names = names or list(found)
-            elif not text or self.skip(text):
-                title = title or text.strip('"# ')
-            elif names:
-                rows.append(ExportRow(line, self.cells(text)))
-            elif not early:
-                early = True
-                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
-        if not names and not early:
-            source.add("", "no header", f"a line such as {self.example}")
-        if names and not rows:
-            source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
-        if not rows:
-            source.check()
-        columns = [self.column(name) for name in names]
-        table = numeric_table(source, columns, rows, self.commas)
-        source.check()
-        again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
-        notes = [*([again] if repeated else []), *self.notes]
-        if self.finish is not None:
-            columns, table = self.finish(columns, table, notes)
-        return history(self.kind, source, columns, table, notes, {"title": title})
-
-
-def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
-    """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
-    counters = [k for k, c in enumerate(columns) if c.role == "counter"]
-    counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]
-    steps = counting[:1] or counters[-1:]
-    if len(counting) > 1:
-        notes.append(f"the last {columns[counting[-1]].name} of each {columns[counting[0]].name} is taken")
-    for k in counters:
-        columns[k] = Column(columns[k].name, "", "step" if k in steps else "counter")
-    return columns, table
 
 
 def _spikes(column: Column, values: Array) -> list[str]:

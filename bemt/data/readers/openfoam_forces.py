@@ -28,7 +28,7 @@ from bemt.base.averaging import Mean
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text
 from bemt.data.readers.cfd import Column, ExportRow, ExportTable, head_lines, history, numeric_table
-from bemt.data.readers.columns import Channel, dataset
+from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
 KIND = "openfoam_forces"

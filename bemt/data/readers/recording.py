@@ -25,7 +25,6 @@ from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers._words import english, quantities
-from bemt.data.readers.columns import Channel, dataset
 from bemt.data.readers.headings import (
     Heading,
     heading,
@@ -35,7 +34,7 @@ from bemt.data.readers.headings import (
     slug,
     surely_shaft_speed,
 )
-from bemt.data.readers.samples import clock_seconds, spikes
+from bemt.data.readers.samples import Channel, clock_seconds, dataset, spikes
 from bemt.data.readers.split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
 from bemt.physics.dataset import Dataset
 

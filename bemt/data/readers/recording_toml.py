@@ -21,9 +21,9 @@ from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import large_table
-from bemt.data.readers.columns import Channel
 from bemt.data.readers.headings import Heading, heading, known
 from bemt.data.readers.recording import Builder
+from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import SplitTable, decimal_mark, some, split_table
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset, concat

@@ -50,23 +50,8 @@ def _alike(d: Dataset, i: int, k: int) -> bool:
 def by_grid(d: Dataset, cells: Array) -> Dataset:
     """Points of a run of which some rows are one condition on several grids, as points with u of the grid.
 
-    Parameters
-    ----------
-    d : Dataset
-        Loads, ``rpm`` and what else the condition is; u of drift and scatter.
-    cells : (N,) array
-        Cells of the grid of each row [1]; NaN: not stated.
-
-    Returns
-    -------
-    Dataset
-        One point for each condition, that of its finest grid. ``provenance["studies"]``: a `LoadStudy` for each load
-        that was extrapolated.
-
-    Raises
-    ------
-    InputError
-        Where one condition has several rows on grids that are not told apart.
+    `cells` (N,) are those of each row's grid [1], NaN where not stated. One point for each condition, that of its
+    finest grid; ``provenance["studies"]`` has a `LoadStudy` for each load that was extrapolated.
     """
     keep: list[int] = []
     studies: list[LoadStudy] = []
@@ -124,22 +109,7 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> Load
 
 
 def together(parts: Sequence[Dataset], cells: Sequence[float] | None = None, name: str = "") -> Dataset:
-    """Runs on several grids as one run with the uncertainty of its grids.
-
-    Parameters
-    ----------
-    parts : sequence of Dataset
-        Runs, of any conditions.
-    cells : sequence of float or None
-        Cells of each run's grid [1]; None: as their set-ups state.
-    name : str
-        Name of the study; the names of the runs, if empty.
-
-    Raises
-    ------
-    InputError
-        Where a run does not say its cells.
-    """
+    """Runs on several grids as one run with the uncertainty of its grids; cells [1] as set-ups state, unless given."""
     own = [d.provenance.get("conditions", {}).get("cells", math.nan) for d in parts] if cells is None else cells
     known = [math.nan if n is None else float(n) for n in own]
     bare = [str(d.provenance.get("file", d.name)) for d, n in zip(parts, known, strict=True) if math.isnan(n)]

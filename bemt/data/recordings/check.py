@@ -1,21 +1,21 @@
 """Sanity before physics: faults of a recording, each named with its evidence and the correction it would take.
 
 Nothing is corrected here. The checks work with whatever channels there are, and say nothing where they cannot know:
-slips of units (:mod:`bemt.data.recordings.slips`), signs and physical bounds (:mod:`bemt.data.recordings.signs`),
-columns (:mod:`bemt.data.recordings.columns`). A new check is one function with the decorator ``check_for``.
+slips of units (:mod:`bemt.data.recordings.slips`); columns, signs and physical bounds
+(:mod:`bemt.data.recordings.columns`). A new check is one function with the decorator ``check_for``.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from bemt.data.recordings import columns, signs, slips  # they register themselves
+from bemt.data.recordings import columns, slips  # they register themselves
 from bemt.data.recordings.findings import CHECKS, SEVERITIES, Finding, facts_of
 from bemt.physics.dataset import Dataset
 
 __all__ = ["Finding", "check"]
 
-_ROOMS = (slips, signs, columns)
+_ROOMS = (slips, columns)
 
 
 @np.errstate(all="ignore")  # a damaged file may hold any number

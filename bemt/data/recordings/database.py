@@ -12,15 +12,185 @@ Schema ``bemt.data/1``: ``kind``, ``folder``, ``url`` (or ``archive``), ``sha256
 from __future__ import annotations
 
 import json
+import lzma
 import os
-from collections.abc import Callable
-from pathlib import Path
+import shutil
+import stat
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bemt.base.cache import cache_dir
 from bemt.base.errors import Fault, InputError
+from bemt.base.packed import MAX_BYTES
 from bemt.base.tables import file_hash, json_text, number_of
-from bemt.data.recordings.archive import download, unpacked
+
+# Archives from elsewhere: fetched whole or resumed, checked before anything is unpacked, put in place in one step.
+
+MAX_ARCHIVE = 500_000_000
+"""Bytes that an archive may have."""
+MAX_UNPACKED = MAX_BYTES
+"""Bytes that its files may have together."""
+MAX_FILES = 50_000
+"""Files that it may hold."""
+_BLOCK = 1 << 16
+
+Progress = Callable[[int, int], None]
+
+
+def _get(url: str, part: Path, progress: Progress | None) -> None:
+    """Fetch into ``part``, going on where an earlier attempt stopped if the server still has the same file."""
+    import requests
+
+    tag_file = part.with_name(part.name + ".tag")
+    have = part.stat().st_size if part.exists() else 0
+    try:
+        tag = json.loads(tag_file.read_text())
+    except (OSError, ValueError):
+        tag = {}
+    headers = {"Accept-Encoding": "identity"}
+    if have and tag.get("url") == url and tag.get("tag"):
+        headers |= {"Range": f"bytes={have}-", "If-Range": tag["tag"]}
+    with requests.get(url, headers=headers, stream=True, timeout=(20, 60)) as answer:
+        answer.raise_for_status()
+        said = answer.headers
+        go_on = answer.status_code == 206 and said.get("Content-Range", "").startswith(f"bytes {have}-")
+        if answer.status_code == 206 and not go_on:
+            part.unlink(missing_ok=True)
+            raise InputError(Fault(url, "", "a different part than requested", "the rest of the file", "Try again"))
+        have = have if go_on else 0
+        length = said.get("Content-Length", "")
+        total = have + int(length) if length.isdigit() else 0
+        _limit(url, total)
+        # a weak tag does not promise the same bytes
+        strong = said.get("ETag", "") if not said.get("ETag", "W/").startswith("W/") else said.get("Last-Modified", "")
+        tag_file.write_text(json.dumps({"url": url, "tag": strong}))
+        with part.open("ab" if go_on else "wb") as stream:
+            for block in answer.iter_content(_BLOCK):
+                stream.write(block)
+                have += len(block)
+                _limit(url, have)
+                if progress is not None:
+                    progress(have, total)
+        if total and have != total:
+            got = f"{have} of {total} bytes"
+            raise InputError(Fault(url, "", got, "the whole file", "Run the command again: it goes on from there"))
+    tag_file.unlink(missing_ok=True)
+
+
+def _limit(url: str, size: int) -> None:
+    if size > MAX_ARCHIVE:
+        raise InputError(Fault(url, "", f"{size} bytes", f"at most {MAX_ARCHIVE} bytes", "Is this the archive?"))
+
+
+def download(url: str, target: Path, known_sha256: str | None = None, progress: Progress | None = None) -> str:
+    """Fetch a file with pooch; what was fetched before an interruption is kept and completed."""
+    import logging
+
+    import pooch
+    import requests
+
+    part = target.with_name(target.name + ".part")
+    target.parent.mkdir(parents=True, exist_ok=True)
+
+    def fetch(url: str, output: str, _: Any) -> None:
+        _get(url, part, progress)
+        os.replace(part, output)
+
+    pooch.get_logger().setLevel(logging.WARNING)
+    target.unlink(missing_ok=True)
+    try:
+        pooch.retrieve(url, known_sha256, target.name, str(target.parent), downloader=fetch)
+    except InputError:  # a ValueError too
+        raise
+    except (requests.RequestException, OSError) as error:
+        if isinstance(error, OSError) and not isinstance(error, requests.RequestException) and error.errno is not None:
+            raise InputError(Fault(os.fspath(target), "", str(error), "room and permission to write")) from error
+        got, hint = (
+            str(error).split("(Caused")[0].strip()[:200],
+            "Download it manually and give it with --source FILE.zip",
+        )
+        raise InputError(Fault(url, "", got or type(error).__name__, "an archive to fetch", hint)) from error
+    except ValueError as error:  # pooch: the hash differs
+        hint = "The archive has changed since its first use: delete the folder of the data to accept the new one"
+        raise InputError(Fault(url, "sha256", "another hash", str(known_sha256), hint)) from error
+    return file_hash(target)
+
+
+def _members(archive: zipfile.ZipFile, name: str) -> list[tuple[zipfile.ZipInfo, PurePosixPath]]:
+    """Files of an archive with the places they may take; all faults at once."""
+    faults: list[Fault] = []
+    found: list[tuple[zipfile.ZipInfo, PurePosixPath]] = []
+    seen: set[str] = set()
+    infos = archive.infolist()
+    if len(infos) > MAX_FILES:
+        raise InputError(Fault(name, "", number_of(len(infos), "file"), f"at most {MAX_FILES}", "Is this the archive?"))
+    for info in infos:
+        path = PurePosixPath(info.filename)
+        parts = path.parts
+        if "\\" in info.filename or path.is_absolute() or ".." in parts or any(":" in part for part in parts):
+            faults.append(Fault(name, info.filename, "a path that leaves the folder", "a relative path"))
+        elif stat.S_ISLNK(info.external_attr >> 16):
+            faults.append(Fault(name, info.filename, "a link", "files only"))
+        elif info.flag_bits & 0x1:
+            faults.append(Fault(name, info.filename, "an encrypted file", "plain files"))
+        elif not info.is_dir() and "__MACOSX" not in parts and not any(part.startswith(".") for part in parts):
+            if str(path).lower() in seen:
+                faults.append(Fault(name, info.filename, "a second file of this name", "one"))
+            seen.add(str(path).lower())
+            found.append((info, path))
+    total = sum(info.file_size for info, _ in found)
+    if total > MAX_UNPACKED:
+        faults.append(Fault(name, "", f"{total} bytes unpacked", f"at most {MAX_UNPACKED}", "Is this the archive?"))
+    if faults:
+        raise InputError(faults[:20])
+    tops = {path.parts[0] for _, path in found}
+    alone = len(tops) == 1 and all(len(path.parts) > 1 for _, path in found)
+    if alone and not min(tops).startswith("volume"):  # UIUC-propDB/volume-1/... -> volume-1/...
+        found = [(info, PurePosixPath(*path.parts[1:])) for info, path in found]
+    return found
+
+
+@contextmanager
+def unpacked(archive: Path, folder: Path) -> Iterator[Path]:
+    """Unpack beside a folder, for a look; put in place of the folder when the block ends well."""
+    name = os.fspath(archive)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fresh = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
+    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
+    shutil.rmtree(fresh, ignore_errors=True)
+    try:
+        try:
+            with zipfile.ZipFile(archive) as source:
+                for info, path in _members(source, name):
+                    place = fresh / path
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                    with source.open(info) as stream, place.open("wb") as out:
+                        shutil.copyfileobj(stream, out)
+        except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, UnicodeDecodeError, RuntimeError) as error:
+            # RuntimeError: encrypted, or compressed in a way that zipfile does not know
+            raise InputError(Fault(name, "", str(error) or "damaged data", "a sound zip archive")) from error
+        except OSError as error:
+            if error.errno is None:  # of bz2, not of the disk
+                raise InputError(Fault(name, "", str(error), "a sound zip archive")) from error
+            hint = "Is there a file where a folder should be, or no room?"
+            raise InputError(Fault(name, "", error.strerror or str(error), "an archive to unpack", hint)) from error
+        fresh.mkdir(parents=True, exist_ok=True)
+        yield fresh
+        if folder.exists():
+            os.replace(folder, old)
+        os.replace(fresh, folder)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+        if old.exists():
+            if folder.exists():
+                shutil.rmtree(old, ignore_errors=True)
+            else:  # the second rename failed: everything as before
+                os.replace(old, folder)
+
 
 SCHEMA = "bemt.data/1"
 RECORD = ".bemt-data.json"

@@ -36,11 +36,19 @@ from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
-from bemt.data.recordings.adapt import adapt, damaged_export, recognised
+from bemt.data.recordings.adapt import (
+    adapt,
+    damaged_export,
+    findings,
+    is_recording,
+    points_text,
+    recognised,
+    reduction_document,
+    reduction_of,
+)
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.choice import Choice, averaged
-from bemt.data.recordings.overview import findings, is_recording, points_text, reduction_document, reduction_of
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
@@ -217,21 +225,10 @@ def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list
 def runs_of(
     names: Sequence[str], run: RunToml | None = None, insist: bool = False
 ) -> tuple[list[Dataset], str | None]:  # fmt: skip
-    """CFD runs of files as the options of `run` say (`cfd_options.run_from`).
+    """CFD runs of files as the options of `run` say (`cfd_options.run_from`), and what exports that are no run yet
+    need.
 
-    Parameters
-    ----------
-    names : sequence of str
-        A run.toml each, and exports, which are one run together; with ``run.grids`` all of them are one study.
-    run : RunToml or None
-        What the exports do not say.
-    insist : bool
-        Whether it is an error when they are no run.
-
-    Returns
-    -------
-    list of Dataset, str or None
-        The runs, as every command takes them; what exports that are no run yet need.
+    A run.toml each, and exports, which are one run together; with ``run.grids`` all of them are one study.
     """
     if run is not None and run.grids:
         if not insist and all(g.cells is None for g in run.grids):

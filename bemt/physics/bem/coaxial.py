@@ -4,7 +4,7 @@ The annuli of each rotor are balanced by the axial kernel, unchanged; the other 
 every annulus.  ``w = V + (from the other) + v`` is the axial velocity in a disk, v the mean that its own annulus
 induces (Prandtl's factor times that at the blade).  The wake of either rotor is a bundle of vortex cylinders, one per
 edge of its annuli, of strength ``v_j - v_(j+1)``; A(r, z) is what they induce a distance z ahead of their disk
-(:func:`bemt.physics.vortex_cylinder.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
+(:func:`bemt.physics.wake.ahead`; superposition: Branlard and Gaunaa 2015, Wind Energy 18(8), "Superposition
 of vortex cylinders", not checked).
 
 Upper rotor: the axial onset gains the suction of the lower one, A_lower(r, z).
@@ -39,8 +39,7 @@ from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects import to_text
-from bemt.physics.vortex_cylinder import ahead
-from bemt.physics.wake import WAKE_RADIUS, contracted, hover_gain, streamtubes
+from bemt.physics.wake import WAKE_RADIUS, ahead, contracted, hover_gain, streamtubes
 
 if TYPE_CHECKING:
     from bemt.physics.bem.solver import Prepared, Solution

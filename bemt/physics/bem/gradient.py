@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.solver import Prepared
     from bemt.physics.effects import Effect
-    from geometry.blade import Stations
+    from geometry.rotor import Stations
 
 STEP = 1e-6
 """Relative step of the central differences; of blade angles in radians, of airspeed in tip speeds."""

@@ -31,9 +31,8 @@ from bemt.physics.sections.neuralfoil import neuralfoil_polar
 from bemt.physics.sections.polars import RE_FIXED, Polar
 
 if TYPE_CHECKING:
-    from geometry.blade import Stations
     from geometry.duct import Duct
-    from geometry.rotor import Rotor
+    from geometry.rotor import Rotor, Stations
 
 # Slope of the loads with onset speed: central difference over this share of the tip speed.
 _SPEED_STEP = 2e-3

@@ -28,7 +28,7 @@ Without swirl v_t = 0, W = UT / cos(phi), and the terms of ``ct`` drop; the brac
 Ducted rotor (:mod:`bemt.physics.bem.duct` derives it).  With ``x = sigma ct / (4 F |s|)``, s = sin(phi), the torque
 balance reads ``W t = UT, t = cos(phi) + x, v_t = W x``.  Speeds times t / UT, lam = V / UT: the mean of the annulus ``w
 = G s + (1 - G) w_V lam t``, w_V = (1 + k_V) / k_w, the jet ``j = k_w w - k_V lam t`` with the bend of
-:mod:`bemt.physics.bem.duct_stream`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
+:mod:`bemt.physics.bem.duct`; and Bernoulli's equation across the disk, times (t / UT)^2, becomes::
 
     g = j |j| + K_wall w |w| + K_lip max(w - lam t, 0)^2 - lam |lam| t^2 - 4 eta (F max(x, 0) s / w)^2
         - sigma cn (1 - leak)

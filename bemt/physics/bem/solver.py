@@ -29,8 +29,7 @@ from bemt.physics.sections.polars import ALPHA_GRID
 if TYPE_CHECKING:
     from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.sections.polars import Polar
-    from geometry.blade import Stations
-    from geometry.rotor import Rotor
+    from geometry.rotor import Rotor, Stations
 
 __all__ = ["REASONS", "Prepared", "Solution", "prepare", "solve", "solve_point", "standard"]
 

@@ -9,8 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from bemt.physics.effects.base import Array, Effect, Flow, Parameter, choice
-from bemt.physics.vortex_cylinder import ahead
-from bemt.physics.wake import contracted, hover_gain, streamtubes
+from bemt.physics.wake import ahead, contracted, hover_gain, streamtubes
 
 _SIDES = ("upstream", "downstream")
 # Twist of a neighbour's blade: the middle of the -16 to -12 deg of propellers of P/D 0.35 and more [deg].
@@ -28,7 +27,7 @@ class CoaxialNeighbour(Effect):
     The wake is that of a coaxial pair of uniform load (:mod:`bemt.physics.wake`; closed form as in Leishman and
     Ananthan 2008, J. AHS 53(1), not checked). The neighbour has blades like this one's. A rotor downstream meets the
     faster stream inside the wake and its upwash outside, one upstream the suction of the other
-    (:func:`bemt.physics.vortex_cylinder.ahead`). The solver knows one onset speed: that at which thrust is the mean
+    (:func:`bemt.physics.wake.ahead`). The solver knows one onset speed: that at which thrust is the mean
     over both parts of the disk, by momentum theory and blades whose thrust falls linearly with the flow through the
     disk, here with the solver's slope. ``load`` is the neighbour's thrust over that of this rotor alone; its induced
     speed follows from momentum theory, of a neighbour downstream in the wake of this rotor. Where

@@ -12,7 +12,7 @@ from bemt.physics.sections.polars import first_stall
 FORMS = ("viterna", "plate")
 # Stall is looked for up to here; the plate takes over within the span behind it [rad].
 _STALL_LAST, _PLATE_SPAN = np.radians(25.0), np.radians(10.0)
-# Lift of the reversed section over that of the same angle in normal flow (as in bemt.physics.sections.extrapolation).
+# Lift of the reversed section over that of the same angle in normal flow (as in bemt.physics.sections.polars).
 _REVERSED = 0.7
 
 

@@ -46,7 +46,7 @@ class RuleSection:
     camber: float
     position: float
     thickness: float
-    shape: str = "naca4"  # ``naca4``, or a name of :data:`geometry.published.PUBLISHED`
+    shape: str = "naca4"  # ``naca4``, or a name of :data:`geometry.airfoil.PUBLISHED`
 
 
 def _one(camber: float, thickness: float = 0.09) -> tuple[RuleSection, ...]:
@@ -108,8 +108,7 @@ def section_at(r_R: float, family: str | None = None) -> RuleSection:
 @lru_cache(maxsize=256)
 def airfoil(section: RuleSection) -> Airfoil:
     """Coordinates of a section of the rule."""
-    from geometry.airfoil import naca4
-    from geometry.published import published, thickened
+    from geometry.airfoil import naca4, published, thickened
 
     if section.shape == "naca4":
         return naca4(section.camber, section.position, section.thickness)

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 from bemt.base.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from bemt.results.report.book import Book
-    from bemt.results.report.values import Page
+    from bemt.results.report.book import Book, Page
 
 __all__ = ["HTML_NAME", "MARKDOWN_NAME", "book_html", "write"]
 
@@ -25,12 +24,10 @@ HTML_NAME, MARKDOWN_NAME = "report.html", "report.md"
 
 def _pages(book: Book) -> Iterator[Page]:
     """Pages in the order of the menu."""
+    from bemt.results.report.book import Page, sections
     from bemt.results.report.case_page import case_sections, reproduction_table
-    from bemt.results.report.diagnosis_block import diagnosis_parts, page_verdict
+    from bemt.results.report.diagnosis_block import diagnosis_parts, headline, page_verdict
     from bemt.results.report.front import answers, front_parts
-    from bemt.results.report.trends import trend_sections
-    from bemt.results.report.values import Page, sections
-    from bemt.results.report.verdicts import headline
 
     names = [page.result.name for page in book.cases]
     ids = [f"case-{i + 1}-" + re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:60] for i, name in enumerate(names)]
@@ -46,8 +43,7 @@ def _pages(book: Book) -> Iterator[Page]:
         "reports/studies/reproduce.py where those data are."
     )
     told = sections(*((item.name, diagnosis_parts(item)) for item in book.diagnoses))
-    trends = Page("trends", "Trends", "Trends", [], trend_sections(book))
-    yield from (p for p in (trends, *book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
+    yield from (p for p in (*book.tools, Page("diagnoses", "Diagnoses", "Diagnoses", [], told)) if p.sections)
     if numbers:
         top = [("words", thesis), ("table", numbers), ("more", inputs)]
         yield Page("reproduction", "Reproduction", "Every number of the source thesis", top, [])
@@ -56,7 +52,7 @@ def _pages(book: Book) -> Iterator[Page]:
 def book_html(book: Book) -> str:
     """Write the HTML of a report."""
     from bemt.base.page import render
-    from bemt.results.report.verdicts import headline
+    from bemt.results.report.diagnosis_block import headline
 
     about, only = book.about, book.cases
     made = " · ".join(filter(None, (about.author, about.date, about.revision)))

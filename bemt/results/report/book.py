@@ -1,10 +1,11 @@
-"""What a report shows, typed: cases with their curves, trends, numbers of the source thesis, diagnoses, pages of tools.
+"""What a report shows, typed: cases with their curves, numbers of the source thesis, diagnoses, pages of tools.
 
 Arrays are along the abscissa that stands first; NaN where nothing is known.
 """
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,9 +15,60 @@ from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.data.recordings.grid_study import GridStudy
 from bemt.physics.dataset import Dataset
-from bemt.results.report.values import Page
 from bemt.results.sweep.rows import Result, Row
-from geometry.surface import Surface
+from geometry.mesh import Surface
+
+# Plain values that the report's templates show: parts of a section, pictures.
+
+Part = tuple[str, Any]
+"""What it is, and its value: words, command, verdict, table, list, figures, more (see `templates/report.html`)."""
+Section = tuple[str, list[Part]]
+
+
+@dataclass(frozen=True)
+class ShownAnswer:
+    """A case in one sentence, with its badge and picture."""
+
+    id: str
+    title: str
+    kind: str
+    word: str
+    words: str
+    picture: str
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of the menu."""
+
+    id: str
+    name: str  # In the menu
+    title: str
+    top: Sequence[Part]  # Above the sections
+    sections: Sequence[Section]
+    answers: Sequence[ShownAnswer] = ()
+
+
+def sections(*found: Section) -> list[Section]:
+    """Leave out what is empty: figures and tables of a part, parts of a section, sections."""
+    out = []
+    for title, parts in found:
+        kept = [(kind, [f for f in value if f] if kind == "figures" else value) for kind, value in parts]
+        kept = [(kind, value) for kind, value in kept if value]
+        if any(kind != "words" for kind, _ in kept):
+            out.append((title, kept))
+    return out
+
+
+def uri(data: bytes, kind: str = "png") -> str:
+    """Embed a picture."""
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def picture(name: str, data: bytes) -> dict[str, Any]:
+    """Show a file with its name in words."""
+    kind = "png" if name.endswith(".png") else "svg+xml"
+    return {"kind": "picture", "alt": name.rpartition(".")[0].replace("_", " "), "src": uri(data, kind)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +114,7 @@ class Refinement:
     grid_study: GridStudy | None
 
 
-class Told(Documented):
+class ShownParameter(Documented):
     """Parameter of an effect: a number with its 90 % interval, or a form of the law; None is one of another form."""
 
     value: Any = None
@@ -76,7 +128,7 @@ class RankedEffect(Documented):
 
     effect: str = ""
     probability: float = math.nan
-    parameters: Mapping[str, Told] = field(default_factory=dict)
+    parameters: Mapping[str, ShownParameter] = field(default_factory=dict)
 
 
 class FitErrors(Documented):
@@ -108,7 +160,7 @@ class NextStep(Documented):
     commands: tuple[str, ...] = ()
 
 
-class Diagnosis(Documented):
+class ShownDiagnosis(Documented):
     """A diagnosis (schema ``bemt.diagnosis/1``) as far as a page shows it."""
 
     verdict: str = ""
@@ -127,7 +179,7 @@ class Diagnosed:
     """A diagnosis in the folder of results with its figures (name, content)."""
 
     name: str
-    told: Diagnosis
+    told: ShownDiagnosis
     figures: Sequence[tuple[str, bytes]] = ()
 
 
@@ -163,58 +215,6 @@ class Reproduced(Documented):
     note: str
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
-    """BEMT and K1/K2 over one quantity that is varied."""
-
-    x: Array
-    thrust_N: Array
-    k1k2_thrust_N: Array
-    M_tip: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Family:
-    """One propeller with one quantity varied at a time."""
-
-    name: str
-    title: str
-    D_in: float
-    pitch_in: float
-    rpm_case: float
-    mach_per_rpm: float
-    mach_per_inch: float
-    diameter: Line
-    pitch: Line
-    rpm: Line
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A drive on the robot of the source thesis, thrust over weight."""
-
-    name: str
-    thrust_N: float
-    u: float
-    power_W: float
-    disk_loading: float
-    g_per_W: float
-    robot_ratio: float
-    u_ratio: float
-    needed: float
-    recorded: Sequence[tuple[str, str, float]]  # Label, source, ratio of a recorded thrust
-
-
-@dataclass(frozen=True, eq=False)
-class Trends:
-    """The page of trends; last the thrusts of one drive of a pair: label, source, thrust and its u [N]."""
-
-    family: Family | None = None
-    choice: Sequence[Choice] = ()
-    pair: str = ""
-    moments: Sequence[tuple[str, str, float, float]] = ()
-
-
 class About(Documented):
     """Head of the page, as far as wanted."""
 
@@ -230,7 +230,6 @@ class Book:
 
     version: str
     cases: tuple[CasePage, ...]
-    trends: Trends
     reproduction: Sequence[Reproduced]
     exit_code: int
     tools: tuple[Page, ...] = ()

@@ -11,15 +11,17 @@ import numpy as np
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.audit_block import audit_parts, study_parts
-from bemt.results.report.book import CasePage, Reproduced
-from bemt.results.report.diagnosis_block import diagnosis_parts, first_pictures
-from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points
-from bemt.results.report.rotor_view import viewer
-from bemt.results.report.values import Section, sections, uri
-from bemt.results.report.verdicts import headline, stand
-from bemt.results.sweep.comparison import Comparison
-from bemt.results.sweep.rows import Fan, Result, Row
+from bemt.results.report.book import CasePage, Reproduced, Section, sections, uri
+from bemt.results.report.diagnosis_block import (
+    audit_parts,
+    diagnosis_parts,
+    first_pictures,
+    headline,
+    stand,
+    study_parts,
+)
+from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points, viewer
+from bemt.results.sweep.rows import Comparison, Fan, Result, Row
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
         "openfoam incompressible": "square", "flight": "square"}  # fmt: skip

@@ -2,14 +2,224 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bemt.base.page import FIRST, num, table
-from bemt.results.report.book import CasePage, Diagnosed, Told
-from bemt.results.report.values import Part, picture
-from bemt.results.report.verdicts import NOTHING_RECORDED, verdict
+from bemt.base.page import FIRST, Cell, num, table
+from bemt.base.tables import number_text
+from bemt.data.recordings.audit import Audit
+from bemt.data.recordings.grid_study import LOADS, LoadStudy
+from bemt.results.report.book import CasePage, Diagnosed, Part, ShownParameter, picture
+from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
+from bemt.results.sweep.rows import Comparison, Result, Row, State
+
+# Sentences about a case, in the language of ASME V&V 20: nothing is ever called correct.
+
+NAMES = {"cfd": "CFD", "bench": "bench", "vendor": "vendor", "flight": "flight", "openfoam": "own CFD"}
+"""Sources in the order in which they are spoken of."""
+
+
+NOTHING_RECORDED = "nothing recorded"
+"""Words of the badge of a case without recordings."""
+
+
+def _n(value: Any, digits: int = 3) -> str:
+    return number_text(float(value), digits) if _finite(value) else "unknown"
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def stand(c: Comparison) -> tuple[str, str]:
+    """Kind of a badge, and how model and recording stand or what agreement would need, in few words.
+
+    >>> stand(Comparison(S=119.1, D=104.9, u_num=0.1, u_input=13.0))
+    ('unknown', 'needs u_D ≥ 5.4 %')
+    >>> stand(Comparison(S=10.0, D=9.0, u_input=2.0, doubts=("supersonic tip",)))
+    ('unknown', "inside the model's band, but flagged: supersonic tip")
+    """
+    kinds: dict[State, tuple[str, str]] = {
+        "no result": ("fault", "no result"), "model unknown": ("unknown", "model's u unknown"),
+        "agrees": ("same", "agrees within u_val"), "differs": ("differs", f"differs by {_far(c):.2g} u_val"),
+        "inside": ("same", "inside the model's band"),
+        "open": ("unknown", f"needs u_D ≥ {c.needed_pct or _n(c.needed, 2)}"),
+    }  # fmt: skip
+    kind, words = kinds[c.state]
+    return ("unknown" if c.doubts and kind == "same" else kind), words + c.but_flagged
+
+
+def _far(c: Comparison) -> float:
+    """Difference in validation uncertainties."""
+    return abs(c.E) / c.u_val if c.u_val else math.inf
+
+
+def _thrusts(result: Result) -> list[Comparison]:
+    """Recorded thrusts that BEMT is compared with, in the order of the sources."""
+    lines = [c for c in result.comparisons if c.model == "bemt" and c.quantity == "thrust_N" and math.isfinite(c.E)]
+    return [c for source in NAMES for c in lines if c.source == source]
+
+
+def _solved(result: Result) -> Row | tuple[str, str, str]:
+    """BEMT at the operating point of the case, or the verdict where there is none."""
+    if not result.rows:
+        n = len(result.faults)
+        return "fault", "not solved", f"{n} fault{'s' * (n != 1)} in the input; nothing was computed."
+    own = result.first("bemt")
+    if own is None or not _finite(own.thrust_N):
+        return "fault", "no result", "BEMT did not converge at the operating point of the case."
+    return own
+
+
+def verdict(result: Result) -> tuple[str, str, str]:
+    """Say how BEMT and the recordings of a case stand: kind and words of a badge, and sentences.
+
+    >>> verdict(Result("mine", faults=("a", "b")))
+    ('fault', 'not solved', '2 faults in the input; nothing was computed.')
+    """
+    row = _solved(result)
+    if isinstance(row, tuple):
+        return row
+    words = f"BEMT gives {_n(row.thrust_N, 4)} N"
+    if _finite(row.u):
+        words += f" ± {_n(row.u, 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
+    lines = _thrusts(result)
+    if not lines:
+        return "unknown", NOTHING_RECORDED, f"{words}. There is no recorded thrust to compare it with."
+    parts = [f"{c.reference} {c.E_pct:+.1f} %" if c.D else c.reference for c in lines]
+    told = [f"{words}. Difference from {'; '.join(parts)}."]
+    far = [c for c in lines if c.state == "differs"]
+    if far:
+        names = ", ".join(f"{c.reference} (|E| {_n(abs(c.E))} N, u_val {_n(c.u_val)} N)" for c in far)
+        told.append(f"It differs by more than the validation uncertainty from {names}.")
+    near = [c.reference for c in lines if c.state == "agrees"]
+    if near:
+        told.append(f"Not distinguishable from noise against {', '.join(near)}: |E| is within u_val.")
+    told += _open(lines)
+    told += [f"Flagged: {flag}." for flag in row.flags]
+    main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *lines]))
+    return (*stand(main), " ".join(told))
+
+
+def _open(lines: Sequence[Comparison]) -> list[str]:
+    """What recordings that state no uncertainty would need for agreement."""
+    inside = [c.reference for c in lines if c.state == "inside"]
+    wanted = [
+        f"{c.reference} {_n(c.needed, 2)} N" + (f" ({c.needed_pct})" if c.needed_pct else "")
+        for c in lines
+        if c.state == "open"
+    ]
+    told = []
+    if inside:
+        told.append(f"Within BEMT's own band, whatever the uncertainty of the recording: {', '.join(inside)}.")
+    if wanted:
+        told.append(
+            f"Agrees only if the recording (no uncertainty stated) is at least this uncertain: {', '.join(wanted)}."
+        )
+    return told
+
+
+def answer(result: Result) -> str:
+    """Answer in one sentence: both numbers, and what their agreement hangs on; then the other recordings.
+
+    >>> from bemt.data.recordings.audit import Audit
+    >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
+    >>> audit = Audit("cfd", (), math.nan, 0.041)
+    >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4.1 % or more.'
+    """  # noqa: E501
+    own = _solved(result)
+    if isinstance(own, tuple):
+        return own[2]
+    band = f" ± {_n(own.u, 2)}" if _finite(own.u) else ""
+    head = f"BEMT {_n(own.thrust_N, 4)}{band} N"
+    lines = _thrusts(result)
+    if not lines:
+        power = f", {_n(own.power_W)} W at the shaft" if _finite(own.power_W) else ""
+        return f"{head}{power}; nothing is recorded to compare it with."
+    c = lines[0]
+    name = NAMES[c.source]
+    share = f" (BEMT {c.E_pct:+.1f} %)" if c.D else ""
+    told = [f"{head}, {name} {_n(c.D, 4)} N{share}: {_hangs(c, name)}{_audited(result, c)}."]
+    seen = {(c.source, _n(c.D, 3))}
+    rest: dict[str, list[str]] = {}
+    for c in lines[1:]:
+        if (key := (c.source, _n(c.D, 3))) not in seen:
+            seen.add(key)
+            rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N")
+    told += [f"{', '.join(names)}: {words}." for words, names in rest.items()]
+    return " ".join(t[:1].upper() + t[1:] for t in told)
+
+
+def _hangs(c: Comparison, name: str) -> str:
+    """What the agreement of one comparison hangs on."""
+    words: dict[State, str] = {
+        "model unknown": "BEMT's own uncertainty is unknown here", "agrees": "they agree within u_val",
+        "differs": f"they differ by {_far(c):.1f} times u_val", "inside": "they agree within BEMT's own band",
+        "open": f"they agree if the {name} is uncertain by {c.needed_pct or f'{_n(c.needed, 2)} N'} or more",
+    }  # fmt: skip
+    return words[c.state] + c.but_flagged
+
+
+def _audited(result: Result, c: Comparison) -> str:
+    """What the audit of a recorded CFD value knows of its uncertainty."""
+    audit = result.audit_of(c.reference)
+    share = audit.u_relative_known if audit else 0.0
+    if not _finite(share) or share <= 0:
+        return ""
+    return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more"
+
+
+def headline(result: Result) -> str:
+    """Name a case for people."""
+    words = (result.title or result.name or "case").split()
+    text = " ".join(words)
+    return text if len(text) <= 140 else text[:139] + "…"
+
+
+# An audit of a CFD result, and its grid study, as parts of a page.
+
+SCATTER_KIND = {"fine": "fine", "doubtful": "doubtful", "fault": "fault", "not stated": "unknown"}
+
+
+def _share(value: float) -> str:
+    return "unknown" if value != value else f"{100 * value:.1f} %"
+
+
+def audit_parts(audit: Audit) -> list[Part]:
+    """Say what an audit comes to, and give its lines."""
+    rows = []
+    for line in audit.lines:
+        rows.append([line.topic, Cell(line.status, badge=SCATTER_KIND.get(line.status, "unknown")), line.finding,
+                     line.consequence, num(100 * line.u_relative, 2, none="unknown")])  # fmt: skip
+    known = audit.u_relative_known
+    rest = f"the known parts make {_share(known)} together" if known else "no part of it is known"
+    words = f"{audit.reference}: uncertainty of the thrust {_share(audit.u_relative)}; {rest}."
+    head = ["setting", "status", "what is known", "consequence for the thrust", "u %"]
+    return [("words", words), ("table", table(head, rows))]
+
+
+def study_parts(studies: Sequence[Mapping[str, Any]]) -> list[Part]:
+    """Grid studies: a picture each, values over the size of the cells down to zero, and what they say."""
+    figures = []
+    for s in map(LoadStudy.from_document, studies):
+        h = [(s.cells[0] / n) ** (1.0 / 3.0) for n in s.cells]
+        unit = f" [{LOADS[s.channel]}]" if LOADS[s.channel] else ""
+        u = [s.u_relative * abs(s.values[0]), *[math.nan] * (len(h) - 1)]
+        words = [f"{n:,.0f} cells" for n in s.cells]
+        grids = Trace("grids; on the finest its u", h, s.values, u, COLOURS["cfd"], points=True, labels=words)
+        traces = [grids]
+        if s.order is not None and s.extrapolated is not None:
+            x = [k * max(h) / 40 for k in range(41)]
+            y = [s.extrapolated + (s.values[0] - s.extrapolated) * v**s.order for v in x]
+            traces.append(Trace(f"order {s.order:.3g}", x, y, dash=DASHES[1]))
+        title, label = f"Grid study: {s.name} at {s.rpm:g} rev/min", "cell size over the finest grid's"
+        plot = Plot(title, label, s.name + unit, traces, note=f"{s.sentence()}.", zero=False, x_zero=True)
+        figures.append(figure(plot))
+    return [("figures", figures)] if figures else []
+
 
 KIND = {"none": "same", "named": "differs", "class": "doubtful", "sensor": "differs", "unknown": "unknown",
         "insufficient": "unknown"}  # fmt: skip
@@ -22,7 +232,7 @@ FIT_HEAD = ("channel", "RMSE before", "after", "noise", "smooth fit without phys
             "held out, after")  # fmt: skip
 
 
-def _parameters(told: Mapping[str, Told]) -> str:
+def _parameters(told: Mapping[str, ShownParameter]) -> str:
     words = []
     for name, p in told.items():
         if p.value is None:  # of another form of the law

@@ -9,11 +9,9 @@ from typing import Any
 
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
-from bemt.results.report.book import Book, CasePage
-from bemt.results.report.diagnosis_block import diagnosis_verdict, page_verdict
+from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
+from bemt.results.report.diagnosis_block import answer, diagnosis_verdict, headline, page_verdict, verdict
 from bemt.results.report.plot import Mark, Plot, figure, points
-from bemt.results.report.values import Answer, Part, uri
-from bemt.results.report.verdicts import answer, headline, verdict
 
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28),
@@ -41,14 +39,14 @@ NEEDS = {
 OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
 
 
-def answers(book: Book, ids: Sequence[str]) -> list[Answer]:
+def answers(book: Book, ids: Sequence[str]) -> list[ShownAnswer]:
     """Give one sentence per case."""
     out = []
     for page, key in zip(book.cases, ids, strict=True):
         kind, word, told = page_verdict(page)
         words = answer(page.result) if verdict(page.result)[1] == word else told
         picture = uri(page.picture) if page.picture else ""
-        out.append(Answer(key, headline(page.result), kind, word, words, picture))
+        out.append(ShownAnswer(key, headline(page.result), kind, word, words, picture))
     return out
 
 

@@ -1,7 +1,7 @@
 """Many cases: solve them beside their recorded values, and write results that survive a kill.
 
 Every case is solved for itself: its faults go into its own result and the others go on. With ``--out`` each case gets
-a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv`` or ``grid.parquet``. A result is
+a folder with ``result.json``, ``table.txt`` and, when it sweeps axes, ``grid.csv``. A result is
 reused when its fingerprint (case, references and other files, program, libraries) and its content are unchanged;
 otherwise it is removed before the case is solved. So a case that fails has no result there, and ``sweep.json``,
 ``sweep.csv`` and ``sweep.txt``, which come last, say why. Cases that the sweep was not asked for keep theirs.
@@ -9,6 +9,7 @@ otherwise it is removed before the case is solved. So a case that fails has no r
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import signal
@@ -26,13 +27,12 @@ from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
 from bemt.results.sweep.case import solve_case
-from bemt.results.sweep.grid.formats import FORMATS, require_extra
 from bemt.results.sweep.rows import Result, Sweep
 from bemt.results.sweep.store import SCHEMA, fingerprint
 from bemt.rotors.case import Case, check_name, find_cases, load_case, repeated_names
 
 if TYPE_CHECKING:
-    from bemt.results.sweep.grid.run import Engine
+    from bemt.results.sweep.grid import Engine
 
 __all__ = ["SCHEMA", "fingerprint", "off_tolerance", "sweep"]
 
@@ -79,7 +79,6 @@ def run_case(
     resume: bool,
     threads: int,
     progress: Callable[[float, str], None] | None = None,
-    form: str = "csv",
     engine: Engine | None = None,
 ) -> Result:
     """Do everything for one case; never raises but for an interrupt."""
@@ -92,7 +91,7 @@ def run_case(
                 got, hint = f"the folder of the case {case.name} itself", "Results would be mixed with its files"
                 raise InputError(Fault("--out", "", got, "another folder", hint))
             remove_stale(folder)
-            kept = store.reuse(folder, mark, form) if resume else None
+            kept = store.reuse(folder, mark) if resume else None
             if kept is not None:
                 return kept
             store.remove_result(folder)
@@ -100,10 +99,10 @@ def run_case(
         result = solve_case(case, threads, lambda i, n, what: tell(share * i / n, what))
         grid = None
         if case.axes():
-            from bemt.results.sweep.grid.run import run_grid
+            from bemt.results.sweep.grid import run_grid
 
             grid = run_grid(
-                case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, form, engine
+                case, folder, mark, threads, lambda i, n: tell(0.5 + 0.5 * i / n, f"grid {i}/{n}"), resume, engine
             )
         result = Result.from_document(plain(replace(result, grid=grid).document()))  # as it will be read back
         if fingerprint(case.content_hash()) != mark:  # no telling which of them the numbers are of
@@ -142,7 +141,6 @@ def _results(
     resume: bool,
     jobs: int | None,
     bar: Progress,
-    form: str,
     engine: Engine | None,
 ) -> Iterator[tuple[int, Result]]:
     """Results in the order in which they come."""
@@ -152,9 +150,9 @@ def _results(
         for i, ready in enumerate(cases):
             at = f"[{i + 1}/{len(cases)}] {ready[0].name}"
             tell = lambda s, what, at=at: bar(f"{at} {_bar(s)} {what}")  # noqa: E731
-            yield i, run_case(ready, out, resume, threads, tell, form, engine)
+            yield i, run_case(ready, out, resume, threads, tell, engine)
         return
-    args = (out, resume, 1, None, form)
+    args = (out, resume, 1, None)
     lost = []
     done = 0
     for i, outcome in _in_processes(dict(enumerate(cases)), jobs, args):
@@ -203,10 +201,10 @@ def _bar(share: float) -> str:
 
 def sweep(
     paths: Sequence[str | Path], out: str | Path | None = None, *, jobs: int | None = None, resume: bool = True,
-    progress: Progress | None = None, engine: str = "local", scheduler: str | None = None, grid_format: str = "csv",
+    progress: Progress | None = None, engine: str = "local", scheduler: str | None = None,
 ) -> Sweep:  # fmt: skip
     """Solve cases."""
-    _check_options(engine, scheduler, grid_format, jobs)
+    _check_options(engine, scheduler, jobs)
     files = find_cases(paths)
     folder = None if out is None else Path(out)
     if folder is not None:
@@ -219,7 +217,7 @@ def sweep(
             stack.enter_context(store.locked(folder))
         on: Engine | None = None
         if engine == "dask":
-            from bemt.results.sweep.grid.dask_engine import Cluster
+            from bemt.results.sweep.dask_engine import Cluster
 
             on = stack.enter_context(Cluster(scheduler, jobs))
         if folder is not None:
@@ -228,7 +226,7 @@ def sweep(
         todo = list(ready)
         tell = progress or (lambda line: None)
         left = [ready[i] for i in todo]
-        for i, result in _results(left, folder, resume, jobs, tell, grid_format, on) if left else ():
+        for i, result in _results(left, folder, resume, jobs, tell, on) if left else ():
             found[todo[i]] = result
         results = tuple(found[i] for i in range(len(files)))
         code = max((r.exit_code for r in results), default=EXIT_OK)
@@ -238,12 +236,11 @@ def sweep(
     return swept
 
 
-def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: int | None) -> None:
+def _check_options(engine: str, scheduler: str | None, jobs: int | None) -> None:
     """Refuse options of the grid that do not fit together, all at once."""
     faults = []
-    for option, value, known in (("--engine", engine, ("local", "dask")), ("--grid-format", grid_format, FORMATS)):
-        if value not in known:
-            faults.append(Fault("", option, repr(value), " or ".join(known)))
+    if engine not in ("local", "dask"):
+        faults.append(Fault("", "--engine", repr(engine), "local or dask"))
     if scheduler is not None and engine == "local":
         faults.append(Fault("", "--scheduler", scheduler, "nothing with --engine local", "Add --engine dask"))
     if scheduler is not None and jobs is not None:
@@ -251,8 +248,6 @@ def _check_options(engine: str, scheduler: str | None, grid_format: str, jobs: i
         faults.append(Fault("", "--jobs", str(jobs), expected, "Leave it out"))
     if faults:
         raise InputError(faults)
-    if grid_format == "parquet":
-        require_extra("--grid-format parquet", "pyarrow")
     if engine == "dask":
         require_extra("--engine dask", "dask", "distributed")
 
@@ -302,3 +297,11 @@ def off_tolerance(result: Result, tolerance: float) -> list[str]:
     if grid and grid.unconverged:
         reasons.append(f"{result.name}: {grid.unconverged} of {grid.points} grid points unconverged")
     return reasons
+
+
+def require_extra(option: str, *modules: str) -> None:
+    """Refuse an option whose optional packages are not installed."""
+    missing = [name for name in modules if importlib.util.find_spec(name) is None]
+    if missing:
+        expected = "the optional packages of the extra 'dask'"
+        raise InputError(Fault("", option, f"no {' and no '.join(missing)}", expected, "pip install 'bemt[dask]'"))

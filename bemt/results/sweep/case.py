@@ -18,14 +18,14 @@ from bemt.base import plugins, units
 from bemt.base.arrays import Array
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
-from bemt.results.sweep.comparison import Comparison
 from bemt.results.sweep.rows import (
     ROW_SOURCES,
     AssumptionRow,
-    Conditions,
+    CaseConditions,
+    Comparison,
     Fan,
     FullThrottle,
-    Pair,
+    PairResult,
     Result,
     Row,
     Stated,
@@ -248,8 +248,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
 
 def _audit(row: Row, ready: Model | PairModel, ducted: bool) -> Audit:
     """Audit of a recorded CFD value by its remark."""
-    from bemt.data.recordings.audit import Audit, CfdFacts
-    from bemt.data.recordings.audit_remarks import facts_from_remark
+    from bemt.data.recordings.audit import Audit, CfdFacts, facts_from_remark
 
     D = ready.diameter_m
     known = CfdFacts(M_tip=float(row.M_tip), J=row.airspeed_m_s / (row.rpm / 60.0 * D),
@@ -265,9 +264,9 @@ def _assumption(moved: Moved) -> AssumptionRow:
     return AssumptionRow(item.key, item.nominal, item.values, item.discrete, item.range_text, item.why, T, Q, *us)
 
 
-def _description(case: Case, ready: Model | PairModel, stations: int) -> Conditions:
+def _description(case: Case, ready: Model | PairModel, stations: int) -> CaseConditions:
     air = case.air()
-    return Conditions(
+    return CaseConditions(
         rpm=case.rpm, airspeed_m_s=case.airspeed_m_s, angle_deg=case.angle_deg, density_kg_m3=air.rho,
         temperature_C=air.temperature_K - 273.15, a_sound_m_s=air.a_sound, air=air.source,
         diameter_m=ready.diameter_m, hub_diameter_m=ready.hub_diameter_m, blades=case.file.rotor.blades,
@@ -277,7 +276,7 @@ def _description(case: Case, ready: Model | PairModel, stations: int) -> Conditi
     )  # fmt: skip
 
 
-def _pair(case: Case, nominal: Dataset) -> Pair:
+def _pair(case: Case, nominal: Dataset) -> PairResult:
     """What a second rotor adds, at the case's own operating point."""
     from bemt.physics.bem.coaxial import LOADS, RATIOS
 
@@ -286,7 +285,7 @@ def _pair(case: Case, nominal: Dataset) -> Pair:
     names = ("lower_rpm", *LOADS, *RATIOS)
     loads = {key: nominal[key][0] for key in names} | {f"u_{key}": nominal.u[key][0] for key in names[1:]}
     z_over_D = told.spacing_m(case.diameter_m) / case.diameter_m
-    return Pair(z_over_D, told.turns, told.label or told.case or "as the first", **loads)
+    return PairResult(z_over_D, told.turns, told.label or told.case or "as the first", **loads)
 
 
 def _fan(case: Case, ready: Model, nominal: Dataset) -> Fan:

@@ -15,11 +15,10 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.physics.air import Air, isa_pressure
 from bemt.rotors.case.schema import AirTable, CaseFile
 from geometry.airfoil import Airfoil, naca, naca4, parse_dat
-from geometry.blade import Blade, from_stations
 from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
-from geometry.rotor import Rotor
+from geometry.rotor import Blade, Rotor, from_stations
 
 T = TypeVar("T")
 

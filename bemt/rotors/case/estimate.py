@@ -206,7 +206,7 @@ def text(doc: dict[str, Any]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate(Dataset):
+class RotorEstimate(Dataset):
     """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
 
     Examples
@@ -239,7 +239,7 @@ def of_label(
     density: float | None = None,
     angle_deg: Any = 0.0,
     reading: str | None = None,
-) -> Estimate:
+) -> RotorEstimate:
     """`document` as a Dataset, standard uncertainties in ``u``."""
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
@@ -257,4 +257,4 @@ def of_label(
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
         values["sideslip_rad"] = sideslip
     flags = tuple(tuple(r["flags"]) for r in rows)
-    return Estimate("bemt", found["case"], values, u, flags=flags, found=found)
+    return RotorEstimate("bemt", found["case"], values, u, flags=flags, found=found)

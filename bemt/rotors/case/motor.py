@@ -124,24 +124,9 @@ class NamedMotor:
 
 
 def named_motor(name: str, where: str = "--motor") -> NamedMotor:
-    """Motor by its name, such as ``T-Motor MN2212 920``: words of the name, and its K_v as a number.
+    """Motor by its name, such as ``T-Motor MN2212 920``: words of the name in any order, and its K_v as a number.
 
-    Parameters
-    ----------
-    name : str
-        Maker, model and K_v in any order.
-    where : str
-        What a fault names.
-
-    Returns
-    -------
-    NamedMotor
-        From setuav-pythrust (Karakaya, Apache-2.0), whose numbers are makers' own.
-
-    Raises
-    ------
-    InputError
-        Without the extra ``motors``, for no motor of that name, or for several: then with their names.
+    From setuav-pythrust (Karakaya, Apache-2.0, extra ``motors``), whose numbers are makers' own.
     """
     try:
         from pythrust import __version__, dataset_dir

@@ -81,7 +81,7 @@ def _polars(case: Case, anchors: Sequence[tuple[float, Any]]) -> list[tuple[floa
 def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, polars.Polar]]:
     """Read the tables of a case; several XFOIL files at one r/R are its Reynolds numbers."""
     from bemt.data import readers as importers
-    from bemt.data.readers import polar_xfoil
+    from bemt.data.readers.polars import read_many
 
     groups: dict[float, list[PolarTable]] = {}
     for item in given:
@@ -91,14 +91,14 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
         paths = [case.folder / item.file for item in items]
         kind = items[0].format
         if len(items) > 1:
-            out.append((x, polar_xfoil.read_many(paths)))
+            out.append((x, read_many(paths)))
             continue
         read = importers.read(paths[0], None if kind is None else f"polar_{kind}")
         if isinstance(read, polars.Polar):
             out.append((x, read))
         else:
             got = f"a different type of file ({type(read).__name__})"
-            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL, C81 or AeroDyn"))
+            faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL or C81"))
     if faults:
         raise InputError(faults)
     return out

@@ -24,10 +24,9 @@ from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.pair_error import PairError
-from bemt.rotors.mixture import LEVELS
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
-from bemt.rotors.predict import zero_thrust
+from bemt.rotors.predict import LEVELS, zero_thrust
 from bemt.rotors.reference import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.validity import Validity, aside
 

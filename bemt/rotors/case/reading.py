@@ -52,28 +52,11 @@ class Reading:
 
 
 def parse_reading(text: str, where: str = "--reading") -> tuple[Reading, ...]:
-    """Read readings as people type them.
+    """Read readings as people type them: ``name=value`` with commas between, readings with semicolons.
 
-    Parameters
-    ----------
-    text : str
-        ``name=value`` pairs with commas between them, readings with semicolons. Names carry their unit: ``rpm``,
-        ``thrust_g`` (gram-force), ``thrust_N``, ``airspeed_m_s``, ``torque_Nm``, ``power_W`` (of the shaft),
-        ``density_kg_m3`` (1.225 by default). ``V`` is the airspeed in m/s.
-    where : str
-        What a fault names.
+    Names carry their unit: ``rpm``, ``thrust_g`` (gram-force), ``thrust_N``, ``airspeed_m_s``, ``torque_Nm``,
+    ``power_W`` (of the shaft), ``density_kg_m3`` (1.225 by default). ``V`` is the airspeed in m/s.
 
-    Returns
-    -------
-    tuple of Reading
-
-    Raises
-    ------
-    InputError
-        For unknown names and units, numbers that are none, and readings without speed or without any load.
-
-    Examples
-    --------
     >>> one, = parse_reading("rpm=5400, thrust_g=410")
     >>> round(one.thrust_N, 3), one.airspeed_m_s
     (4.021, 0.0)
@@ -152,25 +135,7 @@ def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, floa
 
 
 def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> Case:
-    """Case of the rotor that gave a reading, for every action that takes a case.
-
-    Parameters
-    ----------
-    case : Case
-        A rotor known by its label, its stations or as a measured propeller.
-    reading : str or mapping
-        As `parse_reading` takes it, or names and numbers.
-
-    Returns
-    -------
-    Case
-        The case with the key ``blade.as_built.reading``; what the reading settles is no assumption any more.
-
-    Raises
-    ------
-    InputError
-        As `parse_reading`, and for a case that a recording calibrated already.
-    """
+    """Case of the rotor that gave a reading; what the reading settles is no assumption any more."""
     from bemt.rotors.case.load import with_changes
 
     text = reading_text(reading)

@@ -368,9 +368,7 @@ class PolarTable(Table):
 
     file: str = entry("table of lift and drag", required=True, words=FILE)
     r_over_R: float = entry("radius of the section", "", 0, 1, _percent("r_over_R", 2.0), required=True)
-    format: Literal["csv", "xfoil", "c81", "aerodyn"] | None = entry(
-        "file format; detected from the content if omitted"
-    )
+    format: Literal["csv", "xfoil", "c81"] | None = entry("file format; detected from the content if omitted")
 
 
 class CaseFile(Table):

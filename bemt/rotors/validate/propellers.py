@@ -16,8 +16,17 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.folders import find_data
 from bemt.base.tables import json_text, or_null, write_atomic
 from bemt.rotors.population import population
-from bemt.rotors.validate.built import Pool, expect, observe
-from bemt.rotors.validate.points import J_SHARE, Rows, Stations, compare, read_folders, statistics
+from bemt.rotors.validate.points import (
+    J_SHARE,
+    Pool,
+    Rows,
+    Stations,
+    compare,
+    expect,
+    observe,
+    read_folders,
+    statistics,
+)
 
 if TYPE_CHECKING:
     from bemt.data.readers.uiuc import UiucPropeller

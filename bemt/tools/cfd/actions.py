@@ -63,7 +63,7 @@ def cfd(
 
     name = os.fspath(campaign)
     if campaigns.is_folder_of_campaigns(name):
-        from bemt.tools.cfd.summary import summary, summary_text
+        from bemt.tools.cfd.campaign import summary, summary_text
 
         found = summary(name)
         return Told(found.document(), summary_text(found))

@@ -21,8 +21,7 @@ from bemt.data.readers import number
 from bemt.data.recordings.cfd_setup import GRID_FLOOR_SOURCE, grid_floor
 from bemt.data.recordings.grid_study import grid_study, ratios
 from bemt.tools.cfd.balance import BALANCE_LIMIT
-from bemt.tools.cfd.rows import COLUMNS, TEXTS, LoadStudy, RunRow, Study
-from bemt.tools.cfd.schema import Campaign
+from bemt.tools.cfd.schema import COLUMNS, TEXTS, Campaign, RunRow, Study, StudyResult
 from bemt.tools.cfd.worker import DRIFT_LIMIT, RESIDUALS, SCATTER_LIMIT, Outcome
 
 LOADS = ("thrust_N", "torque_Nm")
@@ -102,7 +101,7 @@ def grid_studies(rows: Sequence[RunRow]) -> list[Study]:
                     best = found.extrapolated if found.extrapolated is not None and not found.flags else values[0]
                     u = max(u, 1.25 * abs(value - best) / 1.15)
                 each[f"{row.level:g}"] = u / abs(value)
-            studies.append(LoadStudy(tuple(values), found.order, found.extrapolated, found.gci_fine, found.gci_coarse,
+            studies.append(StudyResult(tuple(values), found.order, found.extrapolated, found.gci_fine, found.gci_coarse,
                                      spread / abs(values[0]), found.flags, each))  # fmt: skip
         point: dict[str, Any] = {k: getattr(fine[0], k) for k in SAME}
         T, Q = studies

@@ -19,15 +19,13 @@ from bemt.base.document import Documented
 from bemt.base.page import num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
-from bemt.results.report.audit_block import audit_parts
-from bemt.results.report.book import Book, CasePage
-from bemt.results.report.found_files import read_json, safe_files
+from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
+from bemt.results.report.diagnosis_block import audit_parts
+from bemt.results.report.gather import read_json, safe_files
 from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
-from bemt.results.report.values import Page, Section, picture, sections
-from bemt.results.sweep.comparison import Comparison
-from bemt.results.sweep.rows import Conditions, Result, Row
+from bemt.results.sweep.rows import CaseConditions, Comparison, Result, Row
 from bemt.rotors.validity import serious
-from bemt.tools.cfd.rows import RunRow, run_of
+from bemt.tools.cfd.schema import RunRow, run_of
 
 SCHEMA = "bemt.cfd-recording/"
 CSV_BYTES = 20_000_000
@@ -38,7 +36,7 @@ Loads = Sequence[tuple[float, float, float]]
 """Radius [m], thrust [N/m] and torque [N] per radius."""
 
 
-class Run(RunRow):
+class ShownRun(RunRow):
     """A run with the campaign that recorded it, and its audit where its case is known."""
 
     campaign: str = ""
@@ -52,7 +50,7 @@ class Runs:
     name: str
     title: str
     case: str
-    runs: tuple[Run, ...]
+    runs: tuple[ShownRun, ...]
     radial: Mapping[str, Loads]
     figures: Sequence[tuple[str, bytes]]
     grid_study: bool  # Whether the uncertainty rests on one, its own or of the same case
@@ -115,7 +113,7 @@ def cfd_runs(out: Path) -> list[Runs]:
             continue
         runs = []
         for row in read_rows(path.parent / "recording.csv"):
-            run = Run(**vars(run_of(row)), campaign=name)
+            run = ShownRun(**vars(run_of(row)), campaign=name)
             if run.rpm > 0 and math.isfinite(run.thrust_N):
                 runs.append(run)
         radial: dict[str, list[tuple[float, float, float]]] = {}
@@ -130,7 +128,7 @@ def cfd_runs(out: Path) -> list[Runs]:
     return found
 
 
-def is_plain(run: Run) -> bool:
+def is_plain(run: ShownRun) -> bool:
     """Tell whether a run is the bare case: free domain, axial flow, no plate, blades as they are, settled.
 
     A sector of one blade counts with its balance only: its sides may leak.
@@ -141,7 +139,7 @@ def is_plain(run: Run) -> bool:
             and all(not abs(v) > 1e-9 for v in apart))  # fmt: skip
 
 
-def operating_run(found: Sequence[Runs], result: Result) -> Run | None:
+def operating_run(found: Sequence[Runs], result: Result) -> ShownRun | None:
     """Choose the run that stands for a case at its operating point: compressible before not, then the finest grid."""
     c = result.conditions
     if c is None:
@@ -165,12 +163,12 @@ def operating_run(found: Sequence[Runs], result: Result) -> Run | None:
     return None if best is None else best[1]
 
 
-def radial_of(found: Sequence[Runs], run: Run) -> Loads:
+def radial_of(found: Sequence[Runs], run: ShownRun) -> Loads:
     """Loads along the radius of a run, ascending."""
     return next((sorted(item.radial[run.run]) for item in found if run.run in item.radial), [])
 
 
-def _facts(run: Run, c: Conditions, ducted: bool, levels: int) -> CfdFacts:
+def _facts(run: ShownRun, c: CaseConditions, ducted: bool, levels: int) -> CfdFacts:
     """What the audit asks for."""
     D, n = c.diameter_m, run.rpm / 60.0
     T, u = abs(run.thrust_N), run.u_thrust_N
@@ -196,7 +194,7 @@ def _plain_rows(found: Sequence[Runs], result: Result) -> list[Row]:
     c = result.conditions
     if c is None:
         return []
-    best: dict[tuple[Any, ...], Run] = {}
+    best: dict[tuple[Any, ...], ShownRun] = {}
     for item in found:
         if item.case != result.name or ("duct" in item.name and result.kind != "fan"):
             continue
@@ -336,7 +334,7 @@ def _plots(item: Runs) -> list[dict[str, Any] | None]:
     name, label = max(VARIED, key=lambda v: (len(values(v[0])), -VARIED.index(v)))
     if len(values(name)) < 2:
         return []
-    groups: dict[str, list[Run]] = {}
+    groups: dict[str, list[ShownRun]] = {}
     for run in runs:
         words = [run.solver, run.domain, f"{run.rpm:g} rev/min"]
         if name != "J" and len(values("J")) > 1:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import NoneType
 from typing import Any, Literal, get_args
@@ -12,9 +13,11 @@ from typing import Any, Literal, get_args
 from pydantic import create_model
 from pydantic.fields import FieldInfo
 
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.toml import Table, entry, limits_of, shown, validated
 from bemt.base.toml_text import Collector, load_toml
+from bemt.data.readers import number
 from bemt.rotors.case import Case, check_name, load_case
 from bemt.tools.cfd.openfoam.settings import GASES, ZONES
 from bemt.tools.cfd.openfoam.write import Run, RunTable
@@ -22,7 +25,7 @@ from bemt.tools.cfd.openfoam.write import Run, RunTable
 __all__ = ["Campaign", "CampaignFile", "CampaignPoint", "load_campaign"]
 
 
-class PointTable(RunTable):
+class PointOptions(RunTable):
     """[defaults], [[points]] and, as lists, [axes]: one CFD run; omitted values come from the case."""
 
     J: float | None = entry("advance ratio, with rpm and instead of airspeed_m_s", low=0, high=5)
@@ -43,7 +46,7 @@ def _listed(field: FieldInfo) -> Any:
 
 
 AxesTable: Any = create_model(
-    "AxesTable", __base__=Table, **{name: _listed(field) for name, field in PointTable.model_fields.items()}
+    "AxesTable", __base__=Table, **{name: _listed(field) for name, field in PointOptions.model_fields.items()}
 )
 
 
@@ -64,9 +67,9 @@ class CampaignFile(Table):
     title: str | None = entry("one-line title")
     case: str = entry("path to case.toml", required=True)
     grid_study: str | None = entry("folder of the campaign that gives the numerical uncertainty")
-    defaults: PointTable = PointTable()
+    defaults: PointOptions = PointOptions()
     axes: AxesTable = AxesTable()
-    points: tuple[PointTable, ...] = ()
+    points: tuple[PointOptions, ...] = ()
     duct: CampaignDuct | None = None
 
 
@@ -165,3 +168,109 @@ def _point(
         out.faults += [Fault(out.file, f"{where}: {f.where}", f.got, f.expected, f.hint) for f in error.faults]
         return []
     return [CampaignPoint(changed, run, row, row.get("start", "neighbour") == "neighbour")]
+
+
+# One run of a campaign as its recording holds it, a line of ``recording.csv``, and the grid studies of its runs.
+
+
+class RunRow(Documented):
+    """Point, loads with their standard uncertainties, how it was computed, and how well it settled; NaN: not stated."""
+
+    run: str = ""
+    rpm: float = math.nan
+    airspeed_m_s: float = math.nan
+    J: float = math.nan
+    thrust_N: float = math.nan
+    torque_Nm: float = math.nan
+    u_thrust_N: float = math.nan
+    u_torque_Nm: float = math.nan
+    thrust_rotor_N: float = math.nan
+    thrust_standing_N: float = math.nan
+    density_kg_m3: float = math.nan
+    temperature_C: float = math.nan
+    pressure_Pa: float = math.nan
+    wall_distance_m: float = math.nan
+    tip_gap_mm: float = math.nan
+    sideslip_deg: float = math.nan
+    pitch_offset_deg: float = math.nan
+    solver: str = ""
+    gas: str = ""
+    domain: str = ""
+    sector: str = ""
+    turbulence: str = ""
+    level: float = math.nan
+    cells: float = math.nan
+    iterations: float = math.nan
+    averaged: float = math.nan
+    drift_thrust: float = math.nan
+    drift_torque: float = math.nan
+    scatter_thrust: float = math.nan
+    scatter_torque: float = math.nan
+    balance_mass: float = math.nan
+    balance_momentum: float = math.nan
+    balance_angular_momentum: float = math.nan
+    swirl_out: float = math.nan
+    yplus_avg: float = math.nan
+    seconds: float = math.nan
+    start: str = ""
+    converged: float = math.nan
+    note: str = ""
+
+    @property
+    def settled(self) -> bool:
+        """Whether it converged."""
+        return self.converged == 1
+
+
+class StudyResult(Documented):
+    """Grid study of one load, finest grid first; standard uncertainty by level, relative [1]."""
+
+    values: tuple[float, ...]
+    order: float | None
+    extrapolated: float | None
+    gci_fine: float | None
+    gci_coarse: float | None
+    spread: float
+    flags: tuple[str, ...]
+    u_relative: Mapping[str, float]
+
+
+class Study(Documented):
+    """Runs that differ in their grid alone, finest first."""
+
+    rpm: float
+    airspeed_m_s: float
+    wall_distance_m: float
+    tip_gap_mm: float
+    sideslip_deg: float
+    pitch_offset_deg: float
+    solver: str
+    gas: str
+    domain: str
+    sector: str
+    turbulence: str
+    levels: tuple[float, ...]
+    cells: tuple[float, ...]
+    ratios: tuple[float, ...]
+    by_cells: tuple[float, ...]
+    thrust_N: StudyResult
+    torque_Nm: StudyResult
+
+    def of(self, load: str) -> StudyResult:
+        """Study of ``thrust_N`` or ``torque_Nm``."""
+        found: StudyResult = getattr(self, load)
+        return found
+
+
+COLUMNS = tuple(f.name for f in fields(RunRow))
+TEXTS = {f.name for f in fields(RunRow) if f.type == "str"}
+
+
+def run_of(cells: Mapping[str, str]) -> RunRow:
+    """Run of a line as written; NaN where nothing or no number stands."""
+    found: dict[str, Any] = {k: cells.get(k) or "" for k in TEXTS}
+    for name in COLUMNS:
+        if name not in TEXTS:
+            read = number(text) if (text := cells.get(name)) else None
+            found[name] = read if read is not None and math.isfinite(read) else math.nan
+    return RunRow(**found)

@@ -10,7 +10,7 @@ from bemt.base.action import Count, action
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from bemt.tools.design.answer import Choice
+    from bemt.tools.design.answer import DriveChoice
     from bemt.tools.design.blade_design import Design
     from bemt.tools.design.motors_file import KnownMotor
 
@@ -30,7 +30,7 @@ def choose(
     max_diameter_in: float | None = None, arm_mm: float | None = None, max_tip_mach: float = 0.8,
     capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
     fluid: Literal["air", "water"] = "air", coaxial: bool = False, sure: float = 0.9, out: Path | None = None,
-) -> Choice:  # fmt: skip
+) -> DriveChoice:  # fmt: skip
     """Find which propeller and which motor constant reach a thrust, with the probability that they do.
 
     Parameters
@@ -104,7 +104,7 @@ def choose(
     )  # fmt: skip
     if out is not None:
         answer.write(table, path_text("out", out))
-    return answer.Choice(table)
+    return answer.DriveChoice(table)
 
 
 @action(

@@ -22,7 +22,7 @@ SHOWN = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class DriveChoice:
     """Propellers and motors for a target, best first; columns of the table are attributes as well.
 
     Parameters

@@ -22,14 +22,14 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.unknowns import AIR, SECTION, SURFACE
 from bemt.tools.design import optimise as search
-from bemt.tools.design.best_label import Label, best_labels
 from bemt.tools.design.minimum_loss import MinimumLoss, actuator_disk, ducted_disk, minimum_loss, without_drag
+from bemt.tools.design.optimise import Label, best_labels
 from bemt.tools.design.problem import BladeProblem, Values
 from bemt.tools.design.requirement import DesignPoint, Requirement, required
 
 if TYPE_CHECKING:
     from bemt.physics.bem.model import Model
-    from geometry.blade import Blade
+    from geometry.rotor import Blade
 
 Progress = Callable[[str], None]
 

@@ -33,16 +33,16 @@ from bemt.physics.bem.kernel import N_OUT, O_JET, O_MASS, O_SPIN, O_STATOR, O_WH
 from bemt.physics.bem.packing import blend_weights
 from bemt.physics.effects import Effect
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, DLOG_RE, LOG_RE0, first_stall
-from bemt.tools.design import materials
+from bemt.tools.design import requirement
+from bemt.tools.design.minimum_loss import CONTROLS, BladeShape
 from bemt.tools.design.requirement import WIDEST, Requirement
-from bemt.tools.design.shape import CONTROLS, Shape
 
 if TYPE_CHECKING:
     from bemt.physics.bem.duct import DuctFlow
     from bemt.physics.bem.model import Model
     from bemt.physics.bem.solver import Prepared
     from bemt.physics.sections.polars import Polar
-    from geometry.blade import Stations
+    from geometry.rotor import Stations
 
 COLUMNS = ("dT", "dQ", "alpha", "W", "w", "v_t", "cl")
 _ALPHA, _W, _AXIAL, _SWIRL, _CL, _ROOM, _LIFT = range(2, 9)  # the last two are added here
@@ -87,7 +87,7 @@ class BladeProblem:
 
     need: Requirement
     model: Model
-    shape: Shape
+    shape: BladeShape
     rpm0: Array
     variants: Sequence[Sequence[Effect]]
     scale_W: float
@@ -142,11 +142,11 @@ class BladeProblem:
         return np.asarray((1.0 - self.need.limits.stall_margin) * (self.blend @ table))
 
     @cached_property
-    def strength(self) -> materials.SectionStrength:
+    def strength(self) -> requirement.SectionStrength:
         """Shape numbers of the elements' sections."""
         anchors = list(self.model.rotor.blade.anchors)
         x = np.array([a[0] for a in anchors])
-        return materials.strength(anchors, blend_weights(self.shape.r / self.shape.R, x))
+        return requirement.strength(anchors, blend_weights(self.shape.r / self.shape.R, x))
 
     @cached_property
     def chord_limits(self) -> tuple[Array, Array, Array]:
@@ -328,9 +328,9 @@ class BladeProblem:
 
     def _stress(
         self, k: int, omega: float, s: Stations, e: Array, by_c: Array | None, by_b: Array | None
-    ) -> materials.Stress:
+    ) -> requirement.Stress:
         tangents = (None, None) if by_c is None or by_b is None else (by_c[:2, k], by_b[:2, k])
-        return materials.stress(self.strength, self.need.limits.material.density, self.need.blades, omega, s.r, s.dr,
+        return requirement.stress(self.strength, self.need.limits.material.density, self.need.blades, omega, s.r, s.dr,
                                 s.chord, s.beta, e[:2, k], *tangents)  # fmt: skip
 
     def active(self, v: Values) -> list[str]:

@@ -6,9 +6,9 @@ form:
     I = Q/k + I_0,   d^2 R_b I - d V_oc + k Omega + R I = 0,   P = (V_oc - R_b d I) d I
 
 with the smaller root d, the duty; the thrust is out of reach where d is above 1 or not real. A motor that is tried by
-its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.masses`), and has the resistance of its
-class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v and
-voltage, as in `drive`. Idle current and battery take the
+its K_v weighs what its torque at the target asks for (:mod:`bemt.tools.design.motors_file`), and has the resistance of
+its class by K_v and mass (`bemt.rotors.case.motor`); one of a list without a resistance has that of its class by K_v
+and voltage, as in `drive`. Idle current and battery take the
 shares at full throttle that `bemt.rotors.case.unknowns` declares (3582 points of 1088 recorded motors):
 
     k Omega_full = (1 - sag) V_oc - R I_full,   I_full = Q_full / (k (1 - idle)).
@@ -39,7 +39,7 @@ from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
-from bemt.tools.design import masses, rotor_loads
+from bemt.tools.design import motors_file, rotor_loads
 from bemt.tools.design.motors_file import KnownMotor, read_motors
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
 
@@ -141,62 +141,13 @@ def choose(
     coaxial: bool = False,
     sure: float = 0.9,
 ) -> pd.DataFrame:
-    """Rank propellers and motors for a thrust or a mass.
+    """Rank propellers and motors for a thrust or a mass; arguments as those of :func:`bemt.choose`.
 
-    Parameters
-    ----------
-    thrust_N : float, optional
-        Thrust of one rotor at full throttle; twice the hover thrust if only `mass_kg` is given. [N]
-    cells : int
-        LiPo cells in series.
-    kv : float or (low, high)
-        Speed constant, or the range of which 72 are tried. [rev/min/V]
-    motors : sequence of KnownMotor, or path
-        Real motors instead of `kv`, or a CSV with ``name,kv,resistance_mohm,no_load_A``.
-    labels : str or sequence of str
-        Labels to try, as ``10x5`` or ``9x4.5x3``; standard sizes by default.
-    blades : int or sequence of int
-        Of the standard sizes.
-    mass_kg : float, optional
-        Mass of the vehicle; power, current and time are then those of hover instead of those at `thrust_N`. [kg]
-    rest_kg : float, optional
-        Of that mass, what is not motor, propeller, controller and frame; 60 % of it unless told. Each pair hovers with
-        this and what it weighs itself (:mod:`bemt.tools.design.masses`). [kg]
-    rotors : int
-        Rotors that carry the vehicle.
-    airspeed_m_s, max_diameter_in : float, optional
-        Flight speed [m/s], limit on size [in].
-    arm_mm : float, optional
-        From the middle of the frame to a shaft, or from the only shaft to what is next to it: limits the diameter. [mm]
-    max_tip_mach : float
-        Limit on the helical tip Mach number at `thrust_N`. [1]
-    capacity_Ah, minutes : optional
-        Battery capacity; with it, time in hover that is part of the target [min].
-    fan : bool
-        Ducted fans on sale, 30 to 120 mm, instead of propellers.
-    fluid : {"air", "water"}
-        What the propeller turns in; in water a blade area too small for the thrust is named (Keller's criterion).
-    coaxial : bool
-        Each propeller is one of a pair, one above the other; `rotors` counts both.
-    sure : float
-        Pairs that meet the target with this probability come first: the smallest within 5 % of the least power, the
-        one with the least power, then by power; at last the others, by probability.
+    A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
+    ``at_N`` the thrust of the power, ``why`` says why it is not the first. Pairs that meet the target with the
+    probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
+    power. `motors` may be a CSV with ``name,kv,resistance_mohm,no_load_A``.
 
-    Returns
-    -------
-    pandas.DataFrame
-        A row per pair, best first: ``label, diameter_in, motor, kv, probability, power_W, u_power_W, current_A, peak_A,
-        g_per_W, minutes, rpm, tip_mach, full_thrust_N, propulsion_g, motor_g, at_N, why``; ``propulsion_g`` is the
-        mass of one rotor's motor, propeller, controller and arm, ``at_N`` the thrust of the power, ``why`` says why it
-        is not the first.
-
-    Raises
-    ------
-    InputError
-        With every fault of the request, or if no size can be tried.
-
-    Examples
-    --------
     >>> found = choose(8.0, 3, labels=["10x4.5", "9x6", "8x4"], kv=(700, 1500))
     >>> found.label.iloc[0], bool(found.probability.iloc[0] >= 0.9)
     ('10x4.5', True)
@@ -207,7 +158,7 @@ def choose(
                      fluid, coaxial, arm_mm)  # fmt: skip
     ends, counts = _several(kv), _several(blades)
     _check(ends, max_diameter_in, sure, counts)
-    room = math.inf if target.arm_m is None else masses.diameter_on(target.arm_m, target.arms) / INCH
+    room = math.inf if target.arm_m is None else motors_file.diameter_on(target.arm_m, target.arms) / INCH
     most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
@@ -289,7 +240,7 @@ def _target(
     if hover is not None and most < hover:
         hint = f"Each of {rotors} carries {hover:.2f} N in hover"
         raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
-    rest = (1.0 - masses.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
+    rest = (1.0 - motors_file.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
     arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
                   thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip
@@ -482,12 +433,12 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     ]  # fmt: skip
 
 
-def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> masses.Masses:
+def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> motors_file.Masses:
     """Mass of one rotor's parts for the thrust asked for at a speed."""
     torque = float(loads.torque_at(np.array([rpm]))[0])
-    arm = masses.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
+    arm = motors_file.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
     watts = torque * rpm * math.pi / 30.0 / EFFICIENCY
-    return masses.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    return motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
 
 
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:

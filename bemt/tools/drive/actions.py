@@ -9,7 +9,7 @@ from bemt.base.action import Count, Told, action
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from bemt.rotors.propeller import Propeller
     from bemt.tools.drive.drive_result import DriveResult
@@ -143,54 +143,36 @@ def map(  # noqa: A001
 
 
 @action("Drive", "motor motor.toml", words=("file",))
-def motor(
-    file: Path | None = None, *, generate: Path | None = None, seed: int | None = None,
-    plant: Mapping[str, str] = {}, out: Path | None = None,  # noqa: B006
-) -> Told:  # fmt: skip
+def motor(file: Path, *, out: Path | None = None) -> Told:
     """Find a motor's torque constant by three methods, and say which one errs.
 
     Parameters
     ----------
-    file : path, optional
+    file : path
         motor.toml or its folder.
-    generate : path, optional
-        Folder for generated trials (labelled as generated) and their motor.toml.
-    seed : int, optional
-        Random seed of generated trials; 0 by default.
-    plant : mapping
-        Systematic errors of generated trials: torque.shunt=1.04.
     out : path, optional
         Folder for JSON, trials as CSV and a box plot.
 
     Returns
     -------
     Told
-        Schema ``bemt.motor.result/1`` (``bemt.motor.generated/1`` where nothing is judged); ``exit_code`` 1 when the
-        methods disagree.
+        Schema ``bemt.motor.result/1``; ``exit_code`` 1 when the methods disagree.
 
     Raises
     ------
     InputError
-        For what cannot be read, and for options that would be ignored.
+        With every fault of the file.
 
     Examples
     --------
-    >>> motor(seed=1)  # doctest: +ELLIPSIS
+    >>> motor("no/such.toml")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    bemt.base.errors.InputError: seed: got 1; expected none without generate...
+    bemt.base.errors.InputError: no/such.toml: got ...
     """
     from bemt.tools.drive import motor_result
 
-    read, target, folder = (None if path is None else os.fspath(path) for path in (file, generate, out))
-    words = [f"{name}={size}" for name, size in plant.items()]
-    motor_result.check_options(read, target, seed, words, folder)
-    if target is not None:
-        made = motor_result.generate(target, seed, words, read, folder)
-        if read is None:
-            return Told(made, motor_result.generated_text(made))
-    assert read is not None  # checked above
-    trials, found = motor_result.judge(read, folder)
+    trials, found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
     return Told(found, motor_result.text(trials, found), exit_code=EXIT_OK if found["agree"] else EXIT_UNCONVERGED)
 
 

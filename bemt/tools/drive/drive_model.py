@@ -33,15 +33,129 @@ without effect at non-zero throttle).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError
 from bemt.physics.effects.motor_heating import COPPER, MAGNET
-from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
-from bemt.tools.drive.rotor_table import RotorMap
+from bemt.rotors.case import Case
+from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
+from bemt.rotors.case.lattice import SPEEDS
+from bemt.rotors.case.motor import class_resistance
+
+# Thrust and torque of a rotor over speed, for the drive: from a case by BEMT, or from coefficients.
+
+
+@dataclass(frozen=True, eq=False)
+class RotorMap:
+    """Loads of a rotor over speed."""
+
+    omega_max: float  # greatest speed of the table. [rad/s]
+    # speed [rad/s] to thrust [N], torque [N m] and thrust per induced speed at fixed rotation [N s/m]
+    thrust_law: Callable[[Array], Array]
+    torque_law: Callable[[Array], Array]
+    slope_law: Callable[[Array], Array] | None
+    # of the rotor [m]; swept area that carries the thrust [m2]
+    radius_m: float
+    area_m2: float
+    rho: float  # density of the air. [kg/m3]
+    airspeed_m_s: float = 0.0  # of flight. [m/s]
+    inertia_kg_m2: float = 0.0  # of the rotor alone. [kg m2]
+    notes: tuple[str, ...] = ()  # what was left out
+
+    def thrust(self, omega: ArrayLike) -> Array:
+        """Steady thrust, (N,) [N]."""
+        return np.asarray(self.thrust_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
+
+    def torque(self, omega: ArrayLike) -> Array:
+        """Steady shaft torque, (N,) [N m]."""
+        return np.asarray(self.torque_law(np.maximum(np.asarray(omega, dtype=float), 0.0)))
+
+    def induced(self, thrust_N: ArrayLike) -> Array:
+        """Induced speed of momentum theory, 2 rho A v (V + v) = T, (N,) [m/s]."""
+        load = np.maximum(np.asarray(thrust_N, dtype=float), 0.0) / (2.0 * self.rho * self.area_m2)
+        half = 0.5 * self.airspeed_m_s
+        return np.asarray(np.sqrt(half**2 + load) - half)
+
+    @property
+    def apparent_mass_kg(self) -> float:
+        """Air that follows the rotor, 8/3 rho R^3 (Carpenter and Fridovich, NACA TN 3044, 1953; not checked). [kg]"""
+        return 8.0 / 3.0 * self.rho * self.radius_m**3
+
+
+def quadratic(
+    kT: float,
+    kQ: float,
+    diameter_m: float,
+    rho: float = 1.225,
+    inertia_kg_m2: float = 0.0,
+    solidity: float | None = None,
+) -> RotorMap:
+    """Rotor whose loads go with the square of the speed.
+
+    With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
+    Leishman, "Principles of Helicopter Aerodynamics", 2006, ch. 3; not checked).
+    """
+    R, A = 0.5 * diameter_m, math.pi * diameter_m**2 / 4.0
+    slope = None if solidity is None else (lambda w: -0.25 * rho * solidity * 5.7 * A * R * w)
+    return RotorMap(math.inf, lambda w: kT * w**2, lambda w: kQ * w**2, slope, R, A, rho, 0.0, inertia_kg_m2)
+
+
+def points(diameter_m: float, rpm_max: float, airspeed_m_s: float) -> tuple[Array, Array]:
+    """Speeds [rev/min] and airspeeds [m/s] of which `from_loads` makes a table: each speed twice, the second faster."""
+    rpm = SPEEDS * rpm_max
+    step = 0.02 * math.pi * diameter_m * rpm[-1] / 60.0
+    return np.tile(rpm, 2), airspeed_m_s + np.repeat([0.0, step], rpm.size)
+
+
+def from_loads(
+    case: Case,
+    rpm: Array,
+    airspeed_m_s: Array,
+    thrust_N: Array,
+    torque_Nm: Array,
+    rho: float,
+    inertia_kg_m2: float = 0.0,
+) -> RotorMap:
+    """Rotor of a case from its loads at `points`; loads that are NaN are dropped."""
+    from scipy.interpolate import PchipInterpolator
+
+    half = rpm.size // 2
+    step = airspeed_m_s[-1] - airspeed_m_s[0]
+    known = np.isfinite(thrust_N) & np.isfinite(torque_Nm)
+    ok, both = known[:half], known[:half] & known[half:]
+    if np.count_nonzero(ok) < max(4, half // 2):
+        got_text = f"{np.count_nonzero(ok)} of {half} speeds up to {rpm[-1]:.0f} rev/min converge"
+        raise InputError(Fault(case.path.as_posix(), "", got_text, "a rotor that can be solved over its speed range"))
+    notes = [] if np.all(ok) else [f"{half - np.count_nonzero(ok)} of {half} speeds do not converge: dropped"]
+    omega = rpm[:half][ok] * math.pi / 30.0
+    area = math.pi / 4.0 * (case.diameter_m**2 - (case.hub_diameter_m**2 if case.ducted else 0.0))
+    T, Q = thrust_N[:half], torque_Nm[:half]
+    tT, tQ = PchipInterpolator(omega, T[ok] / omega**2), PchipInterpolator(omega, Q[ok] / omega**2)
+    table = RotorMap(
+        float(omega[-1]), lambda w: tT(np.clip(w, omega[0], omega[-1])) * w**2,
+        lambda w: tQ(np.clip(w, omega[0], omega[-1])) * w**2, None, 0.5 * case.diameter_m, area, rho,
+        float(airspeed_m_s[0]), inertia_kg_m2, tuple(notes),
+    )  # fmt: skip
+    if case.ducted or np.count_nonzero(both) < 4:
+        why = "the inflow of a duct follows the fan at once here" if case.ducted else "no slope of thrust over airspeed"
+        return _with(table, None, (*notes, f"{why}: no lag of the inflow"))
+    # slope at fixed induced speed from the solver's, whose induced speed follows (bemt.physics.effects.inflow_lag)
+    w = rpm[:half][both] * math.pi / 30.0
+    dT_dV = (thrust_N[half:][both] - T[both]) / step
+    v = table.induced(T[both])
+    follow = (dT_dV / (2.0 * rho * area) - v) / np.maximum(airspeed_m_s[0] + 2.0 * v, 1e-9)
+    law = PchipInterpolator(w, dT_dV / np.maximum(1.0 + follow, 0.1) / w)
+    return _with(table, lambda x: law(np.clip(x, w[0], w[-1])) * x, tuple(notes))
+
+
+def _with(table: RotorMap, slope: Callable[[Array], Array] | None, notes: tuple[str, ...]) -> RotorMap:
+    return RotorMap(**{**vars(table), "slope_law": slope, "notes": notes})
+
 
 EFFECTS = ("battery_sag", "motor_heating", "rotor_inertia", "inflow_lag")
 """Effects of the drive that can be switched off; ids of the diagnosis."""
@@ -252,3 +366,89 @@ class Drive:
             i = np.argmax(enough, axis=1)
             lo, hi = grid[row, np.maximum(i - 1, 0)], grid[row, i]
         return np.where(out_of_reach, np.nan, hi)
+
+
+# The drive of a case: its battery, ESC and motor around its rotor, with whatever a label leaves open filled in.
+#
+# A case that states no winding has that of its class (`bemt.rotors.case.motor`), whatever the rotor; one that states
+# the share of voltage or current that is lost at full throttle has the ohms and amperes of a motor that is as large as
+# this rotor needs. The motor does not change with an unknown of the rotor: it is the same motor, whatever the blade
+# turns out to be.
+
+ROTOR_DENSITY = 0.06
+"""Mass of a plastic two-blade propeller over its diameter squared: declared. [kg/m2]"""
+
+
+def battery_of(table: DriveTable, resistance_ohm: float = 0.0) -> Battery:
+    """The share of the battery that one rotor has."""
+    b, n = table.battery, table.vehicle.rotors
+    capacity = math.nan if b.capacity_Ah is None else b.capacity_Ah / n
+    return Battery(table.cells, resistance_ohm, capacity, b.soc_table, b.ocv_cell_V)
+
+
+def rpm_max(case: Case) -> float:
+    """Speed at no load and full battery, at any end of the declared range of K_v: no rotor turns faster. [rev/min]"""
+    table = drive_table(case)
+    kv = max([table.kv, *(float(v) for item in case.assumptions if item.key == "drive.kv" for v in item.values)])
+    return kv * float(battery_of(table).voc(1.0))
+
+
+def drive_table(case: Case) -> DriveTable:
+    """The table [drive] of a case that has one."""
+    assert case.file.drive is not None
+    return case.file.drive
+
+
+def inertia_kg_m2(case: Case) -> float:
+    """Rotor inertia that the case states, else of slender blades, m R^2/3 with their mass nearer to the hub. [kg m2]"""
+    stated = drive_table(case).rotor_inertia_kg_mm2
+    if stated is not None:
+        return 1e-6 * stated
+    return ROTOR_DENSITY * case.diameter_m**2 * (0.5 * case.diameter_m) ** 2 / 9.0 * case.file.rotor.blades
+
+
+def drive_of(case: Case, rotor: RotorMap) -> Drive:
+    """Drive of a case; shares are taken at full throttle and the stated charge with the rotor that is given."""
+    t = drive_table(case)
+    m, e = t.motor, t.esc
+    henry = None if m.inductance_uH is None else m.inductance_uH * 1e-6
+    battery, winding, idle, bridge = _losses(t, rotor)
+    esc = Esc(
+        e.pulse_min_us, e.pulse_max_us, e.exponent, bridge, e.idle_A,
+        math.inf if e.current_limit_A is None else e.current_limit_A, e.braking == "yes", e.brake_on_stop,
+        math.inf if henry is None or e.pwm_kHz is None else 2e3 * henry * e.pwm_kHz,
+    )  # fmt: skip
+    turning = 0.3 * rotor.inertia_kg_m2 if m.inertia_kg_mm2 is None else m.inertia_kg_mm2 * 1e-6
+    motor = Motor(
+        t.kv, winding, idle, turning, math.inf if m.heat_capacity_J_K is None else m.heat_capacity_J_K,
+        m.thermal_K_W or 0.0, m.ambient_C, 0.0 if henry is None or m.pole_pairs is None else m.pole_pairs * henry,
+    )  # fmt: skip
+    return Drive(battery_of(t, battery), esc, motor, rotor)
+
+
+def _losses(t: DriveTable, rotor: RotorMap) -> tuple[float, float, float, float]:
+    """Resistance of the battery share and of the winding [ohm], no-load current [A], resistance of the ESC [ohm].
+
+    The current at full throttle, on which the shares depend, is the root of a falling function: damped iteration.
+    """
+    volts, k = float(battery_of(t).voc(t.soc)), 30.0 / (math.pi * t.kv)
+    stated = None if t.battery.resistance_mohm is None else t.vehicle.rotors * t.battery.resistance_mohm * 1e-3
+    ohm = None if t.motor.resistance_mohm is None else t.motor.resistance_mohm * 1e-3
+    if ohm is None and t.motor.winding_drop is None:
+        ohm = class_resistance(t)
+    sag, drop, share = t.battery.sag or 0.0, t.motor.winding_drop or 0.0, t.motor.idle_share or 0.0
+    more, lost = t.esc.resistance_mohm * 1e-3, t.esc.drop or 0.0
+    amps = 1e-3
+    for _ in range(200):
+        loaded = volts * (1.0 - sag) if stated is None else volts - stated * (amps + t.esc.idle_A)
+        emf = loaded * (1.0 - lost) - more * amps - (loaded * drop if ohm is None else ohm * amps)
+        load = float(rotor.torque(max(emf, 0.0) / k)) / k
+        new = load / (1.0 - share) if t.motor.no_load_A is None else load + t.motor.no_load_A
+        step = new - amps
+        amps = max(amps + 0.3 * step, 1e-3)
+        if abs(step) < 1e-9 * amps:
+            break
+    battery = volts * sag / amps if stated is None else stated
+    winding = loaded * drop / amps if ohm is None else ohm
+    no_load = share * amps if t.motor.no_load_A is None else t.motor.no_load_A
+    return battery, winding, no_load, more + loaded * lost / amps

@@ -24,9 +24,8 @@ from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.motor import named_motor
 from bemt.rotors.case.propagate import propagate, vary
 from bemt.rotors.case.schema import AIRSPEED
-from bemt.tools.drive import case_drive, mission, outputs, picture, rotor_table
-from bemt.tools.drive.drive_model import EFFECTS, Drive, Steady
-from bemt.tools.drive.rotor_table import RotorMap
+from bemt.tools.drive import drive_model, mission, outputs
+from bemt.tools.drive.drive_model import EFFECTS, Drive, RotorMap, Steady
 
 SCHEMA = "bemt.drive.result/2"
 COLUMNS = ("pulse_us", "rpm", "thrust_N", "battery_A", "voltage_V", "power_W", "efficiency")
@@ -102,7 +101,7 @@ class DriveResult:
 
     def __repr__(self) -> str:
         """Say what is known in a line."""
-        t = case_drive.drive_table(self.case)
+        t = drive_model.drive_table(self.case)
         return f"<drive of {self.case.name}: {t.kv:g} rev/min/V, {t.cells}S, {shown(self.full['thrust_N'], 'N')}>"
 
     def _repr_html_(self) -> str:
@@ -127,7 +126,7 @@ class DriveResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ``bemt.drive.result/2``; thrust over power in gf/W."""
-        t = case_drive.drive_table(self.case)
+        t = drive_model.drive_table(self.case)
         motor, battery = self.drive.motor, self.drive.battery
         given = {"kv": t.kv, "cells": t.cells, "soc": t.soc, "airspeed_m_s": self.airspeed_m_s,
                  "mass_kg": t.vehicle.mass_kg, "rotors": t.vehicle.rotors, "capacity_Ah": t.battery.capacity_Ah,
@@ -173,7 +172,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
     if wrong:
         raise InputError(wrong)
     drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
-    table = case_drive.drive_table(case)
+    table = drive_model.drive_table(case)
     steady = drive.steady(_pulses(drive), table.soc)
     steps, course = mission.response(drive, LOW, HIGH, table.soc)
     notes = [*_unusual(case), *_validity(case, bands["full.rpm"].value, airspeed_m_s), *drive.rotor.notes]
@@ -196,7 +195,7 @@ def full_throttle(case: Case, airspeed_m_s: float = 0.0, bands: bool = True) -> 
 
 def full_document(case: Case) -> dict[str, Any]:
     """Full throttle of a case that has a motor, as plain values with its line of text."""
-    full, t = full_throttle(case), case_drive.drive_table(case)
+    full, t = full_throttle(case), drive_model.drive_table(case)
     return {"kv": t.kv, "cells": t.cells, "soc": t.soc, "text": _line(case, full),
             **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
 
@@ -205,7 +204,7 @@ def circuit(case: Case) -> dict[str, Any] | None:
     """Numbers of battery, ESC and motor for a program that runs them itself, SI; None for a case without a motor."""
     if case.file.drive is None:
         return None
-    drive, t = _carried(case, 0.0, (), lambda _c, _d: {}, bands=False)[0], case_drive.drive_table(case)
+    drive, t = _carried(case, 0.0, (), lambda _c, _d: {}, bands=False)[0], drive_model.drive_table(case)
     idle, limit = drive.esc.idle_A, drive.esc.current_limit_A
     stated = t.rotor_inertia_kg_mm2
     return {
@@ -222,7 +221,7 @@ def circuit(case: Case) -> dict[str, Any] | None:
 
 
 def _line(case: Case, full: Mapping[str, DriveBand]) -> str:
-    t = case_drive.drive_table(case)
+    t = drive_model.drive_table(case)
     return (
         f"full throttle, {t.kv:g} rev/min/V on {t.cells}S at {t.soc:.0%} charge: "
         f"{shown(full['thrust_N'], 'N')} at {shown(full['rpm'], 'rev/min')}, {shown(full['battery_A'], 'A')}"
@@ -242,21 +241,21 @@ def _carried(
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()
-    rpm, V = rotor_table.points(case.diameter_m, 1.02 * case_drive.rpm_max(case), airspeed_m_s)
+    rpm, V = drive_model.points(case.diameter_m, 1.02 * drive_model.rpm_max(case), airspeed_m_s)
     found = propagate(case, rpm, V, angle_deg=0.0, bands=bands)
-    rho, inertia = float(case.air().rho), case_drive.inertia_kg_m2(case)
+    rho, inertia = float(case.air().rho), drive_model.inertia_kg_m2(case)
 
     def rotor(loads: Mapping[str, Array]) -> RotorMap:
-        return rotor_table.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
+        return drive_model.from_loads(case, rpm, V, loads["thrust_N"], loads["torque_Nm"], rho, inertia)
 
     own = rotor(found.nominal)
-    drive = case_drive.drive_of(case, own).without(*off)
+    drive = drive_model.drive_of(case, own).without(*off)
     if bands:
         values, by_origin = found.carry(lambda loads: ask(case, dataclasses.replace(drive, rotor=rotor(loads))))
     else:
         values, by_origin = ask(case, drive), {}
     unknown = [item for item in case.assumptions if item.key.startswith("drive.")] if bands else []
-    moved = vary(case, values, lambda c, _: ask(c, case_drive.drive_of(c, own).without(*off)), unknown)
+    moved = vary(case, values, lambda c, _: ask(c, drive_model.drive_of(c, own).without(*off)), unknown)
     nan = {key: np.full(np.shape(v), math.nan) for key, v in values.items()}
     rest = {key: sum((part[key] ** 2 for part in by_origin.values()), np.zeros(np.shape(v))) if bands else nan[key]
             for key, v in values.items()}  # fmt: skip
@@ -273,7 +272,7 @@ def _pulses(drive: Drive) -> Array:
 
 
 def _full(case: Case, drive: Drive) -> dict[str, Array]:
-    full = drive.steady(drive.esc.pulse_max_us, case_drive.drive_table(case).soc)
+    full = drive.steady(drive.esc.pulse_max_us, drive_model.drive_table(case).soc)
     out = {f"full.{key}": np.asarray(getattr(full, key)) for key in CARRIED}
     with np.errstate(divide="ignore", invalid="ignore"):
         out["full.g_per_W"] = 1e3 * out["full.thrust_N"] / KGF / out["full.power_W"]
@@ -282,7 +281,7 @@ def _full(case: Case, drive: Drive) -> dict[str, Array]:
 
 def _answers(case: Case, drive: Drive) -> dict[str, Array]:
     """Full throttle, hover and the curve over pulse width."""
-    table = case_drive.drive_table(case)
+    table = drive_model.drive_table(case)
     out = _full(case, drive)
     curve = drive.steady(_pulses(drive), table.soc)
     out |= {f"steady.{key}": np.asarray(getattr(curve, key)) for key in CARRIED}
@@ -308,8 +307,8 @@ def _validity(case: Case, rpm: float, airspeed_m_s: float) -> tuple[str, ...]:
 
 def _unusual(case: Case) -> list[str]:
     """Say when K_v, cells and diameter seldom go together."""
-    table = case_drive.drive_table(case)
-    loaded = float(case_drive.battery_of(table).voc(table.soc)) * (1.0 - (table.battery.sag or 0.06))
+    table = drive_model.drive_table(case)
+    loaded = float(drive_model.battery_of(table).voc(table.soc)) * (1.0 - (table.battery.sag or 0.06))
     per_m = math.pi * table.kv * loaded / 60.0
     tips = case.diameter_m * per_m
     if tips <= TIPS[2] or case.ducted:
@@ -342,7 +341,7 @@ def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:
 
 def text(found: DriveResult) -> str:
     """Lay a result out: one screen."""
-    t, full, hover, drive = case_drive.drive_table(found.case), found.full, found.hover, found.drive
+    t, full, hover, drive = drive_model.drive_table(found.case), found.full, found.hover, found.drive
     lines = [f"{found.case.name}, {t.kv:g} rev/min/V, {t.cells}S at {t.soc:.0%} charge, ± one standard deviation"]
     lines += [*(f"! {note}" for note in found.notes), ""]
     mass, rotors = t.vehicle.mass_kg, t.vehicle.rotors
@@ -402,4 +401,4 @@ def write(found: DriveResult, out: str | Path) -> None:
     if found.course is not None:
         series = [("", found.course.time_s, found.course.thrust_N, "-")]
         panels.append({"x": "time [s]", "y": "thrust [N]", "series": series})
-    write_atomic(folder / RESULTS[2], picture.curves(panels, found.case.name))
+    write_atomic(folder / RESULTS[2], outputs.curves(panels, found.case.name))

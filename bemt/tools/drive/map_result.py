@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +11,161 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import json_text, number_text, text_table, write_atomic
+from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
-from bemt.tools.drive import bench_map, map_export, map_points, map_scatter, outputs, picture
+from bemt.tools.drive import bench_map, outputs
+from bemt.tools.drive.bench_map import BenchMap
+
+# What of a round trip the stand itself scatters: thrust over speed squared, which ESC and battery do not move.
+
+LEAST_THRUST = 0.05
+"""Share of the greatest thrust below which a level does not speak for T/rpm^2: there it is mostly zero point."""
+
+
+def speed_known(points: Dataset) -> Array:
+    """Errors of the same held-out levels if their speed were known: what is left is not the map's, (M,) [1].
+
+    A propeller at rest has thrust = k rpm^2, with k almost constant (Reynolds number). Each level's k is read between
+    the nearest levels below and above in speed; its thrust then misses by this much. It holds the scatter of the
+    readings of thrust and speed, whatever ESC and battery do.
+    """
+    thrust, rpm = points.thrust_N, points.rpm
+    usable = np.isfinite(thrust) & np.isfinite(rpm) & (rpm > 0.0)
+    if not np.any(usable):
+        return np.empty(0)
+    full = float(np.max(thrust[usable]))
+    usable &= thrust > LEAST_THRUST * full
+    errors = []
+    for run in np.unique(points.run[usable]):
+        own = np.flatnonzero(usable & (points.run == run))
+        own = own[np.argsort(rpm[own])]
+        n = rpm[own]
+        k = thrust[own] / n**2
+        for i in range(1, own.size - 1):
+            # a level of the very same speed is a repeat: it counts as a neighbour on both sides
+            share = (n[i] - n[i - 1]) / (n[i + 1] - n[i - 1]) if n[i + 1] > n[i - 1] else 0.5
+            between = (1.0 - share) * k[i - 1] + share * k[i + 1]
+            errors.append((between * n[i] ** 2 - thrust[own[i]]) / full)
+    return np.array(errors)
+
+
+def scatter_document(points: Dataset) -> dict[str, Any]:
+    """Summary of `speed_known`. [1]"""
+    e = speed_known(points)
+    worst, rms = (float(np.max(np.abs(e))), float(np.sqrt(np.mean(e**2)))) if e.size else (None, None)
+    return {"points": int(e.size), "worst_of_full_thrust": worst, "rms_of_full_thrust": rms}
+
+
+# A bench map as CSV, JSON and a C header, for the controller that asks for a thrust.
+
+COLUMNS = {"thrust": "thrust_N", "rpm": "rpm", "current": "current_A", "power": "power_W"}
+
+
+def tables(chart: BenchMap, nodes: int = 41) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Sample the map and its inverse."""
+    pulse = np.linspace(*chart.pulse_range_us, nodes)
+    forward = {"pulse_us": pulse}
+    forward |= {COLUMNS[name]: chart.at(name, pulse) for name in COLUMNS if name in chart.curves}
+    if chart.voltage is not None:
+        forward["recorded_voltage_V"] = chart.voltage_at(pulse)
+    low = max(float(chart.curves["thrust"].values[0]), 0.0)
+    wanted = np.linspace(low, chart.full_thrust_N, nodes)
+    return forward, {"thrust_N": wanted, "pulse_us": chart.pulse_for(wanted)}
+
+
+def table_csv(table: dict[str, Array]) -> str:
+    """One table as CSV."""
+    rows = [{name: float(v[i]) for name, v in table.items()} for i in range(len(next(iter(table.values()))))]
+    return csv_text(list(table), rows)
+
+
+def export_document(chart: BenchMap, nodes: int = 41) -> dict[str, Any]:
+    """The map as a JSON document."""
+    forward, inverse = tables(chart, nodes)
+    return {
+        "full_thrust_N": chart.full_thrust_N,
+        "voltage_is_a_parameter": chart.with_voltage,
+        "voltage_ref_V": chart.voltage_ref,
+        "voltage_range_V": list(chart.voltage_range),
+        "voltage_exponent": {name: curve.exponent for name, curve in chart.curves.items()},
+        "smoothness": {name: curve.smoothness for name, curve in chart.curves.items()},
+        "forward": forward,
+        "inverse": inverse,
+        "notes": list(chart.notes),
+    }
+
+
+def _array(name: str, values: Array, comment: str) -> str:
+    cells = [f"{v:.7g}" for v in values]
+    cells = [c if re.search(r"[.e]", c) else c + ".0" for c in cells]
+    lines = [", ".join(c + "f" for c in cells[i : i + 8]) for i in range(0, len(cells), 8)]
+    body = ",\n    ".join(lines)
+    return f"static const float {name}[{len(cells)}] = {{ /* {comment} */\n    {body}\n}};\n"
+
+
+def c_header(chart: BenchMap, name: str = "drive", nodes: int = 41) -> str:
+    """The map as a C99 header: tables at equal steps, and two functions that interpolate between them."""
+    p = re.sub(r"\W", "_", name.strip()).lower() or "drive"
+    p = f"m_{p}" if p[0].isdigit() else p
+    guard = f"{p.upper()}_MAP_H"
+    forward, inverse = tables(chart, nodes)
+    lo, hi = chart.pulse_range_us
+    t0, t1 = float(inverse["thrust_N"][0]), float(inverse["thrust_N"][-1])
+    m = chart.curves["thrust"].exponent
+    parts = [
+        f"/* Bench map of {p}: pulse width [us], thrust [N]; written by bemt. Equal steps, linear between them. */",
+        *[f"/* {note.replace('*/', '')} */" for note in chart.notes],
+        f"#ifndef {guard}\n#define {guard}\n",
+        *(["#include <math.h>\n"] if m else []),
+        f"#define {guard[:-2]}_NODES {nodes}",
+        f"#define {guard[:-2]}_PULSE_MIN_US {lo:.7e}f",
+        f"#define {guard[:-2]}_PULSE_MAX_US {hi:.7e}f",
+        f"#define {guard[:-2]}_THRUST_MIN_N {t0:.7e}f",
+        f"#define {guard[:-2]}_THRUST_MAX_N {t1:.7e}f\n",
+    ]
+    for column, values in forward.items():
+        if column != "pulse_us":
+            parts.append(_array(f"{p}_{column.lower()}", values, f"{column} at equal steps of pulse width"))
+    parts.append(_array(f"{p}_pulse_us", inverse["pulse_us"], "pulse width [us] at equal steps of thrust"))
+    parts.append(_LOOKUP.format(p=p, g=guard[:-2]))
+    arg, scale = ("", "")
+    if m:
+        arg = ", float voltage_V"
+        scale = f"    const float scale = powf(voltage_V / {chart.voltage_ref:.7e}f, {m:.7e}f);\n"
+    parts.append(
+        _FUNCTIONS.format(
+            p=p, g=guard[:-2], arg=arg, scale=scale, by=" * scale" if m else "", over=" / scale" if m else ""
+        )
+    )
+    return "\n".join(parts) + f"\n#endif /* {guard} */\n"
+
+
+_LOOKUP = """static inline float {p}_lookup_(const float *table, float x) /* x from 0 to 1, held at the ends */
+{{
+    const float at = (x > 0.0f ? (x < 1.0f ? x : 1.0f) : 0.0f) * ({g}_NODES - 1);
+    int i = (int)at;
+    if (i > {g}_NODES - 2) i = {g}_NODES - 2;
+    return table[i] + (at - (float)i) * (table[i + 1] - table[i]);
+}}
+"""
+_FUNCTIONS = """/* Thrust [N] that a pulse width [us] gives. */
+static inline float {p}_thrust(float pulse_us{arg})
+{{
+{scale}    return {p}_lookup_({p}_thrust_n,
+        (pulse_us - {g}_PULSE_MIN_US) / ({g}_PULSE_MAX_US - {g}_PULSE_MIN_US)){by};
+}}
+
+/* Pulse width [us] for a wanted thrust [N]; held at the ends of the map. */
+static inline float {p}_pulse(float thrust_N{arg})
+{{
+{scale}    return {p}_lookup_({p}_pulse_us,
+        (thrust_N{over} - {g}_THRUST_MIN_N) / ({g}_THRUST_MAX_N - {g}_THRUST_MIN_N));
+}}
+"""
+
 
 SCHEMA = "bemt.map/1"
 UNFIT = 0.05
@@ -57,14 +208,14 @@ def fit(
             read |= dict.fromkeys(own, file)
             if not isinstance(got, Dataset):
                 raise InputError(Fault(file, "", "no recording", "a log or a table of a thrust stand"))
-            parts.append(map_points.points(got, file, sign, i))
+            parts.append(bench_map.points(got, file, sign, i))
         except InputError as error:
             faults += error.faults
     if out:
         faults += outputs.faults("--out", Path(out), [form.format(name) for form in RESULTS], read)
     if faults:
         raise InputError(faults)
-    points = map_points.join(parts)
+    points = bench_map.join(parts)
     chart = bench_map.fit(points)
     off = bench_map.misfit(points, chart)
     if off > UNFIT:
@@ -72,9 +223,9 @@ def fit(
         hint = "Is there a propeller, and did the motor run through? Different drives do not share a map"
         raise InputError(Fault(", ".join(files), "thrust_N", got, "thrust that rises with the pulse width", hint))
     trip = bench_map.held_out(points)
-    spread, speed = bench_map.repeat_spread(points, chart), map_scatter.document(points)
+    spread, speed = bench_map.repeat_spread(points, chart), scatter_document(points)
     document: dict[str, Any] = {
-        "schema": SCHEMA, "name": name, "files": list(files), **map_export.document(chart, nodes),
+        "schema": SCHEMA, "name": name, "files": list(files), **export_document(chart, nodes),
         "steady_points": len(points),
         "held_out": {"points": len(trip.error), "worst_of_full_thrust": trip.worst, "rms_of_full_thrust": trip.rms,
                      "share_within_1_pct": float(np.mean(np.abs(trip.error) <= 0.01))},
@@ -96,7 +247,7 @@ def text(result: MapResult) -> str:
     chart, nodes, document = result.chart, result.nodes, result.document
     trip, spread = document["held_out"], document["repeat_spread_of_full_thrust"]
     speed, answer = document["speed_known"], document.get("answer")
-    forward, _ = map_export.tables(chart, nodes)
+    forward, _ = tables(chart, nodes)
     rows = [[number_text(float(v[i])) for v in forward.values()] for i in range(nodes)]
     lines = [text_table(list(forward), rows, left=())]
     worst, rms = (100 * trip[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
@@ -146,13 +297,13 @@ def _sources(path: Path, got: object) -> set[Path]:
 
 
 def _write(folder: Path, name: str, chart: bench_map.BenchMap, nodes: int, text: str) -> None:
-    forward, inverse = map_export.tables(chart, nodes)
+    forward, inverse = tables(chart, nodes)
     contents: Iterable[bytes | str] = (
         text,
-        map_export.table_csv(forward),
-        map_export.table_csv(inverse),
-        map_export.c_header(chart, name, nodes),
-        picture.bench_map(chart, name),
+        table_csv(forward),
+        table_csv(inverse),
+        c_header(chart, name, nodes),
+        outputs.bench_map(chart, name),
     )
     for form, content in zip(RESULTS, contents, strict=True):
         write_atomic(folder / form.format(name), content)

@@ -22,12 +22,15 @@ not checked against the book). Equation (2) and the trials' layout follow T. Cah
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
@@ -223,3 +226,212 @@ def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
     sizes = [math.hypot(c[1 + 2 * k], c[2 + 2 * k]) for k in range(3)]
     sd = float(np.sqrt(rest @ rest / max(len(t) - 8, 1)))
     return Waveform(f, sizes[0], float(c[0]), (sizes[1] / sizes[0], sizes[2] / sizes[0]), sd)
+
+
+# Do the methods agree on the motor constant and, if not, which systematic error explains it?
+#
+# Data are the constant of the data sheet and slope and intercept of the back-EMF and of the torque trials, with their
+# covariances. Every hypothesis says how these five numbers follow from one constant ke:
+#
+#     none              k1 = ke, b2 = ke, a2 = 0, b3 = 3/2 ke / g, a3 = 0
+#     back_emf.offset   a2 free
+#     torque.offset     a3 free (zero of the sensor; friction and cogging look the same)
+#     torque.shunt      R_true/R_assumed = s scales the loop current: b3 times s, a3 = (s - 1) times the live zero
+#     METHOD.factor     its slope times sqrt(3/2), sqrt(3), 2 or the inverse: a convention missed
+#     METHOD.gain       its slope times a free number; tried only when no single error above explains the data
+#
+# The least chi-square over ke and the free number judges each. The live zero of the 4-20 mA loop is what tells a wrong
+# resistor from a wrong gain. A hypothesis is named only when none fails at `ALPHA` and it passes; when single errors
+# fail, gains and then pairs are tried; when several explain the data equally well, all are named and none is preferred.
+
+METHODS = ("data_sheet", "back_emf", "torque")
+ALPHA = 0.001
+"""Probability at which agreement is rejected."""
+FACTORS = {
+    e.stated if e.actual == "1" else f"1/{e.actual}": e.factor
+    for e in sorted(unit_errors.errors("motor_constant"), key=lambda e: e.actual != "1")
+}
+"""Convention factors: what a method's value may be too large by."""
+NEAR = 6.0
+"""Difference of the criterion below which two explanations are not told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What the methods gave, all slopes as ke [V s/rad]."""
+
+    data_sheet: float | None  # ke of the data sheet [V s/rad]
+    # Its standard uncertainty; NaN when not stated: then it only bears on convention factors [V s/rad]
+    u_data_sheet: float
+    # Trials: slopes in V s/rad, intercepts in V and N m
+    back_emf: Line | None
+    torque: Line | None
+    # Standard uncertainty of gains and of the resistor, common to all trials [1]
+    u_gain_back_emf: float = 0.0
+    u_gain_torque: float = 0.0
+    u_shunt: float = 0.0
+    live_zero_Nm: float = 0.0  # Shift of torque by a resistor that is wrong by 1 [N m]
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """One hypothesis fitted."""
+
+    names: tuple[str, ...]  # errors, such as ``torque.shunt`` or ``back_emf.factor sqrt(3)``; empty: none
+    # constant under it and its standard uncertainty. [V s/rad]
+    ke: float
+    u_ke: float
+    # by error: offset [V or N m], R_true/R_assumed or factor [1]; standard uncertainty, 0 for a factor
+    sizes: tuple[float, ...]
+    u_sizes: tuple[float, ...]
+    chi2: float  # misfit. [1]
+    p: float  # probability of a misfit as large. [1]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the methods agree."""
+
+    agree: bool  # Whether no systematic error is needed
+    # What explains a disagreement, best first; several: not told apart; empty: agreement, or nothing known does
+    explanations: tuple[ErrorSource, ...]
+    none: ErrorSource  # The fit without any error
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Errors of the only explanation; empty when there is none or more than one."""
+        return self.explanations[0].names if len(self.explanations) == 1 else ()
+
+
+def _errors(m: Measured) -> list[tuple[str, float | None]]:
+    """Hypotheses that the data can hold: name and factor (None: a free size)."""
+    present = [k for k, v in zip(METHODS, (m.data_sheet, m.back_emf, m.torque), strict=True) if v is not None]
+    out: list[tuple[str, float | None]] = []
+    if m.back_emf is not None:
+        out.append(("back_emf.offset", None))
+    if m.torque is not None:
+        out += [("torque.offset", None), ("torque.shunt", None)] if m.live_zero_Nm else [("torque.offset", None)]
+    if len(present) > 1:
+        out += [(f"{method}.factor {word}", f) for method in present for word, f in FACTORS.items()]
+    return out
+
+
+def _gains(m: Measured) -> list[tuple[str, float | None]]:
+    """Free scales of the methods; the data sheet's only beside two others."""
+    present = [k for k, v in zip(METHODS, (m.data_sheet, m.back_emf, m.torque), strict=True) if v is not None]
+    return [(f"{method}.gain", None) for method in present] if len(present) > 1 else []
+
+
+def _fit(m: Measured, errors: Sequence[tuple[str, float | None]]) -> ErrorSource:
+    """Generalised least squares of one hypothesis; Gauss-Newton, since a shunt multiplies ke."""
+    from scipy.stats import chi2 as chi2_law
+
+    names = [name for name, _ in errors]
+    fixed = {name.split(" ")[0]: f for name, f in errors if f is not None}
+    free = [name for name, f in errors if f is None]
+    factor = {method: fixed.get(f"{method}.factor", 1.0) for method in METHODS}
+    y, blocks = _data(m)
+    slopes = [v for v in (m.data_sheet, m.back_emf and m.back_emf.slope, m.torque and m.torque.slope) if v]
+    ke = float(np.median(slopes))
+    size = {name: 0.0 if name.endswith("offset") else 1.0 for name in free}
+
+    def model(ke: float, size: dict[str, float]) -> Array:
+        out: list[float] = []
+        if m.data_sheet is not None:
+            out.append(factor["data_sheet"] * ke * size.get("data_sheet.gain", 1.0))
+        if m.back_emf is not None:
+            out += [factor["back_emf"] * ke * size.get("back_emf.gain", 1.0), size.get("back_emf.offset", 0.0)]
+        if m.torque is not None:
+            s = size.get("torque.shunt", 1.0)
+            gain = factor["torque"] * size.get("torque.gain", 1.0)
+            out += [gain * ke * s, (s - 1.0) * m.live_zero_Nm + size.get("torque.offset", 0.0)]
+        return np.array(out)
+
+    cov = _covariance(m, blocks)
+    weight = np.linalg.inv(cov)
+    theta = np.array([ke, *size.values()])
+
+    def at(theta: Array) -> Array:
+        return model(float(theta[0]), dict(zip(free, map(float, theta[1:]), strict=True)))
+
+    jac = np.zeros((len(y), len(theta)))
+    for _ in range(30):
+        f = at(theta)
+        for k in range(len(theta)):
+            h = 1e-6 * max(abs(theta[k]), 1e-3)
+            step = theta.copy()
+            step[k] += h
+            jac[:, k] = (at(step) - f) / h
+        move = np.linalg.lstsq(jac.T @ weight @ jac, jac.T @ weight @ (y - f), rcond=None)[0]
+        theta = theta + move
+        if np.all(np.abs(move) <= 1e-10 * np.maximum(np.abs(theta), 1e-6)):
+            break
+    rest = y - at(theta)
+    misfit = float(rest @ weight @ rest)
+    spread = np.sqrt(np.diag(np.linalg.pinv(jac.T @ weight @ jac)))
+    dof = len(y) - len(theta)
+    p = float(chi2_law.sf(misfit, dof)) if dof > 0 else math.nan
+    found = dict(zip(free, zip(theta[1:], spread[1:], strict=True), strict=True))
+    sizes = [found.get(name, (fixed.get(name.split(" ")[0], math.nan), 0.0)) for name in names]
+    return ErrorSource(tuple(names), float(theta[0]), float(spread[0]), tuple(float(s) for s, _ in sizes),
+                       tuple(float(u) for _, u in sizes), misfit, p)  # fmt: skip
+
+
+def _data(m: Measured) -> tuple[Array, list[Array]]:
+    y: list[float] = []
+    blocks: list[Array] = []
+    if m.data_sheet is not None:
+        u = m.u_data_sheet if math.isfinite(m.u_data_sheet) else 0.1 * m.data_sheet
+        y.append(m.data_sheet)
+        blocks.append(np.array([[u**2]]))
+    for line in (m.back_emf, m.torque):
+        if line is not None:
+            y += [line.slope, line.intercept]
+            blocks.append(line.cov)
+    return np.array(y), blocks
+
+
+def _covariance(m: Measured, blocks: list[Array]) -> Array:
+    """Covariance of the data: trials, gains, resistor."""
+    n = sum(len(b) for b in blocks)
+    cov, i = np.zeros((n, n)), 0
+    order = [x for x in ("data_sheet" if m.data_sheet is not None else "", "back_emf" if m.back_emf else "",
+                         "torque" if m.torque else "") if x]  # fmt: skip
+    for name, block in zip(order, blocks, strict=True):
+        k = len(block)
+        cov[i : i + k, i : i + k] += block
+        if name == "back_emf" and m.back_emf is not None:
+            cov[i, i] += (m.u_gain_back_emf * m.back_emf.slope) ** 2
+        if name == "torque" and m.torque is not None:
+            cov[i, i] += (m.u_gain_torque * m.torque.slope) ** 2
+            along = np.array([m.torque.slope, m.live_zero_Nm])
+            cov[i : i + 2, i : i + 2] += m.u_shunt**2 * np.outer(along, along)
+        i += k
+    return cov
+
+
+def _criterion(e: ErrorSource, errors: int) -> float:
+    free = sum(u > 0.0 for u in e.u_sizes)
+    return e.chi2 + math.log(5.0) * free + 2.0 * errors
+
+
+def judge(m: Measured, alpha: float = ALPHA) -> Verdict:
+    """Judge the agreement of the methods."""
+    none = _fit(m, [])
+    if not none.p < alpha:
+        return Verdict(True, (), none)
+    errors = _errors(m)
+    for pool, how_many in ((errors, 1), (_gains(m), 1), (errors, 2)):
+        tried: list[ErrorSource] = []
+        for some in itertools.combinations(pool, how_many):
+            methods = [name.split(" ")[0] for name, _ in some]
+            if len(set(methods)) < how_many or (how_many == 2 and len(_data(m)[0]) - 1 - how_many < 1):
+                continue
+            e = _fit(m, some)
+            if e.p >= alpha:
+                tried.append(e)
+        if tried:
+            tried.sort(key=lambda e: _criterion(e, how_many))
+            best = _criterion(tried[0], how_many)
+            return Verdict(False, tuple(e for e in tried if _criterion(e, how_many) - best < NEAR), none)
+    return Verdict(False, (), none)

@@ -3,85 +3,272 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
+from bemt.base.folders import inside
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
-from bemt.tools.drive import motor_errors, motor_file, motor_generate, outputs, picture
-from bemt.tools.drive.motor_constant import Line
+from bemt.base.toml import FieldLimits, Table, entry, read_model
+from bemt.data import readers as importers
+from bemt.physics.dataset import Dataset
+from bemt.tools.drive import motor_constant, outputs
+from bemt.tools.drive import motor_constant as mc
+from bemt.tools.drive.motor_constant import Line, Measured
+
+# ``motor.toml``: the recordings of a motor constant and the conventions they were made in.
+
+Volt = Literal["peak", "rms", "peak_to_peak"]
+Ampere = Literal["q_power_invariant", "q_amplitude_invariant", "peak", "rms"]
+Between = Literal["line", "phase"]
+_PCT = FieldLimits("%", 0.0, 50.0)
+
+
+class MotorHead(Table):
+    """[motor]: the machine and its data sheet."""
+
+    name: str = entry("name of the motor", required=True)
+    winding: Literal["wye", "delta"] = entry("connection of the phases", required=True)
+    kv_rpm_V: float | None = entry("speed constant, for the data sheet method", "rev/min/V", 1.0, 50000.0)
+    kv_tolerance_pct: float | None = entry("half-width, stated or assumed; unknown if omitted", _PCT)
+    kv_measure: Volt = entry("voltage measure that K_v refers to", default="peak")
+    kv_between: Between = entry("where that voltage is measured", default="line")
+    pole_pairs: int | None = entry("required with waveforms", low=1, high=60)
+    data: str = entry("description of the trials", default="")
+    source: str | None = entry("source of the trials")
+
+
+class ResultTable(Table):
+    """[result]: convention for K_t."""
+
+    current: Ampere = entry("current that K_t refers to", default="q_power_invariant")
+    between: Between = entry("current in a winding (phase) or a lead (line)", default="phase")
+
+
+class BackEmfTable(Table):
+    """[back_emf]: generator trials."""
+
+    file: str | None = entry("columns trial, rpm, one in V")
+    waveforms: tuple[str, ...] | None = entry("oscilloscope traces, one trial each")
+    measure: Volt | None = entry("voltage measure in the column in V")
+    between: Between = entry("where it is measured", required=True)
+    u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One way; a column needs its measure."""
+        if (self.file is None) == (self.waveforms is None):
+            yield "", "both or neither of file, waveforms", "one of them"
+        elif self.file is not None and self.measure is None:
+            yield "measure", "nothing", f"one of {', '.join(get_args(Volt))}", "peak_to_peak is twice the peak"
+        elif self.waveforms is not None and len(self.waveforms) < 3:
+            yield "waveforms", f"{len(self.waveforms)} traces", "3 or more"
+
+
+class TorqueTable(Table):
+    """[torque]: trials with a torque sensor on a current loop."""
+
+    file: str = entry("columns trial, one in A, one in V", required=True)
+    shunt_ohm: float = entry(
+        "shunt that converts the loop current into the column in V", "ohm", 0.01, 1e5, required=True
+    )
+    u_shunt_pct: float = entry("its standard uncertainty", _PCT, default=0.0)
+    low_mA: float = entry("current at torque_low_Nm", "mA", 0.0, 100.0, default=4.0)
+    high_mA: float = entry("current at torque_high_Nm", "mA", 0.1, 100.0, default=20.0)
+    torque_low_Nm: float = entry("lower limit of the sensor", "N m", -1e4, 1e4, default=0.0)
+    torque_high_Nm: float = entry("upper limit of the sensor", "N m", 1e-4, 1e4, default=2.0)
+    current: Ampere = entry("current measure in the column in A", required=True)
+    between: Between = entry("where it is measured", required=True)
+    u_gain_pct: float | None = entry("standard uncertainty common to all trials", _PCT)
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """Ends of the loop in order."""
+        if self.high_mA <= self.low_mA:
+            yield "high_mA", f"{self.high_mA:g}", "more than low_mA"
+
+
+class StatedTable(Table):
+    """[[stated]]: a published value, plotted for comparison."""
+
+    name: str = entry("whose", required=True)
+    Kt_Nm_A: float = entry("torque constant", "N m/A", 1e-7, 1e3, required=True)
+
+
+class MotorToml(Table):
+    """motor.toml: the recordings of a motor constant and the conventions they were made in."""
+
+    schema_: Literal["bemt.motor/1"] = entry("version of the format", required=True, alias="schema")
+    motor: MotorHead
+    result: ResultTable = ResultTable()
+    back_emf: BackEmfTable | None = None
+    torque: TorqueTable | None = None
+    stated: tuple[StatedTable, ...] = ()
+
+    def rules(self) -> Iterable[tuple[str, ...]]:
+        """One method or more; waveforms need the pole pairs."""
+        if self.back_emf is None and self.torque is None and self.motor.kv_rpm_V is None:
+            yield "", "no method", "motor.kv_rpm_V, [back_emf] or [torque]"
+        if self.back_emf is not None and self.back_emf.waveforms and self.motor.pole_pairs is None:
+            yield "motor.pole_pairs", "nothing", "a whole number, for waveforms"
+
+
+@dataclass(frozen=True, eq=False)
+class MotorTrials:
+    """All that was recorded of one motor."""
+
+    name: str
+    data: str  # what the trials are
+    measured: Measured  # results of the methods as ke
+    to_kt: float  # K_t in the convention asked for, over ke [N m/A per V s/rad]
+    convention: str  # of K_t, in words
+    stated: Mapping[str, float]  # values of others [N m/A]
+    notes: tuple[str, ...] = ()  # what a reader has to know
+    files: tuple[Path, ...] = ()  # all that was read, motor.toml first
+
+
+def read(path: str | Path) -> MotorTrials:
+    """Read a motor.toml and its recordings."""
+    file = Path(path) / "motor.toml" if Path(path).is_dir() else Path(path)
+    made = read_model(MotorToml, file)
+    motor, result, emf_table, torque_table = made.motor, made.result, made.back_emf, made.torque
+    winding, notes = motor.winding, []
+    sheet, u_sheet = None, math.nan
+    if motor.kv_rpm_V is not None:
+        sheet = mc.from_kv(motor.kv_rpm_V, winding, motor.kv_measure, motor.kv_between)
+        if motor.kv_tolerance_pct is not None:
+            u_sheet = sheet * motor.kv_tolerance_pct / 100.0 / math.sqrt(3.0)
+        else:
+            notes.append("no tolerance of K_v is stated: the data sheet only bears on convention factors")
+    names = {"back_emf.file": emf_table and emf_table.file, "torque.file": torque_table and torque_table.file}
+    names |= {f"back_emf.waveforms[{i}]": n for i, n in enumerate((emf_table and emf_table.waveforms) or ())}
+    far = {where: name for where, name in names.items() if name and not inside(file.parent, name)}
+    if far:
+        expected = "the name of a file in the folder of the motor.toml"
+        raise InputError([Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items()])
+    faults: list[Fault] = []
+    emf = torque = loop = None
+    try:
+        emf = None if emf_table is None else _back_emf(file, emf_table, winding, motor.pole_pairs)
+    except InputError as error:
+        faults += error.faults
+    try:
+        if torque_table is not None:
+            torque, loop = _torque(file, torque_table, winding)
+    except InputError as error:
+        faults += error.faults
+    if faults:
+        raise InputError(faults)
+    gains = {name: table.u_gain_pct for name, table in (("back_emf", emf_table), ("torque", torque_table)) if table}
+    notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
+    measured = Measured(
+        sheet, u_sheet, emf, torque, (gains.get("back_emf") or 0.0) / 100.0, (gains.get("torque") or 0.0) / 100.0,
+        torque_table.u_shunt_pct / 100.0 if torque_table else 0.0, loop.live_zero_Nm if loop else 0.0,
+    )  # fmt: skip
+    where = "a winding" if result.between == "phase" else "a line"
+    convention = f"torque per {result.current.replace('_', ' ')} current in {where}, {winding}"
+    stated = {item.name: item.Kt_Nm_A for item in made.stated}
+    to_kt = mc.ke_to_kt(1.0, result.current, result.between, winding)
+    files = (file, *(file.parent / name for name in names.values() if name))
+    return MotorTrials(motor.name, motor.data, measured, to_kt, convention, stated, tuple(notes), files)
+
+
+def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
+    """Column ``trial`` and one column per unit."""
+    got = importers.read(path)
+    name = path.as_posix()
+    if not isinstance(got, Dataset):
+        raise InputError(Fault(name, "", "no table of trials", "columns trial, " + ", ".join(units)))
+    faults, found = [], []
+    for unit in units:
+        of_unit = [k for k in got.values if got.unit(k) == unit]
+        if len(of_unit) != 1:
+            shown = ", ".join(of_unit) or "none"
+            faults.append(Fault(name, f"column in {unit}", shown, "one column", "Name the unit in the heading"))
+        else:
+            found.append(got[of_unit[0]])
+    if "trial" not in got:
+        faults.append(Fault(name, "trial", "no column trial", "the number of the trial of each row"))
+    if faults:
+        raise InputError(faults)
+    columns = (got["trial"], *found)
+    bad = ~np.all(np.isfinite(columns), axis=0)
+    if np.any(bad):
+        rows = ", ".join(str(got.lines[i] if got.lines else i + 1) for i in np.flatnonzero(bad)[:5])
+        raise InputError(Fault(name, rows, "cells without a number", "a number in every cell"))
+    return columns
+
+
+def _back_emf(file: Path, table: BackEmfTable, winding: str, pole_pairs: int | None) -> mc.Line:
+    if table.file is not None and table.measure is not None:
+        trial, rpm, volts = _columns(file.parent / table.file, ("rpm", "V"))
+        line = mc.line(rpm * 2.0 * math.pi / 60.0, volts, trial)
+        return line.scaled(1.0 / mc.voltage_factor(table.measure, table.between, winding))
+    names = table.waveforms or ()
+    waves = [mc.fit_waveform(*read_waveform(file.parent / name)) for name in names]
+    omega = np.array([2.0 * math.pi * w.frequency_Hz / (pole_pairs or 1) for w in waves])
+    peak = np.array([w.amplitude_V for w in waves]) / mc.voltage_factor("peak", table.between, winding)
+    if len(np.unique(np.round(omega, 1))) >= 3:
+        return mc.line(omega, peak, np.arange(len(waves)))
+    each = peak / omega  # all at one speed: an offset of the amplitude cannot be told
+    u2 = float(np.var(each, ddof=1)) / len(each) * (len(each) - 1) / max(len(each) - 3, 0.5)
+    cov = np.diag([u2, (10.0 * float(peak.max())) ** 2])
+    return mc.Line(float(each.mean()), 0.0, cov, each, np.full(len(each), math.nan), names)
+
+
+def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.TorqueLoop]:
+    loop = mc.TorqueLoop(table.shunt_ohm, table.low_mA, table.high_mA, table.torque_low_Nm, table.torque_high_Nm)
+    trial, amps, volts = _columns(file.parent / table.file, ("A", "V"))
+    mA = volts / loop.shunt_ohm * 1e3
+    beyond = (mA < loop.low_mA - 1.0) | (mA > loop.high_mA + 2.0)
+    if np.mean(beyond) > 0.5:
+        got = f"a loop current of {np.median(mA):.3g} mA"
+        hint = "Is shunt_ohm right, and the column in volts?"
+        raise InputError(
+            Fault(file.as_posix(), "torque.shunt_ohm", got, f"{loop.low_mA:g} to {loop.high_mA:g} mA", hint)
+        )
+    line = mc.line(amps, loop.torque(volts), trial)
+    return line.scaled(mc.current_factor(table.current, table.between, winding) / 1.5), loop
+
+
+def read_waveform(path: Path) -> tuple[Array, Array]:
+    """Read an oscilloscope's CSV."""
+    source = importers.load_text(path)
+    split = [[c.strip().strip('"') for c in re.split(r"[,;\t]", line)] for line in source.lines if line.strip()]
+    start = next((i for i, c in enumerate(split) if _pair(c, 0)), None)
+    at = 0
+    if start is None or any(_pair(c, 3) for c in split[:3]):
+        start, at = next((i for i, c in enumerate(split) if _pair(c, 3)), None), 3
+    if start is None:
+        raise InputError(Fault(source.name, "", "no two columns of numbers", "time and voltage"))
+    words = " ".join(" ".join(c) for c in (split[:20] if at == 3 else split[:start]))
+    scale = [_scale(words, r"(?:s|sec|seconds?)", 1.0), _scale(words, r"(?:v|volts?)", 1.0)]
+    if None in scale:
+        hint = "Keep the heading lines of the oscilloscope, or write Time (s),CH1 (V)"
+        raise InputError(Fault(source.name, "", "no units of time and voltage", "seconds and volts in a heading", hint))
+    rows = [c for c in split[start:] if _pair(c, at)]
+    data = np.array([[float(c[at]), float(c[at + 1])] for c in rows])
+    return data[:, 0] * float(scale[0] or 1.0), data[:, 1] * float(scale[1] or 1.0)
+
+
+def _pair(cells: list[str], at: int) -> bool:
+    return len(cells) > at + 1 and all(importers.number(c) is not None for c in cells[at : at + 2])
+
+
+def _scale(words: str, unit: str, one: float) -> float | None:
+    """Factor to SI of a unit among words, with a prefix; None when it is not there."""
+    for prefix, factor in (("m", 1e-3), ("[uµμ]", 1e-6), ("n", 1e-9), ("", one)):
+        if re.search(rf"(?<![A-Za-z]){prefix}{unit}(?![A-Za-z])", words, re.IGNORECASE):
+            return factor
+    return None
+
 
 RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
-
-
-def check_options(
-    file: str | None, generate: str | None, seed: int | None, plant: Sequence[str], out: str | None
-) -> None:
-    """Refuse options that would be ignored, all at once."""
-    faults = []
-    if not generate:
-        given = [("--plant", " ".join(plant)), ("--seed", seed)]
-        told = [(name, value) for name, value in given if value not in (None, "")]
-        faults = [Fault("", name, str(value), "none without --generate DIR") for name, value in told]
-        if not file:
-            hint = "Or --generate DIR for an example"
-            faults.append(Fault("", "FILE", "nothing", "motor.toml or its folder", hint))
-    elif out and not file:
-        hint = "Name the generated folder as FILE too, to judge it at once"
-        faults.append(Fault("", "--out", out, "none with --generate DIR alone, which only writes to DIR", hint))
-    if faults:
-        raise InputError(faults)
-
-
-def generate(
-    target: str, seed: int | None, plant: Sequence[str], file: str | None = None, out: str | None = None
-) -> dict[str, Any]:
-    """Write generated trials; only generated files are overwritten."""
-    folder, seed = Path(target), seed or 0
-    faults: list[Fault] = []
-    planted: dict[str, float] = {}
-    texts: dict[str, str] = {}
-    try:
-        planted = motor_generate.plants(list(plant))
-    except InputError as error:
-        faults += error.faults
-    try:
-        texts = motor_generate.generate(seed, planted)
-    except InputError as error:
-        faults += error.faults
-    inputs: tuple[Path, ...] = ()
-    if file and Path(file).resolve() not in (folder.resolve(), (folder / "motor.toml").resolve()):
-        inputs = motor_file.read(file).files  # before writing: its faults leave nothing behind
-    faults += outputs.faults("--generate", folder, texts, inputs)
-    if out:
-        faults += outputs.faults("--out", Path(out), RESULTS, [*inputs, *(folder / name for name in texts)])
-    hint = "Name another folder: measured data are not replaced by generated data"
-    for name in texts:
-        if (folder / name).exists() and not _generated(folder / name):
-            faults.append(Fault((folder / name).as_posix(), "", "a file that was not generated", "none, or one", hint))
-    if faults:
-        raise InputError(faults)
-    for name, content in texts.items():
-        write_atomic(folder / name, content)
-    return {
-        "schema": "bemt.motor.generated/1",
-        "folder": folder.as_posix(),
-        "files": list(texts),
-        "seed": seed,
-        "planted": planted,
-    }
-
-
-def _generated(path: Path) -> bool:
-    """Whether a file says in its first line that it was generated."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        return stream.readline(200).startswith(motor_generate.LABEL.encode())
 
 
 def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any]:
@@ -99,7 +286,7 @@ def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any
     }
 
 
-def document(trials: motor_file.MotorTrials, verdict: motor_errors.Verdict) -> dict[str, Any]:
+def document(trials: MotorTrials, verdict: motor_constant.Verdict) -> dict[str, Any]:
     """All results as a JSON document."""
     m, to = trials.measured, trials.to_kt
     methods: list[dict[str, Any]] = []
@@ -162,7 +349,7 @@ def verdict_text(made: dict[str, Any]) -> list[str]:
     return lines
 
 
-def text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
+def text(trials: MotorTrials, made: dict[str, Any]) -> str:
     """Lay the results out for a terminal."""
     rows = []
     for m in made["methods"]:
@@ -181,17 +368,12 @@ def text(trials: motor_file.MotorTrials, made: dict[str, Any]) -> str:
     return "\n".join(lines + [f"! {note}" for note in made["notes"]]) + "\n"
 
 
-def generated_text(made: dict[str, Any]) -> str:
-    """Say what was generated and how to go on."""
-    return f"generated trials (seed {made['seed']}); now: bemt lab motor {made['folder']}\n"
-
-
-def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, dict[str, Any]]:
+def judge(file: str, out: str | None = None) -> tuple[MotorTrials, dict[str, Any]]:
     """Read trials and judge them: what was read, and ``bemt.motor.result/1``; written where told, over no input."""
-    trials = motor_file.read(file)
+    trials = read(file)
     if out:
         outputs.check("--out", Path(out), RESULTS, trials.files)
-    made = document(trials, motor_errors.judge(trials.measured))
+    made = document(trials, motor_constant.judge(trials.measured))
     if out:
         folder = Path(out)
         write_atomic(folder / "motor.json", json_text(made))
@@ -203,6 +385,6 @@ def judge(file: str, out: str | None = None) -> tuple[motor_file.MotorTrials, di
         write_atomic(folder / "trials.csv", csv_text(["method", "trial", "Kt_Nm_A"], rows))
         title = f"{trials.name}: {trials.data}" if trials.data else trials.name
         values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}
-        png = picture.box_plot(values, trials.stated, "torque constant [N m/A]", title)
+        png = outputs.box_plot(values, trials.stated, "torque constant [N m/A]", title)
         write_atomic(folder / "motor.png", png)
     return trials, made

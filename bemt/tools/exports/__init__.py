@@ -1,5 +1,5 @@
-"""Exports of a case, one file per target, found by scanning this folder: the file ``rotor_disk.py`` is ``rotor-disk``
-and ``_3mf.py`` is ``3mf``. Other tools offer theirs (``EXPORTS`` of :mod:`bemt.base.plugins`).
+"""Exports of a case, found by scanning this folder: the file ``rotor_disk.py`` is the target ``rotor-disk``. Targets
+that share a file, and those of other tools, are offered (``EXPORTS`` of :mod:`bemt.base.plugins`).
 
 An export is a class of :class:`bemt.tools.exports.base.Export` whose ``id`` is the name of its file with ``-`` for
 ``_``.
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["exports", "target_ids"]
 
 _SHARED = {
-    "actions", "answer", "base", "blades", "folder", "hub", "manifest", "motor", "offers", "parts", "performance",
-    "printing",
+    "actions", "autopilots", "base", "blades", "design_codes", "flow_solvers", "folder", "offers", "parts",
+    "performance", "printing", "simulators", "solids", "tables",
 }  # fmt: skip
-"""Files of this folder that are no targets."""
+"""Files of this folder that are no target of their own; those with several have them in ``offers``."""
 
 
 def _own() -> dict[str, str]:

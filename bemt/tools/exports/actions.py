@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from bemt.rotors.propeller import Propeller
-    from bemt.tools.exports.answer import Exported
+    from bemt.tools.exports.folder import Exported
 
     Path = str | os.PathLike[str]
 
@@ -95,7 +95,7 @@ def export(
 
     Returns
     -------
-    bemt.tools.exports.answer.Exported
+    bemt.tools.exports.folder.Exported
         ``.files``, ``.manifests``, ``.text``; ``exit_code`` 2 where a target or a case was refused, and
         ``complaints`` say why.
 
@@ -120,8 +120,7 @@ def export(
     from bemt.base.errors import Fault, InputError, system_fault
     from bemt.base.given import number, path_text
     from bemt.rotors.propeller import rotor_of
-    from bemt.tools.exports.answer import Exported
-    from bemt.tools.exports.folder import export_cases
+    from bemt.tools.exports.folder import Exported, export_cases
     from bemt.tools.exports.printing import Print, asked
 
     wanted, faults = [format] if isinstance(format, str) else list(format), []

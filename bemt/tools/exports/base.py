@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import plain, write_atomic
 from bemt.base.toml import Table
 from bemt.rotors.case.schema import PointTable
-from bemt.tools.exports.hub import CHECK_ANGLES, HubTable, hub_of
+from bemt.tools.exports.parts import CHECK_ANGLES, HubTable, hub_of
 from bemt.tools.exports.performance import (
     Loading,
     Performance,
@@ -246,7 +246,7 @@ class Export(ABC):
         InputError
             If the request cannot be met; nothing is written then.
         """
-        from bemt.tools.exports.manifest import entry
+        from bemt.tools.exports.parts import entry
         from geometry.export import MANIFEST, SCHEMA
 
         if found := self.faults(job):
@@ -510,7 +510,7 @@ class SolidExport(Export):
 
     def put(self, job: Job, out: Path) -> dict[str, Any]:
         """The files that `geometry.export` makes."""
-        from bemt.tools.exports.manifest import joined
+        from bemt.tools.exports.parts import joined
         from geometry.common import GeometryError
         from geometry.export import export
 
@@ -568,14 +568,13 @@ class BladeExport(Export):
         Case
             The case.
         """
-        import importlib
-
+        from bemt.data.readers import importers
         from bemt.data.readers.blade import case_text
         from bemt.rotors.case import load_case
 
         name, data = next(iter(files.items()))
         write_atomic(folder / name, data)
-        blade = importlib.import_module(f"bemt.data.readers.{self.id.replace('-', '_')}").read(folder / name)
+        blade = importers()[self.id].read(folder / name)
         for path, text in case_text(blade, "read_back", name).items():
             write_atomic(folder / path, text)
         return load_case(folder / "case.toml")

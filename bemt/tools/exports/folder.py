@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.base.face import as_html
 from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import check_field, shown
@@ -15,7 +17,7 @@ from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job
-from bemt.tools.exports.manifest import joined
+from bemt.tools.exports.parts import joined
 from bemt.tools.exports.printing import Print, faults_of, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA
@@ -338,3 +340,62 @@ def text(manifest: dict[str, Any], out: Path) -> str:
         if word in exports():
             lines += exports()[word].text(part)
     return "\n".join(lines + targets)
+
+
+# Answer of ``export``: what was written, where, and what was refused.
+
+ANSWER = "bemt.export/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """Cases that were written for other programs.
+
+    Parameters
+    ----------
+    manifests : tuple of mapping
+        What ``manifest.json`` says of each case, with the formats that were kept and that are stale.
+    folders : tuple of Path
+        Folder of each.
+    refused : tuple of InputError
+        Why cases or targets were refused.
+    """
+
+    manifests: tuple[Mapping[str, Any], ...]
+    folders: tuple[Path, ...]
+    refused: tuple[InputError, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files that the manifests list."""
+        return tuple(
+            home / name for one, home in zip(self.manifests, self.folders, strict=True) for name in listed(one)
+        )
+
+    @property
+    def text(self) -> str:
+        """What was written, for a terminal."""
+        return "\n".join(text(dict(one), home) for one, home in zip(self.manifests, self.folders, strict=True))
+
+    @property
+    def exit_code(self) -> int:
+        """2 where something was refused."""
+        return EXIT_INPUT if self.refused else EXIT_OK
+
+    @property
+    def complaints(self) -> tuple[str, ...]:
+        """Why, a line each."""
+        return tuple(str(error) for error in self.refused)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ``bemt.export/1``."""
+        return {"schema": ANSWER, "cases": [dict(one) for one in self.manifests]}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<export of {', '.join(str(one['name']) for one in self.manifests)}: {len(self.files)} files>"
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self)[1:-1], self.text)

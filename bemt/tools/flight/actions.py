@@ -92,7 +92,7 @@ class FlightsAnswer:
 
 def layouts() -> dict[str, str]:
     """Layouts by name: angle of each motor from ahead to the left [deg], with + for one that turns to the left."""
-    from bemt.tools.flight.layout import LAYOUTS
+    from bemt.tools.flight.log import LAYOUTS
 
     return dict(LAYOUTS)
 
@@ -252,7 +252,7 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
 
     from bemt.judge.diagnose.rotor_calibration import document, text, write
     from bemt.rotors.case.load import with_changes
-    from bemt.tools.flight.rotor_case import learn_from_flights
+    from bemt.tools.flight.identify import learn_from_flights
 
     files = [a.log.file for a in answers]
     from bemt.rotors.propeller import rotor_of

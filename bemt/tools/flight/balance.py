@@ -34,8 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.layout import effect_matrix
-from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.log import FlightLog, effect_matrix
 
 __all__ = [
     "BLADE", "DAY", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight",

@@ -29,7 +29,7 @@ IN_SET, LARGEST = 0.95, 6
 
 
 @dataclass(frozen=True)
-class Decision:
+class FlightDecision:
     """What is said, and why."""
 
     verdict: str  # none, named, class, unknown or insufficient
@@ -47,7 +47,7 @@ class Rule:
     """One row of the list."""
 
     name: str  # What it asks
-    ask: Callable[[Any], Decision | None]  # Its answer; None where it does not apply. Its docstring is its source
+    ask: Callable[[Any], FlightDecision | None]  # Its answer; None where it does not apply. Its docstring is its source
     threshold: str = ""  # Names of the numbers it asks with
     revises: bool = False  # Whether it sees the answer of the rows before it, and only then is asked
 
@@ -57,12 +57,12 @@ class Rule:
         return str(self.ask.__doc__)
 
 
-def decide(query: Any, rules: Sequence[Rule]) -> Decision:
+def decide(query: Any, rules: Sequence[Rule]) -> FlightDecision:
     """Go through a list, of this judge or of one that asks of other readings; `query` has `said` and `steps`."""
     for rule in rules:
         if rule.revises == (query.said is not None) and (answer := rule.ask(query)) is not None:
             query.steps.append(replace(answer, rule=rule.name))
-    said: Decision | None = query.said
+    said: FlightDecision | None = query.said
     assert said is not None, "the last rule that does not revise always holds"
     return said
 

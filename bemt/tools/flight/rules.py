@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from bemt.base.arrays import Array
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
-from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, blade
-from bemt.tools.flight.change import FlightChange
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, axes_of, blade, directions
 from bemt.tools.flight.decision import (
     BESIDE_IT,
     EARNED,
@@ -24,10 +26,113 @@ from bemt.tools.flight.decision import (
     RARE,
     SMALL,
     SURE,
-    Decision,
+    FlightDecision,
     Rule,
     credible_sets,
 )
+from bemt.tools.flight.log import FlightLog
+
+# A change within one flight: a rotor that suddenly, or more and more, needs another drive than the others.
+#
+# The readings of :mod:`bemt.tools.flight.judge` over time, in blocks, are regressed on a step at each possible time, or
+# on a slope, beside a level and the mean velocity of the block where it was logged (a rotor meets other air in flight).
+# What the regression leaves is correlated in time, so its variance is that of means over batches (e.g. Law, Simulation
+# Modeling and Analysis, ch. 9). The bar is Student's, divided by causes and by independent times (Bonferroni).
+
+_BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
+_ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))  # chi squares that differ by less leave a name open
+_SMALL = 0.05  # a change below this is not worth a word [1]
+
+
+@dataclass(frozen=True)
+class FlightChange:
+    """A change within a flight."""
+
+    kind: str  # "step" or "growth"
+    at_s: float  # Time of a step from the first sample; NaN for a growth [s]
+    causes: tuple[str, ...]  # What explains its direction, best first
+    # Change of that rotor's drive, over the whole flight for a growth, and the half width of its 95 % interval [1]
+    size: float
+    half: float
+
+
+def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
+    """The clearest change within a flight; None where there is none, or under 20 blocks in the air."""
+    from scipy import stats
+
+    drive = log.drive
+    if drive is None or log.rotors < 3:
+        return None
+    found = _blocks(log, drive)
+    if found is None:
+        return None
+    t, mean, other = found
+    axes = axes_of(layout, log.rotors)
+    y = np.log(mean) @ axes.T
+    N, k = y.shape
+    ways = directions(log.rotors, layout)
+    D = np.stack([axes @ w for w in ways.values()])
+    plain = np.column_stack([np.ones(N), other])
+    edge = max(int(round(_EDGE_S / (t[1] - t[0]))), 2)
+    ramp = (t - t[0]) / (t[-1] - t[0])
+    tries = [("step", float(t[c]), (np.arange(N) >= c).astype(float)) for c in range(edge, N - edge)]
+    fits = [(*_regressed(y, np.column_stack([column, plain])), kind, at)
+            for kind, at, column in [*tries, ("growth", float("nan"), ramp)]]  # fmt: skip
+    change, s2, _, kind, at = min(fits, key=lambda f: f[2])
+    d = D / np.sqrt(s2)
+    length = np.linalg.norm(d, axis=1)
+    z = change / np.sqrt(s2)
+    T = d / length[:, None] @ z
+    free = k * (_BATCHES - 1 - plain.shape[1])
+    bar = float(stats.t.ppf(1.0 - GATE / (len(ways) * (_BATCHES + 1)), free))
+    i = int(np.argmax(T))
+    misfit = float(z @ z) - T**2
+    size, half = float(T[i] / length[i]), float(stats.t.ppf(0.975, free) / length[i])
+    # What no listed cause explains to three quarters is another manoeuvre.
+    if T[i] < bar or size < _SMALL or misfit[i] > 0.25 * float(z @ z):
+        return None
+    order = np.argsort(misfit)
+    alike = tuple(list(ways)[j] for j in order if T[j] > 0.0 and misfit[j] - misfit[i] < _ALIKE)
+    return FlightChange(kind, at, alike, size, half)
+
+
+def _regressed(y: Array, X: Array) -> tuple[Array, float, float]:
+    """Change of the readings with the first column, (k,), its variance by batches, and the squares that are left."""
+    gram = np.linalg.pinv(X.T @ X)
+    b = gram @ X.T @ y
+    rest = y - X @ b
+    N, k = y.shape
+    batches = np.array([p.mean(axis=0) for p in np.array_split(rest, _BATCHES)])
+    # One variance for all readings; independent samples are the least that it can be.
+    long = N / _BATCHES * float(np.sum(batches**2)) / max(_BATCHES - X.shape[1], 3)
+    short = float(np.sum(rest**2)) / max(N - X.shape[1], 1)
+    return b[0], max(long / k, short / k, 1e-6) * float(gram[0, 0]), float(np.sum(rest**2))
+
+
+def _blocks(log: FlightLog, drive: Array) -> tuple[Array, Array, Array] | None:
+    """Times, mean drives and velocities of the blocks in the air."""
+    on = log.flying
+    if on.sum() < 100:
+        return None
+    t = log.t[on]
+    width = max(_BLOCK_S, float(t[-1] - t[0]) / _LONGEST)
+    number = np.floor((t - t[0]) / width).astype(int)
+    count = np.bincount(number)
+    full = count >= max(0.5 * np.median(count[count > 0]), 2)
+
+    def mean(v: Array) -> Array:
+        return np.stack([np.bincount(number, weights=c)[full] / count[full] for c in v[on].T], axis=1)
+
+    values = mean(drive)
+    if full.sum() < 20 or not np.all(values > 0.0):
+        return None
+    other = np.zeros((int(full.sum()), 0))
+    if log.velocity is not None:
+        v = mean(log.velocity)
+        other = v - v.mean(axis=0)
+        other = other[:, np.ptp(other, axis=0) > 0.2]
+    return t[0] + width * (np.flatnonzero(full) + 0.5), values, other
+
 
 __all__ = ["BUILD", "DAYS", "IN_FLIGHT", "RULES", "WIDE", "BesideBalance", "FlightEvidence", "FlightQuery"]
 
@@ -78,10 +183,10 @@ class FlightQuery:
     alarm: float
     given: int  # Healthy flights to compare with
     beside: BesideBalance = field(default_factory=BesideBalance)  # What else the log shows
-    steps: list[Decision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
+    steps: list[FlightDecision] = field(default_factory=list)  # Answers of the rules so far, the last one in force
 
     @property
-    def said(self) -> Decision | None:
+    def said(self) -> FlightDecision | None:
         """Answer so far."""
         return self.steps[-1] if self.steps else None
 
@@ -134,13 +239,13 @@ class FlightQuery:
     def says(
         self, verdict: str, why: str, of: Sequence[Explanation] = (), more: tuple[str, ...] = (),
         sets: tuple[tuple[str, ...], ...] = (),
-    ) -> Decision:  # fmt: skip
+    ) -> FlightDecision:  # fmt: skip
         """Decision that gives the effects of some explanations, and more."""
         lead = of[0] if of else self.leading if verdict != "none" else NONE
         names = tuple(dict.fromkeys(i for e in of for i in e)) + more
         chance = self.share(of) if of else self.P[NONE] if verdict == "none" else self.P[lead]
         rest = self.log_bayes[UNKNOWN] - self.log_bayes[lead]
-        return Decision(verdict, names, lead, chance, rest, why, sets=sets)
+        return FlightDecision(verdict, names, lead, chance, rest, why, sets=sets)
 
     def share(self, of: Sequence[Explanation]) -> float:
         """Probability of some explanations among those of their kind, once something moved."""
@@ -149,14 +254,14 @@ class FlightQuery:
         return sum(self.P[e] for e in of) / sum(self.P[e] for e in kind)
 
 
-def _within(a: FlightQuery) -> Decision | None:
+def _within(a: FlightQuery) -> FlightDecision | None:
     """DIAGNOSIS 2.3: the p-value of the gate."""
     if a.p_value <= a.alarm or a.few:
         return None
     return a.says("none", "no more than healthy flights differ")
 
 
-def _few_and_within(a: FlightQuery) -> Decision | None:
+def _few_and_within(a: FlightQuery) -> FlightDecision | None:
     """Declared: without healthy flights of one vehicle nobody knows its trim."""
     if a.p_value <= a.alarm:
         return None
@@ -164,7 +269,7 @@ def _few_and_within(a: FlightQuery) -> Decision | None:
     return a.says("insufficient", why)
 
 
-def _few(a: FlightQuery) -> Decision | None:
+def _few(a: FlightQuery) -> FlightDecision | None:
     """The same."""
     if not a.few:
         return None
@@ -173,7 +278,7 @@ def _few(a: FlightQuery) -> Decision | None:
     return a.says("class", why, () if left else a.as_good, (WIDE if a.given else BUILD,))
 
 
-def _day(a: FlightQuery) -> Decision | None:
+def _day(a: FlightQuery) -> FlightDecision | None:
     """Declared: what days do to a trim is no fault, and only a flight of the same day tells."""
     day = Explanation.of(DAY)
     if a.leading != day:
@@ -182,7 +287,7 @@ def _day(a: FlightQuery) -> Decision | None:
     return a.says("insufficient", why)
 
 
-def _rest(a: FlightQuery) -> Decision | None:
+def _rest(a: FlightQuery) -> FlightDecision | None:
     """As of a smooth rest in the diagnosis: a small share of what is explained is a detail of it."""
     rest = a.log_bayes[UNKNOWN] - a.log_bayes[a.leading]
     if rest <= max(LEFT_OVER, SMALL * a.log_bayes[a.leading]):
@@ -190,7 +295,7 @@ def _rest(a: FlightQuery) -> Decision | None:
     return a.says("unknown", "the balance moved, but not as one or two rotors or one weight move it")
 
 
-def _another(a: FlightQuery) -> Decision | None:
+def _another(a: FlightQuery) -> FlightDecision | None:
     """As in the diagnosis: one is sure, another may be there."""
     lead = a.leading
     if len(lead) != 1 or a.share((lead,)) < NAMED or a.same or not a.partners:
@@ -200,7 +305,7 @@ def _another(a: FlightQuery) -> Decision | None:
     return a.says("class", why, (lead,), a.partners, sets=((name,), a.partners))
 
 
-def _one(a: FlightQuery) -> Decision | None:
+def _one(a: FlightQuery) -> FlightDecision | None:
     """As of a name in the diagnosis."""
     lead = a.leading
     if len(lead) != 1 or a.share((lead,)) < NAMED or a.same:
@@ -208,7 +313,7 @@ def _one(a: FlightQuery) -> Decision | None:
     return a.says("named", "one cause explains the balance, the others do not", (lead,), sets=(tuple(lead),))
 
 
-def _both(a: FlightQuery) -> Decision | None:
+def _both(a: FlightQuery) -> FlightDecision | None:
     """The same, of two: they are tried as one explanation, so their probability is that of both."""
     lead = a.leading
     if not lead.pair or a.share((lead,)) < NAMED:
@@ -217,7 +322,7 @@ def _both(a: FlightQuery) -> Decision | None:
     return a.says("named", why, (lead,), sets=tuple((i,) for i in lead))
 
 
-def _two(a: FlightQuery) -> Decision | None:
+def _two(a: FlightQuery) -> FlightDecision | None:
     """As of two at work in the diagnosis: a set for each."""
     lead = a.leading
     if not lead.pair:
@@ -230,7 +335,7 @@ def _two(a: FlightQuery) -> Decision | None:
     return a.says("class", "two damaged rotors, each with look-alikes", of, sets=sets)
 
 
-def _alike(a: FlightQuery) -> Decision | None:
+def _alike(a: FlightQuery) -> FlightDecision | None:
     """As of look-alikes in the diagnosis."""
     members = a.as_good[:LARGEST]
     if a.leading.pair or a.share(members) < SURE:
@@ -243,12 +348,12 @@ def _alike(a: FlightQuery) -> Decision | None:
     return a.says("class", why, members, more)
 
 
-def _many(a: FlightQuery) -> Decision | None:
+def _many(a: FlightQuery) -> FlightDecision | None:
     """The rest."""
     return a.says("insufficient", "several different explanations are possible")
 
 
-def _speed(a: FlightQuery) -> Decision | None:
+def _speed(a: FlightQuery) -> FlightDecision | None:
     """By definition: of the causes that look alike in the balance a damaged blade alone unloads its motor."""
     said = a.steps[-1]
     turned = [blade(k) for k in a.beside.faster if blade(k) in said.effects]
@@ -259,7 +364,7 @@ def _speed(a: FlightQuery) -> Decision | None:
                    sets=((turned[0],),))  # fmt: skip
 
 
-def _slow(a: FlightQuery) -> Decision | None:
+def _slow(a: FlightQuery) -> FlightDecision | None:
     """By definition: a blade that lost area does not load its motor more."""
     said = a.steps[-1]
     weak = [k for k in a.beside.slower if blade(k) in said.effects]
@@ -271,7 +376,7 @@ def _slow(a: FlightQuery) -> Decision | None:
     return replace(said, effects=names, why=f"{said.why}; motor {weak[0]} turns slower at its drive")
 
 
-def _changed(a: FlightQuery) -> Decision | None:
+def _changed(a: FlightQuery) -> FlightDecision | None:
     """By definition: the flight before the change is the healthy one."""
     said, change = a.steps[-1], a.beside.change
     if said.verdict not in ("none", "insufficient") or change is None:
@@ -283,7 +388,7 @@ def _changed(a: FlightQuery) -> Decision | None:
                    leading=Explanation.of(names[0]), probability=1.0 - GATE)  # fmt: skip
 
 
-def _shake(a: FlightQuery) -> Decision | None:
+def _shake(a: FlightQuery) -> FlightDecision | None:
     """Declared: what shakes and does not move the balance is an imbalance or a small damage."""
     said = a.steps[-1]
     if said.verdict != "none" or len(a.beside.shaken) != 1:

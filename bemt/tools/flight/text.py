@@ -8,7 +8,7 @@ import numpy as np
 
 from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
-from bemt.tools.flight.decision import BESIDE_IT, Decision
+from bemt.tools.flight.decision import BESIDE_IT, FlightDecision
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
@@ -292,7 +292,7 @@ def headline(j: FlightVerdict) -> str:
     return words[said.verdict]
 
 
-def _open(said: Decision) -> str:
+def _open(said: FlightDecision) -> str:
     """Members of a class; of two at work, each with its look-alikes."""
     if len(said.sets) > 1:
         return "; with one of: ".join(" or ".join(s) for s in said.sets)

@@ -4,7 +4,7 @@ Made for OpenFOAM 1912 (the package of Debian 12). The frame is that of :mod:`ge
 thrust, blade 1 on the x axis.
 """
 
-from bemt.tools.cfd.openfoam.settings import Body, Settings, Sweep, sector_choice
+from bemt.tools.cfd.openfoam.settings import Body, RunSweep, Settings, sector_choice
 from bemt.tools.cfd.openfoam.write import case_files
 
-__all__ = ["Body", "Settings", "Sweep", "case_files", "sector_choice"]
+__all__ = ["Body", "Settings", "RunSweep", "case_files", "sector_choice"]

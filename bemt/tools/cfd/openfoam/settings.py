@@ -29,7 +29,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class RunSweep:
     """Where the blades are, for the grid."""
 
     # z of the blades' lowest and highest point [m]
@@ -62,7 +62,7 @@ class Settings:
     B: int  # Number of blades
     rotation: int  # Sense of rotation about z
     rotor: Body  # Extents of blades and hub
-    blades: Sweep  # Extents of the blades
+    blades: RunSweep  # Extents of the blades
     rpm: float  # Speed [rev/min]
     # Density [kg/m3], viscosity [Pa s], speed of sound [m/s] and temperature [K] far away
     rho: float

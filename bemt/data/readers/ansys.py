@@ -1,0 +1,278 @@
+r"""Tables that ANSYS exports: CSV of CFD-Post, nodes of Fluent, design points of Workbench.
+
+CFD-Post writes blocks of ``[Name]`` and ``[Data]``, units in the headings; or expressions with their values.
+
+::
+
+    [Name]
+    Blade
+
+    [Data]
+    X [ m ], Y [ m ], Z [ m ], Wall Shear [ Pa ]
+    7.69e-02, 5.98e-02, 8.56e-02, 3.79
+
+A table of expressions (of CFD-Post and CFX) has one on each line, under a heading or none::
+
+    Expression, Value
+    Thrust, 2.61 [kg m s^-2]
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from bemt.base.averaging import Mean
+from bemt.base.tables import number_of
+from bemt.data.readers import Reader, SourceText, load_text, number
+from bemt.data.readers.cfd import (
+    Column,
+    ExportRow,
+    cells_of,
+    fields,
+    head_lines,
+    history,
+    no_units,
+    numeric_table,
+    si_unit,
+    slug,
+    unique,
+)
+from bemt.data.readers.headings import may_be_shaft_speed
+from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.physics.dataset import Dataset
+
+CFD_POST_CSV = "cfd_post_csv"
+
+_SECTION = re.compile(r"\[(\w[\w ]*)\]")
+_HEADING = re.compile(r"(.*?)\s*\[([^\]]*)\]\s*")
+_EXPRESSION = re.compile(
+    r'\s*"?([A-Za-z][^",;\t=]*?)"?\s*[,;\t=]\s*"?\s*([-+\d.][\d.eE+-]*)\s*\[([^\]]*)\]\s*"?[,;\s]*'
+)
+_VALUES = re.compile(r'\s*"?[\w ]+"?\s*[,;\t=]\s*"?values?"?[,;\s]*', re.IGNORECASE)
+
+
+def sniff_cfd_post_csv(head: bytes | str) -> bool:
+    r"""Tell whether the file begins with the section Name or Data, or with an expression and its value.
+
+    >>> sniff_cfd_post_csv("[Name]\nBlade\n\n[Data]\nX [ m ], Y [ m ]"), sniff_cfd_post_csv("[propeller]\nname = 1")
+    (True, False)
+    >>> sniff_cfd_post_csv("Expression, Value\nThrust, 2.61 [kg m s^-2]\n")
+    True
+    >>> sniff_cfd_post_csv("rpm,thrust [N]\n6000,2.61\n")
+    False
+    """
+    lines = [line for line in head_lines(head) if not line.startswith("#")]
+    return bool(lines) and (lines[0].rstrip(",;") in ("[Name]", "[Data]") or _lists_expressions(lines[:2]))
+
+
+def _lists_expressions(lines: list[str]) -> bool:
+    """Whether lines begin as a table of expressions."""
+    body = lines[1:] if _VALUES.fullmatch(lines[0]) else lines[:1]
+    return any(_EXPRESSION.fullmatch(line) for line in body)
+
+
+def _heading(text: str) -> Column:
+    """Column of a heading: unit in the name when it is SI, else the heading as it stands."""
+    match = _HEADING.fullmatch(text)
+    if not match:
+        return Column(text or "unnamed")
+    unit = si_unit(match[2])
+    if unit is None:
+        return Column(text if match[2].strip() else slug(match[1]), match[2].strip())
+    role = "time" if unit == "s" and slug(match[1]) in ("time", "flow_time", "physical_time") else "value"
+    if unit == "rpm" and may_be_shaft_speed(match[1]):
+        return Column("rpm", unit)
+    return Column(f"{slug(match[1])}_{unit}", unit, role)
+
+
+def read_cfd_post_csv(path: str | os.PathLike[str]) -> Dataset:
+    """Read a CSV of CFD-Post."""
+    source = load_text(path)
+    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
+    lines = [(k, text) for k, text in lines if not text.startswith("#")]
+    if lines and _lists_expressions([text for _, text in lines[:2]]):
+        return _expressions(source, lines)
+    data: list[tuple[str, list[ExportRow]]] = []
+    section, name = "", ""
+    skipped: set[str] = set()
+    mark = ","
+    for line, text in lines:
+        match = _SECTION.fullmatch(text.rstrip(",;"))
+        if match and match[1] in ("Name", "Data", "Lines", "Faces", "Spatial Fields", "Parameters"):
+            section = match[1]
+            if section == "Data":
+                data.append((name or "data", []))
+        elif section == "Name":
+            name = text.rstrip(",;")
+        elif section == "Data":
+            if not data[-1][1]:
+                mark = ";" if ";" in text else "\t" if "\t" in text and "," not in text else ","
+            data[-1][1].append(ExportRow(line, cells_of(text, mark)))
+        elif section:
+            skipped.add(section)
+        else:
+            source.refuse(line, repr(text[:60]), "[Name] or [Data]", "Is the head cut?")
+    if not any(rows for _, rows in data):
+        source.refuse("", "no data", "a section [Data] with headings and rows")
+    notes = [f"section {', '.join(sorted(skipped))} not read"] if skipped else []
+    records = [(block, _block(source, rows, mark != ",")) for block, rows in data if rows]
+    if len(records) == 1:
+        block, record = records[0]
+        return replace(record, provenance={**record.provenance, "name": block}, notes=(*notes, *record.notes))
+    channels: dict[str, Channel] = {}
+    often = Counter(block for block, _ in records)
+    for k, (block, record) in enumerate(records):
+        label = block if often[block] == 1 else f"{block} {k + 1}"
+        channels |= {f"{key}({label})": channel for key, channel in channels_of(record).items()}
+        notes += [f"{label}: {text}" for text in record.notes]
+    return dataset(CFD_POST_CSV, "cfd", channels, notes, {**source.about, "clock": "none"})
+
+
+def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
+    """Values of expressions, one a line."""
+    found: list[tuple[Column, float]] = []
+    for line, text in lines[1:] if _VALUES.fullmatch(lines[0][1]) else lines:
+        match = _EXPRESSION.fullmatch(text)
+        value = number(match[2]) if match else None
+        if match is None or value is None:
+            source.add(line, repr(text[:60]), "an expression, its value and unit, such as Thrust, 2.61 [N]")
+        else:
+            unit = si_unit(match[3]) or match[3].strip()
+            found.append((_heading(f"{match[1]} [{match[3]}]") if unit else Column(match[1]), value))
+    source.check()
+    columns = [column for column, _ in found]
+    channels = {
+        name: Channel(np.array([value]), column.unit, Mean(value, "one value of an expression"))
+        for name, (column, value) in zip(unique([c.name for c in columns]), found, strict=True)
+    }
+    return dataset(CFD_POST_CSV, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
+
+
+def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
+    columns = [_heading(cell) for cell in rows[0].cells]
+    if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
+        got = f"numbers ({', '.join(rows[0].cells[:4])})"
+        source.refuse(rows[0].line, got, "headings such as X [ m ]", "Is the head cut?")
+    body = [row for row in rows[1:] if row.cells != rows[0].cells]
+    table = numeric_table(source, columns, body, commas=commas)
+    notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
+    build = history if columns[0].role == "time" else fields
+    return build(CFD_POST_CSV, source, columns, table, [*notes, *no_units(columns)])
+
+
+# Fluent's ASCII export of a surface or zone: ``nodenumber, x-coordinate, ...``, comma or blanks between cells.
+#
+# ::
+#
+#     nodenumber,    x-coordinate,    y-coordinate,        pressure
+#              1, 8.427639012E-17,-7.500000000E-01,-3.011805813E-01
+#
+# Fluent exports in SI whatever units it displays, but the file does not say so; units stay open. Coordinates and fields
+# are values at points, which carry no areas: forces cannot be summed from them.
+
+FLUENT_ASCII = "fluent_ascii"
+
+_FIRST = ("nodenumber", "cellnumber")
+
+
+def sniff_fluent_ascii(head: bytes | str) -> bool:
+    r"""Tell whether the first line names node or cell numbers and a coordinate.
+
+    >>> sniff_fluent_ascii("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff_fluent_ascii("node,x\n1,2")
+    (True, False)
+    """
+    return any(line.lower().lstrip('"').startswith(_FIRST) for line in head_lines(head, 1))
+
+
+def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:
+    """Read an ASCII export."""
+    source = load_text(path)
+    lines = [(k, text.strip()) for k, text in enumerate(source.lines, 1) if text.strip()]
+    if not lines or not sniff_fluent_ascii(lines[0][1]):
+        got = repr(lines[0][1][:60]) if lines else "no text"
+        source.refuse(1, got, "a header that begins with nodenumber or cellnumber")
+    mark = next((m for m in (",", ";") if m in lines[0][1]), None)
+    names = cells_of(lines[0][1], mark)
+    columns = [Column(name or "unnamed", "", "value" if k else "index") for k, name in enumerate(names)]
+    rows = [ExportRow(k, cells_of(text, mark)) for k, text in lines[1:]]
+    body = [row for row in rows if row.cells != names]
+    table = numeric_table(source, columns, body, commas=mark != ",")
+    repeated = len(rows) - len(body)
+    notes = [f"header repeated {number_of(repeated, 'time')}: several surfaces in one file"] if repeated else []
+    return fields(FLUENT_ASCII, source, columns, table, [*notes, "no units stated (Fluent exports SI)"])
+
+
+# Design points of Ansys Workbench as CSV: one operating point a row.
+#
+# ::
+#
+#     # The parameters defined in the project are:
+#     # ,P1 - rpm [rev min^-1],P2 - thrust [N]
+#     # The following header line defines the name of the columns by reference to the parameters.
+#     Name,P1,P2
+#     DP 0,8000,3.6
+#
+# or, as the parametric study of Fluent saves it, ``Design Points,rpm,thrust-op`` without units.
+
+DESIGN_POINTS = "design_points"
+
+_HEAD = re.compile(r"(Name\s*[,;]\s*P\d|Design Points?\s*[,;])", re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*(P\d+) - (.*?)\s*(?:\[([^\]]*)\])?\s*")
+
+
+def sniff_design_points(head: bytes | str) -> bool:
+    r"""Tell whether the first line that is no comment heads a table of design points.
+
+    >>> sniff_design_points("# ,P1 - rpm [rev min^-1]\nName,P1\nDP 0,8000")
+    True
+    >>> sniff_design_points("Design Points,rpm,T-op\nDP1,1,2")
+    True
+    >>> sniff_design_points("Name,a")
+    False
+    """
+    lines = [line for line in head_lines(head) if not line.startswith("#")]
+    return bool(lines) and _HEAD.match(lines[0]) is not None
+
+
+def read_design_points(path: str | os.PathLike[str]) -> Dataset:
+    """Read design points; one that failed is NaN."""
+    source = load_text(path)
+    told: dict[str, tuple[str, str]] = {}
+    names: tuple[str, ...] = ()
+    rows: list[ExportRow] = []
+    labels: list[str] = []
+    mark = ","
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        if text.startswith("#"):
+            found = map(_PARAMETER.fullmatch, text.lstrip("# ").split(","))
+            told |= {m[1]: (m[2], m[3] or "") for m in found if m}
+        elif text and not names:
+            mark = ";" if ";" in text and "," not in text else ","
+            names = cells_of(text, mark)[1:]
+        elif text:
+            label, *cells = cells_of(text, mark) if not text.endswith(mark) else (*cells_of(text, mark), "")
+            labels.append(label)
+            rows.append(ExportRow(line, tuple(cell or "nan" for cell in cells)))
+    if not names:
+        source.refuse("", "no header", "a line such as Name,P1,P2")
+    columns = [Column(words, si_unit(unit) or unit) for words, unit in (told.get(n, (n, "")) for n in names)]
+    table = numeric_table(source, columns, rows, mark != ",")
+    keys = unique([c.name for c in columns])
+    channels = {key: Channel(v, c.unit) for key, c, v in zip(keys, columns, table.values.T, strict=True)}
+    texts = {"name": tuple(labels)} if len(labels) == len(table.values) else {}
+    about = {**source.about, "clock": "none"}
+    notes = (*table.warnings, *no_units(columns))
+    return dataset(DESIGN_POINTS, "cfd", channels, notes, about, lines=table.lines, texts=texts)
+
+
+READERS = (
+    Reader(CFD_POST_CSV, sniff_cfd_post_csv, read_cfd_post_csv),
+    Reader(FLUENT_ASCII, sniff_fluent_ascii, read_fluent_ascii),
+    Reader(DESIGN_POINTS, sniff_design_points, read_design_points),
+)

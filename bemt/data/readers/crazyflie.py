@@ -1,0 +1,205 @@
+"""Crazyflie: records of its bench, and flight logs, the binary files of its micro-SD card (``.usdlog``).
+
+Magic 0xBC, version, number of event types, their names and variables with a type letter, then records: id (u16), time
+(us; version 1: u32, version 2: u64), packed little-endian values; the last four bytes are a CRC32 of all
+before (Bitcraze, crazyflie-firmware, tools/usdlog/cfusdlog.py). The four speeds are joined to their root mean square,
+since thrust goes with the square. No thrust is measured in flight: accelerations are kept, the mass is the user's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import struct
+import zlib
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base import units
+from bemt.base.toml_text import Collector
+from bemt.base.units import G0
+from bemt.data.readers import Reader, first_cells, load_bytes
+from bemt.data.readers.headings import known
+from bemt.data.readers.recording import Builder
+from bemt.data.readers.samples import Channel, dataset
+from bemt.physics.dataset import Dataset
+
+CRAZYFLIE_LOG = "crazyflie_log"
+MAGIC = 0xBC
+_TIMES = {1: struct.Struct("<HI"), 2: struct.Struct("<HQ")}
+_LETTERS = "bBhHiIlLqQefd"
+_UNITS = {
+    "stateEstimate.x": ("x_m", 1.0), "stateEstimate.y": ("y_m", 1.0), "stateEstimate.z": ("height_m", 1.0),
+    "stateEstimate.vx": ("velocity_x_m_s", 1.0), "stateEstimate.vy": ("velocity_y_m_s", 1.0),
+    "stateEstimate.vz": ("velocity_z_m_s", 1.0), "acc.x": ("acceleration_x_m_s2", G0),
+    "acc.y": ("acceleration_y_m_s2", G0), "acc.z": ("acceleration_z_m_s2", G0), "pm.vbatMV": ("voltage_V", 1e-3),
+    "pm.vbat": ("voltage_V", 1.0),
+}  # fmt: skip
+_SPEED, _COMMAND = re.compile(r"rpm\.m[1-4]"), re.compile(r"pwm\.m[1-4]_pwm|motor\.m[1-4]")
+
+
+def sniff_crazyflie_log(head: bytes | str) -> bool:
+    """Tell whether the first bytes are those of such a log."""
+    if isinstance(head, str) or len(head) < 5 or head[0] != MAGIC:
+        return False
+    version, events = struct.unpack_from("<HH", head, 1)
+    return version in _TIMES and 0 < events < 1000
+
+
+def read_crazyflie_log(path: str | os.PathLike[str]) -> Dataset:
+    """Read a log."""
+    data, log = load_bytes(path), Collector(os.fspath(path))
+    if not sniff_crazyflie_log(data):
+        log.refuse("", "other first bytes", "a Crazyflie log, which begins with 0xBC")
+    if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
+        log.refuse("", "a wrong checksum", "the CRC32 of all bytes before it", "Copy the file again")
+    try:
+        tables, _ = log_tables(data[:-4])
+    except (struct.error, KeyError, ValueError, UnicodeDecodeError) as error:
+        log.refuse("", f"a damaged log ({error})", "whole records", "Copy the file again")
+    tables = {k: v for k, v in tables.items() if v["time_s"].size > 1}
+    if not tables:
+        log.refuse("", "no records", "two or more")
+    return _made(log.file, hashlib.sha256(data).hexdigest(), tables)
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    end = data.index(b"\0", at)
+    return data[at:end].decode("utf-8"), end + 1
+
+
+def log_tables(data: bytes, partly: bool = False) -> tuple[dict[str, dict[str, NDArray[np.float64]]], int]:
+    """Event to variable to (N,) values in the units of the log, and the place at which reading ended.
+
+    `data` is the file without its checksum; `time_s` is in seconds of the log's clock. `partly`: keep what stands
+    before a damaged record instead of raising.
+    """
+    version, events = struct.unpack_from("<HH", data, 1)
+    at, known = 5, {}
+    for _ in range(events):
+        (number,) = struct.unpack_from("<H", data, at)
+        name, at = _text(data, at + 2)
+        (count,) = struct.unpack_from("<H", data, at)
+        at += 2
+        names, form = [], "<"
+        for _ in range(count):
+            variable, at = _text(data, at)
+            if variable[-2] not in _LETTERS:
+                raise ValueError(f"type {variable[-2]!r}")
+            names.append(variable[:-3])
+            form += variable[-2]
+        known[number] = (name, names, struct.Struct(form))
+    rows: dict[int, list[tuple[float, ...]]] = {k: [] for k in known}
+    stamp, scale = _TIMES[version], 1e-6
+    while at < len(data):
+        try:
+            number, time = stamp.unpack_from(data, at)
+            record = known[number][2]
+            rows[number].append((time * scale, *record.unpack_from(data, at + stamp.size)))
+        except (struct.error, KeyError):
+            if not partly:
+                raise
+            break
+        at += stamp.size + record.size
+    out = {}
+    for number, (name, names, _) in known.items():
+        table = np.array(rows[number], dtype=float).reshape(-1, len(names) + 1)
+        out[name] = {"time_s": table[:, 0]} | {n: table[:, k + 1] for k, n in enumerate(names)}
+    return out, at
+
+
+def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64]]]) -> Dataset:
+    main = max(tables, key=lambda k: tables[k]["time_s"].size)
+    t = tables[main]["time_s"]
+    columns: dict[str, NDArray[np.float64]] = {}
+    for table in tables.values():
+        for key, v in table.items():
+            if key != "time_s":
+                columns.setdefault(key, v if table is tables[main] else np.interp(t, table["time_s"], v))
+    channels = {"time_s": Channel(t - t[0], "s")}
+    for key, v in columns.items():
+        if key in _UNITS:
+            label, factor = _UNITS[key]
+            unit = "m/s2" if label.endswith("_s2") else "m/s" if label.endswith("_s") else label.rsplit("_", 1)[1]
+            channels[label] = Channel(v * factor, unit)
+    warnings = [f"event {main} with {t.size} records; others are interpolated to its times"] if len(tables) > 1 else []
+    speeds = [v for key, v in columns.items() if _SPEED.fullmatch(key)]
+    if len(speeds) == 4:
+        channels["rpm"] = Channel(np.sqrt(np.mean(np.square(speeds), axis=0)), "rpm")
+        warnings.append("rpm is the root mean square of four propellers")
+    commands = [v for key, v in columns.items() if _COMMAND.fullmatch(key)][:4]
+    if len(commands) == 4:
+        channels["throttle"] = Channel(np.mean(commands, axis=0) / 65535.0, "-")
+    warnings.append(
+        "a flight: no thrust is measured; mass times acceleration gives it, and the mass is not in the file"
+    )
+    said = {"file": name, "sha256": sha256}
+    return dataset(CRAZYFLIE_LOG, "flight", channels, warnings, said)
+
+
+# Bench tables of a Crazyflie on a scale: total thrust of four propellers, their optical speeds, command and battery.
+#
+# Columns ``pwm`` (0 to 65535), ``vbat[V]``, ``rpm1`` to ``rpm4``, ``weight`` or ``weight[g]`` or ``thrust[g]`` (total,
+# in gram-force), and with a power analyser ``v[V]``, ``i[A]``, ``p[W]`` of the supply (tables of Bitcraze and of IMRC,
+# TU Berlin). Loads are per propeller: a fourth of the total, at the root mean square of the four speeds, since thrust
+# goes with the square.
+
+CRAZYFLIE_BENCH = "crazyflie_bench"
+FULL = 65535.0
+"""Largest command. [counts]"""
+_COLUMNS = {
+    "pwm": ("throttle", "-"), "vbat": ("voltage", "V"), "v": ("supply_voltage", "V"), "i": ("supply_current", "A"),
+    "p": ("supply_power", "W"), "weight": ("total_thrust", "gf"), "thrust": ("total_thrust", "gf"),
+} | {f"rpm{k}": (str(k), "rpm") for k in (1, 2, 3, 4)}  # fmt: skip
+_SPEEDS = ("1_rpm", "2_rpm", "3_rpm", "4_rpm")
+
+
+def sniff_crazyflie_bench(head: bytes | str) -> bool:
+    r"""Tell whether the first line has a command, four speeds and a total thrust.
+
+    >>> sniff_crazyflie_bench("pwm,vbat[V],rpm1,rpm2,rpm3,rpm4,thrust[g]\n")
+    True
+    >>> sniff_crazyflie_bench("pwm,rpm,thrust[g]\n")
+    False
+    """
+    cells = set(map(_base, first_cells(head)))
+    return {"pwm", "rpm1", "rpm2", "rpm3", "rpm4"} <= cells and bool({"weight", "thrust"} & cells)
+
+
+def _base(text: str) -> str:
+    return text.partition("[")[0].strip()
+
+
+def read_crazyflie_bench(path: str | os.PathLike[str]) -> Dataset:
+    """Read a table."""
+    build = Builder.of_stand(path, CRAZYFLIE_BENCH)
+    for k, text in enumerate(h.strip() for h in build.table.headings):
+        if text == "pwm":
+            build.add(k, replace(known(text, *_COLUMNS["pwm"]), unit=units.Unit("", "none", 1.0 / FULL)))
+        elif _base(text) in _COLUMNS:
+            build.add_usual(k, *_COLUMNS[_base(text)])
+    build.check()
+    build.need("total_thrust_N", "throttle", *_SPEEDS)
+    build.check()
+    speeds = np.array([build.channels.pop(name).values for name in _SPEEDS])
+    build.channels["rpm"] = Channel(np.sqrt(np.mean(speeds**2, axis=0)), "rpm")
+    build.channels["thrust_N"] = Channel(build.channels.pop("total_thrust_N").values / 4.0, "N")
+    if (power := build.channels.pop("supply_power_W", None)) is not None:
+        build.channels["electrical_power_W"] = Channel(power.values / 4.0, "W")
+    build.headings = {k: v for k, v in build.headings.items() if k in build.channels}
+    build.flag_speeds("rpm")
+    with np.errstate(invalid="ignore"):
+        spread = np.ptp(speeds, axis=0) > 0.25 * np.maximum(speeds.max(axis=0), 1.0)
+    build.flag(np.flatnonzero(spread), "speeds of the four propellers differ by more than a quarter")
+    build.warnings.append("loads are a fourth of the total of four propellers, at the rms of their speeds")
+    build.warnings.append("weight and thrust are taken as gram-force; air density is not in the file")
+    return build.finish({"stand": "Crazyflie on a scale"})
+
+
+READERS = (
+    Reader(CRAZYFLIE_LOG, sniff_crazyflie_log, read_crazyflie_log),
+    Reader(CRAZYFLIE_BENCH, sniff_crazyflie_bench, read_crazyflie_bench),
+)

@@ -1,0 +1,365 @@
+r"""Histories that CFD programs write while they run: one row of :data:`READERS` for each program.
+
+Fluent report files (``thrust-rfile.out``) have three header lines, the second abbreviated. Steady files count
+"Iteration" and have no flow-time; columns of several zones are ``"name(zone)"`` and stay apart. No units, except that
+flow-time is in seconds. Rows of a report definition with average-over above 1 are running averages already; the file
+does not say so. Forces are projected on the vector the user gave: the sign is that of the file::
+
+    "thrust-rfile"
+    "Time Step" "thrust etc.."
+    ("Time Step" "thrust" "torque" "flow-time")
+    101 9.81 0.12 0.0519
+
+Old Fluent monitors (``cd-1-history``) have a title, a line of quoted names, rows; no third header line::
+
+    "Drag Convergence"
+    "Flow Time" "cd"
+    5.00000e-03     7.61066e-02
+
+STAR-CCM+ monitors and plots as CSV have quoted headings with the unit in parentheses. Steady runs count "Iteration";
+implicit unsteady ones have "Physical Time: Physical Time (s)". What stands before " Monitor:" is the name::
+
+    "Iteration","Thrust 1 Monitor: Thrust (N)","Torque 1 Monitor: Moment (N-m)"
+
+SU2 pads quoted names with blanks (CSV, or its Tecplot form). Coefficients rest on reference values (``RefForce`` when
+it is written). A dual-time run keeps the last inner iteration of each time step; with ``Cur_Time`` it is a history by
+time. Older versions head the first column "Iteration", as STAR-CCM+ does; coefficients and residuals tell them apart::
+
+    "Time_Iter","Outer_Iter","Inner_Iter",     "rms[Rho]"     ,       "CD"       , ...
+
+Flow360 (``total_forces_v2.csv``) has coefficients by physical and pseudo step: a steady run counts pseudo steps, of a
+transient one the last pseudo step of each physical step holds. They rest on reference values of the case::
+
+    physical_step, pseudo_step, CL, CD, CFx, CFy, CFz, CMx, CMy, CMz, CLPressure, ...
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemt.data.readers import Reader, SourceText, load_text
+from bemt.data.readers.cfd import (
+    Column,
+    ExportRow,
+    ExportTable,
+    cells_of,
+    head_lines,
+    history,
+    numeric_table,
+    si_unit,
+    unique,
+)
+from bemt.data.readers.samples import Channel, channels_of, dataset
+from bemt.physics.dataset import Dataset
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one program writes a history: a reader of that program."""
+
+    KIND: str
+    example: str  # of a header, for messages
+    header: Callable[[str], Sequence[str] | None]  # names on a line of headings; None on any other line
+    cells: Callable[[str], tuple[str, ...]]  # of a row
+    column: Callable[[str], Column]  # of a name
+    skip: str = "(?!)"  # lines that are neither headings nor rows
+    notes: tuple[str, ...] = ()
+    commas: bool = True  # whether a decimal comma is possible
+    hint: str = "Is the header damaged?"  # where a row comes before the headings
+    finish: Callable[[list[Column], ExportTable, list[str]], tuple[list[Column], ExportTable]] | None = None
+    within: int = 1  # first lines that may be the header, for the sniffer
+    told: Callable[[list[str]], bool] | None = None  # by its first lines, where a header alone does not tell
+
+    def sniff(self, head: bytes | str) -> bool:
+        """Tell whether one of the first lines is a header of this program."""
+        lines = head_lines(head, self.within)
+        return self.told(lines) if self.told else any(self.header(line) is not None for line in lines)
+
+    def read(self, path: str | os.PathLike[str]) -> Dataset:
+        """Read a history: headings that may be repeated by a restart, rows, lines to skip; all faults at once."""
+        source = load_text(path)
+        names: list[str] = []
+        title, rows, repeated, early = "", list[ExportRow](), list[int](), False
+        for line, raw in enumerate(source.lines, 1):
+            text = raw.strip()
+            found = self.header(text) if text else None
+            if found is not None:
+                if names and list(found) != names:
+                    got, expected = f"another header ({', '.join(found)})", f"the first one ({', '.join(names)})"
+                    source.add(line, got, expected, "Split the file there")
+                    break
+                repeated += [line] if names else []
+                names = names or list(found)
+            elif not text or re.match(self.skip, text):
+                title = title or text.strip('"# ')
+            elif names:
+                rows.append(ExportRow(line, self.cells(text)))
+            elif not early:
+                early = True
+                source.add(line, repr(text[:60]), f"a header such as {self.example}", self.hint)
+        if not names and not early:
+            source.add("", "no header", f"a line such as {self.example}")
+        if names and not rows:
+            source.add("", f"a header ({', '.join(names)}) and no rows", "one row or more", "Did the run write a step?")
+        if not rows:
+            source.check()
+        columns = [self.column(name) for name in names]
+        table = numeric_table(source, columns, rows, self.commas)
+        source.check()
+        again = f"header repeated in line {', '.join(map(str, repeated[:5]))}: the run was restarted"
+        notes = [*([again] if repeated else []), *self.notes]
+        if self.finish is not None:
+            columns, table = self.finish(columns, table, notes)
+        return history(self.KIND, source, columns, table, notes, {"title": title})
+
+
+# ---------------------------------------------------------------- Fluent
+
+_QUOTED = re.compile(r'"([^"]*)"')
+_REPORT = re.compile(r'\(\s*(?:"[^"]*"\s*)+\)')
+_MONITOR = re.compile(r'"[^"]*"(?:\s+"[^"]*")+')
+_UNIT = re.compile(r"(.+?)\s*\[\s*([^\[\]]+?)\s*\]")
+_STEPS = {"time step", "time-step", "iteration", "iterations"}
+_TIMES = {"flow time", "flow-time", "physical-time", "time"}
+
+
+def column_of(name: str) -> Column:
+    """Make the column of a name in Fluent's words; times are in seconds.
+
+    >>> column_of("flow-time").name, column_of("Iteration").role, column_of("thrust(blade:1)").role
+    ('time_s', 'step', 'value')
+    """
+    stated = _UNIT.fullmatch(name.strip())
+    word = (stated[1] if stated else name).strip().lower()
+    if word in _STEPS:
+        return Column(name.strip(), "", "step")
+    if word in _TIMES and (stated is None or stated[2] == "s"):
+        return Column("time_s", "s", "time")
+    if word == "delta-time" and stated is None:
+        return Column("delta_time_s", "s", "step_size")
+    unit = (si_unit(stated[2]) or stated[2].strip()) if stated else ""
+    return Column(name.strip() or "unnamed", unit)
+
+
+def _report(lines: list[str]) -> bool:
+    """A parenthesised list of quoted names, or an abbreviated one, under a quoted title."""
+    if not lines or not lines[0].startswith('"') or '",' in lines[0]:
+        return False
+    return any(line.startswith('("') or line.endswith(' etc.."') for line in lines[1:])
+
+
+def _monitor(lines: list[str]) -> bool:
+    """A quoted title, a line of quoted names, and then a number."""
+    return (
+        len(lines) > 1
+        and re.fullmatch(r'"[^"]*"', lines[0]) is not None
+        and _MONITOR.fullmatch(lines[1]) is not None
+        and not lines[1].endswith(' etc.."')
+        and (len(lines) < 3 or re.match(r"[-+.\d]", lines[2]) is not None)
+    )
+
+
+def _checked(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+    if any(c.role == "value" and not c.unit for c in columns):
+        notes.append("report files state no units, reference values, sector or sign convention: check them")
+    if not any(c.role in ("step", "time") for c in columns):
+        notes.append("no column counts steps or time: rows are taken in their order")
+    return columns, table
+
+
+# ---------------------------------------------------------------- STAR-CCM+, SU2, Flow360
+
+_HEADING = re.compile(r"(?P<name>.*?)(?P<monitor> Monitor(: (?P<what>[^()]*?))?)?( ?\((?P<unit>[^()]*)\))?")
+_CLOCK = re.compile(r"(Physical )?Time(: Physical Time)?( \(s\))?|Time Step(: Time Step)?|Iteration(: Iteration)?")
+_SU2 = re.compile(
+    r'(VARIABLES\s*=\s*)?"\s*((Time|Outer|Inner)_Iter\s*"\s*,|Iteration\s*",(?=.*"\s*(C[DL]|Res_|rms\[)))',
+    re.IGNORECASE,
+)
+_COUNTERS = ("Time_Iter", "Outer_Iter", "Inner_Iter", "Iteration", "physical_step", "pseudo_step")
+
+
+def _commas(line: str) -> tuple[str, ...]:
+    return cells_of(line, ",")
+
+
+def _star_names(line: str) -> tuple[str, ...] | None:
+    """Headings of monitors under a clock of STAR-CCM+.
+
+    >>> _star_names('"Iteration","Thrust 1 Monitor: Thrust (N)"'), _star_names('"Iteration","CL","CD"')
+    (('Iteration', 'Thrust 1 Monitor: Thrust (N)'), None)
+    """
+    own = line.startswith(("Physical Time: ", '"Physical Time: ')) or " Monitor" in line
+    return _commas(line) if own and any(_CLOCK.fullmatch(cell) for cell in _commas(line)) else None
+
+
+def _star_column(name: str) -> Column:
+    if _CLOCK.fullmatch(name):
+        timed = "Time" in name and "Step" not in name
+        return Column("time_s", "s", "time") if timed else Column(name.split(":")[0], "", "step")
+    match = _HEADING.fullmatch(name)
+    unit = match["unit"] or "" if match else ""
+    return Column((match["name"] if match else name) or "unnamed", si_unit(unit) or unit)
+
+
+def _counted(name: str) -> Column:
+    """Column of SU2 or Flow360: a counter, simulated or wall time, or a coefficient."""
+    if name == "Cur_Time":
+        return Column("time_s", "s", "time")
+    wall = name.startswith("Time(")
+    return Column(name or "unnamed", "", "wall" if wall else "counter" if name in _COUNTERS else "value")
+
+
+def outermost(columns: list[Column], table: ExportTable, notes: list[str]) -> tuple[list[Column], ExportTable]:
+    """Let the outermost counter that counts be the step; rows of inner iterations of one time step repeat it."""
+    counters = [k for k, c in enumerate(columns) if c.role == "counter"]
+    counting = [k for k in counters if len(np.unique(table.values[:, k])) > 1]
+    steps = counting[:1] or counters[-1:]
+    if len(counting) > 1:
+        notes.append(f"the last {columns[counting[-1]].name} of each {columns[counting[0]].name} is taken")
+    for k in counters:
+        columns[k] = Column(columns[k].name, "", "step" if k in steps else "counter")
+    return columns, table
+
+
+# Fluent XY plots: ``(title ...)``, ``(labels "x" "y")``, then one list of pairs for each zone.
+#
+# ::
+#
+#     (title "Axial Velocity")
+#     (labels "Position" "Axial Velocity")
+#
+#     ((xy/key/label "inlet")
+#     0	0.2
+#     )
+
+FLUENT_XY = "fluent_xy"
+
+_LABELS = re.compile(r'\(labels\s+"([^"]*)"\s+"([^"]*)"\s*\)')
+_ZONE = re.compile(r'\(\(xy/key/label\s+("[^"]*"|[^\s"()]+)\s*\)(?:\s*\((?:xy/key/visible\?|[\w/?-]+)[^)]*\))*')
+_FLUENT_XY_UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+
+
+def sniff_fluent_xy(head: bytes | str) -> bool:
+    r"""Tell whether the file begins with a title and labels in parentheses.
+
+    >>> sniff_fluent_xy('(title "a")\n(labels "x" "y")\n'), sniff_fluent_xy('("Iteration" "drag")')
+    (True, False)
+    """
+    lines = head_lines(head, 6)
+    return any(line.startswith("(labels ") for line in lines) and lines[0].startswith(("(title", "(labels"))
+
+
+def read_fluent_xy(path: str | os.PathLike[str]) -> Dataset:
+    """Read an XY plot."""
+    source = load_text(path)
+    title = ""
+    labels: list[str] = []
+    zones: list[tuple[str, list[ExportRow]]] = []
+    closed = True
+    for line, raw in enumerate(source.lines, 1):
+        text = raw.strip()
+        match = _LABELS.fullmatch(text)
+        zone = _ZONE.fullmatch(text)
+        if not text:
+            continue
+        if match:
+            labels = [match[1].strip() or "x", match[2].strip() or "y"]
+        elif text.startswith("(title"):
+            title = text[6:].strip().strip(')"').strip()
+        elif zone:
+            zones.append((zone[1].strip('"'), []))
+            closed = False
+        elif text == ")":
+            closed = True
+        elif closed:
+            expected = '(labels "x" "y") and lists that begin with ((xy/key/label "zone")'
+            source.refuse(line, repr(text[:60]), expected, "Is the file damaged?")
+        else:
+            zones[-1][1].append(ExportRow(line, tuple(text.split())))
+    if not labels or not zones:
+        got = "no (labels ...)" if not labels else "no list of points"
+        source.refuse("", got, 'labels and a list ((xy/key/label "zone") ... )')
+    return _record(source, title, labels, zones, closed)
+
+
+def _column(label: str) -> Column:
+    """Column of an axis label; a label may end in its unit."""
+    match = _FLUENT_XY_UNIT.search(label)
+    name = label[: match.start()].strip() if match else label
+    column = column_of(name or label)
+    if column.role == "time" and match and match[1] not in ("s", "sec", "seconds", ""):  # no clock in seconds
+        return Column(label, match[1])
+    return column if column.role != "value" else replace(column, name=label)
+
+
+def _record(
+    source: SourceText, title: str, labels: list[str], zones: list[tuple[str, list[ExportRow]]], closed: bool
+) -> Dataset:
+    columns = [_column(label) for label in labels]
+    counts = columns[0].role in ("step", "time")
+    channels: dict[str, Channel] = {}
+    notes: list[str] = [] if closed else ["the last list is not closed: the file may be cut"]
+    names = unique([zone for zone, _ in zones])
+    clocks: list[str] = []
+    for name, (_, data) in zip(names, zones, strict=True):
+        if not data:
+            notes.append(f"{name}: no points")
+            continue
+        table = numeric_table(source, columns, data)
+        record = history(FLUENT_XY, source, columns, table)
+        keys = unique([c.name for c in columns])
+        for k, (key, channel) in enumerate(zip(keys, channels_of(record).values(), strict=True)):
+            if counts:
+                channels[f"{key}({name})"] = channel
+                if k == 0:
+                    clocks.append(f"{key}({name})")
+            else:
+                channels[f"{key}({name})"] = Channel(table.values[:, k], columns[k].unit)
+        notes += [f"{name}: {text}" for text in (record.notes if counts else table.warnings)]
+    if not channels:
+        source.refuse("", "no points", "one pair of numbers or more")
+    if not counts:
+        notes.append("a curve over a position or frequency: no mean is taken")
+    about = {**source.about, "title": title, "clock": "none"}
+    if counts:
+        about |= {"clock": "time" if columns[0].role == "time" else "iteration", "clock_channels": "\t".join(clocks)}
+        if columns[0].role == "time" and len(clocks) == 1:
+            about["time_channel"] = clocks[0]
+    return dataset(FLUENT_XY, "cfd", channels, notes, about)
+
+
+READERS: tuple[Layout | Reader, ...] = (
+    Reader(FLUENT_XY, sniff_fluent_xy, read_fluent_xy),
+    Layout(
+        "fluent_report", '("Time Step" "thrust" "flow-time") in line 3',
+        lambda line: [name.strip() for name in _QUOTED.findall(line)] if _REPORT.fullmatch(line) else None,
+        lambda line: tuple(line.split()), column_of, '"',
+        hint="Line 3 of a report file lists all names; line 2 is abbreviated", finish=_checked, within=4, told=_report,
+    ),
+    Layout(
+        "fluent_monitor", '"Flow Time" "cd"', lambda line: _QUOTED.findall(line) if _MONITOR.fullmatch(line) else None,
+        lambda line: tuple(line.split()), column_of, r'"[^"]*"$',
+        ("monitors state no units, reference values, sector or sign convention: check them",), within=3, told=_monitor,
+    ),
+    Layout(
+        "star_monitor", '"Iteration","Thrust 1 Monitor: Thrust (N)"', _star_names, _commas, _star_column,
+        notes=("monitors state neither sector nor sign convention",), commas=False,
+    ),
+    Layout(
+        "su2_history", '"Time_Iter","Inner_Iter","CD"',
+        lambda line: _commas(re.sub(r"^VARIABLES\s*=\s*", "", line)) if _SU2.match(line) else None, _commas, _counted,
+        r"(TITLE|ZONE)\b", ("coefficients rest on reference values that the history does not state",), commas=False,
+        finish=outermost, within=4,
+    ),
+    Layout(
+        "flow360_forces", "physical_step, pseudo_step, CL, CD",
+        lambda line: _commas(line) if _commas(line)[:2] == ("physical_step", "pseudo_step") else None, _commas,
+        _counted, notes=("coefficients rest on reference values that the file does not state",), commas=False,
+        finish=outermost,
+    ),
+)  # fmt: skip

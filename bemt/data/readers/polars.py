@@ -1,0 +1,485 @@
+"""Section polars: delimited text, files of XFOIL and C81, and the checks that they share.
+
+The header line names the columns with their units: ``alpha_deg`` or ``alpha_rad``, ``cl``, ``cd``, and optionally
+``Re`` and ``Mach`` (any case, any order; comma, semicolon or tab). Lines that begin with ``#`` are comments. Rows of
+several Reynolds or Mach numbers may be mixed; together they fill a rectangle of Re x Mach.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bemt.base.errors import Fault, InputError
+from bemt.data.readers import Reader, SourceText, head_text, load_text, number
+from bemt.physics.sections.polars import ExtrapolatedTable, Polar, from_tables
+
+POLAR_CSV = "polar_csv"
+
+NO_RE = 1e5
+"""Stands in for the Reynolds number of a source that states none (a polar of one Re ignores it)."""
+MIN_SPAN_DEG = 5.0
+"""Positive angles that a polar must reach."""
+_NAMES = {"alpha_deg": "alpha_deg", "alpha_rad": "alpha_rad", "cl": "cl", "cd": "cd", "re": "Re", "reynolds": "Re",
+          "mach": "Mach", "m": "Mach"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PolarRow:
+    """One line of polar data."""
+
+    line: int  # Line in the file, from 1
+    # Angle of attack [rad], lift and drag coefficients [-]
+    alpha: float
+    cl: float
+    cd: float
+    Re: float | None = None  # Chord Reynolds number; None when the source states none [-]
+    M: float = 0.0  # Mach number [-]
+
+
+def sniff_polar_csv(head: bytes | str) -> bool:
+    r"""Tell whether the first line that is no comment is a header of alpha, cl and cd.
+
+    >>> sniff_polar_csv("alpha_deg,cl,cd"), sniff_polar_csv("# polar\nRe;alpha;CL;CD"), sniff_polar_csv("rpm,thrust_N")
+    (True, True, False)
+    """
+    for line in head_text(head).splitlines():
+        if line.strip() and not line.lstrip().startswith("#"):
+            cells = [c.lower() for c in _cells(line)]
+            return len(cells) > 2 and {"cl", "cd"} <= set(cells) and any(c.startswith("alpha") for c in cells)
+    return False
+
+
+def read_polar_csv(path: str | os.PathLike[str]) -> Polar:
+    """Read a delimited polar file."""
+    source = load_text(path)
+    lines = [(i, text) for i, text in enumerate(source.lines, 1) if text.strip() and not text.lstrip().startswith("#")]
+    if not lines:
+        source.refuse("", "no data", "a header line and rows")
+    columns, ignored = _header(source, *lines[0])
+    source.check()
+    rows = []
+    for line, text in lines[1:]:
+        cells = _cells(text)
+        value: dict[str, float] = {}
+        for name, k in columns.items():
+            got = cells[k] if k < len(cells) else ""
+            if (found := number(got)) is not None:
+                value[name] = found
+                continue
+            hint = "Write the decimal point as ." if re.fullmatch(r"[+-]?\d+,\d+", got) else ""
+            source.add(f"{line}:{k + 1}", repr(got), f"a number for {name}", hint)
+        if len(value) == len(columns):
+            alpha = value["alpha_rad"] if "alpha_rad" in value else math.radians(value["alpha_deg"])
+            rows.append(PolarRow(line, alpha, value["cl"], value["cd"], value.get("Re"), value.get("Mach", 0.0)))
+    notes = [f"column ignored: {c}" for c in ignored]
+    return assemble(source, rows, radians="alpha_rad" in columns, notes=notes)
+
+
+def row_of(
+    source: SourceText, line: int, cells: Sequence[str], Re: float | None, M: float = 0.0,
+    names: tuple[str, str, str] = ("alpha", "cl", "cd"),
+) -> list[PolarRow]:  # fmt: skip
+    """One row that begins with alpha [deg], cl, cd as a list of one, or of none with a fault."""
+    values = [number(c) for c in cells[:3]]
+    bad = next((k for k, v in enumerate(values) if v is None), len(values))
+    if bad < 3:
+        got = repr(cells[bad]) if bad < len(cells) else "the end of the line"
+        source.add(f"{line}:{bad + 1}", got, f"{names[bad]} as a number")
+        return []
+    alpha, cl, cd = (float(v or 0.0) for v in values)
+    return [PolarRow(line, math.radians(alpha), cl, cd, Re, M)]
+
+
+def _cells(line: str) -> list[str]:
+    """Cells of a line; the first of ; tab , that occurs separates."""
+    mark = next((m for m in (";", "\t", ",") if m in line), ",")
+    return [c.strip().strip('"') for c in line.split(mark)]
+
+
+def _header(source: SourceText, line: int, text: str) -> tuple[dict[str, int], list[str]]:
+    """Columns by their meaning, and ignored names."""
+    columns: dict[str, int] = {}
+    ignored = []
+    for k, cell in enumerate(_cells(text)):
+        where, key = f"{line}:{k + 1}", cell.lower()
+        name = _NAMES.get(key)
+        if name is None and (key.startswith("alpha") or key in ("aoa", "angle")):
+            source.add(where, repr(cell), "alpha_deg or alpha_rad", "Name the unit of the angle")
+        elif name is None and (key.startswith(("re_", "re ", "reynolds")) or key == "re(million)"):
+            source.add(where, repr(cell), "Re", "Give the plain Reynolds number")
+        elif name is None:
+            ignored.append(cell)
+        elif name in columns:
+            source.add(where, f"a second {name}", "each column once")
+        else:
+            columns[name] = k
+    angles = [c for c in columns if c.startswith("alpha")]
+    if len(angles) > 1:
+        source.add(line, "alpha_deg and alpha_rad", "one of them", "Drop one column")
+    if not angles and not source.faults:
+        source.add(line, "no angle of attack", "a column alpha_deg or alpha_rad")
+    for name in ("cl", "cd"):
+        if name not in columns:
+            source.add(line, f"no column {name}", f"a column {name}")
+    return columns, ignored
+
+
+def assemble(
+    source: SourceText, rows: Sequence[PolarRow], *, name: str = "", kind: str = "CSV", radians: bool = False,
+    notes: Sequence[str] = (),
+) -> Polar:  # fmt: skip
+    """Check rows of any polar format and make the Polar."""
+    said = list(notes)
+    _doubts(source, rows, radians)
+    groups: dict[tuple[float, float], dict[float, PolarRow]] = {}
+    for row in rows:
+        group = groups.setdefault((NO_RE if row.Re is None else row.Re, row.M), {})
+        old = group.setdefault(round(row.alpha, 9), row)
+        if old is not row and (old.cl, old.cd) != (row.cl, row.cd):
+            got = f"another row at {math.degrees(row.alpha):.6g} deg (line {old.line} has other values)"
+            source.add(row.line, got, "each angle once per Reynolds and Mach number")
+        elif old is not row:
+            said.append(f"line {row.line} repeats line {old.line}")
+    tables = []
+    for (reynolds, mach), group in sorted(groups.items()):
+        used = [group[a] for a in sorted(group)]
+        lo, hi = (math.degrees(used[k].alpha) for k in (0, -1))
+        label = f" at Re {reynolds:.4g}, Mach {mach:g}" if len(groups) > 1 else ""
+        if not rows or lo > 0.0 or hi < MIN_SPAN_DEG or len(used) < 3:
+            got = f"{len(used)} angles from {lo:.4g} to {hi:.4g} deg{label}"
+            source.add("", got, f"three or more that hold 0 and reach {MIN_SPAN_DEG:g} deg")
+        columns = np.array([(r.alpha, r.cl, r.cd) for r in used])
+        columns[0, 0], columns[-1, 0] = (_snap(columns[k, 0]) for k in (0, -1))
+        tables.append(ExtrapolatedTable(columns[:, 0], columns[:, 1], columns[:, 2], reynolds, mach))
+    if not rows and not source.faults:
+        source.add("", "no rows", "rows of alpha, cl and cd")
+    sizes = len({r for r, _ in groups}), len({m for _, m in groups})
+    if len(groups) != sizes[0] * sizes[1]:
+        got = f"{len(groups)} pairs of {sizes[0]} Reynolds and {sizes[1]} Mach numbers"
+        source.add("", got, "every pair", "Give one file per Mach number")
+    source.check()
+    if rows[0].Re is None:
+        said.append("the source states no Reynolds number")
+    label = f"{kind} {Path(source.name).name} (sha256 {source.sha256[:12]})"
+    return from_tables(tables, name=name or Path(source.name).stem, source=label, notes=said)
+
+
+def _snap(alpha: float) -> float:
+    """Exactly +-pi for 180 deg that lost its last digits."""
+    return math.copysign(math.pi, alpha) if abs(abs(alpha) - math.pi) < 1e-4 else alpha
+
+
+def _doubts(source: SourceText, rows: Sequence[PolarRow], radians: bool) -> None:
+    """Faults of magnitude: units are never converted on suspicion, but refused with a hint."""
+    for row in rows:
+        if row.cd <= 0.0:
+            source.add(row.line, f"cd = {row.cd:g}", "a drag coefficient above 0")
+        if abs(row.cl) > 5.0:
+            source.add(row.line, f"cl = {row.cl:g}", "a lift coefficient within +-5", "Are columns swapped?")
+        if row.Re is not None and not 1e3 <= row.Re <= 1e9:
+            hint = "Millions? Write 0.1 million as 1e5" if 0.0 < row.Re < 1e3 else ""
+            source.add(row.line, f"Re = {row.Re:g}", "a Reynolds number from 1e3 to 1e9", hint)
+        if not 0.0 <= row.M <= 1.5:
+            source.add(row.line, f"Mach = {row.M:g}", "a Mach number from 0 to 1.5")
+    if not rows:
+        return
+    alpha = np.array([r.alpha for r in rows])
+    lo, hi = (float(v) for v in (alpha.min(), alpha.max()))
+    if radians and max(-lo, hi) > math.pi + 1e-4:
+        got, hint = f"alpha_rad from {lo:.4g} to {hi:.4g}", "The span looks like degrees: name the column alpha_deg"
+        source.add("", got, "angles within +-pi rad", hint)
+    elif not radians and max(-lo, hi) > math.pi * (1.0 + 1e-6):
+        got = f"angles from {math.degrees(lo):.6g} to {math.degrees(hi):.6g} deg"
+        source.add("", got, "angles within +-180 deg", "Give angles above 180 deg as negative ones")
+    elif not radians and math.degrees(max(-lo, hi)) <= math.pi + 1e-3:
+        got = f"angles from {math.degrees(lo):.4g} to {math.degrees(hi):.4g} in a column of degrees"
+        source.add("", got, f"degrees that reach {MIN_SPAN_DEG:g}", "The span looks like radians")
+    least, bluff = min(r.cd for r in rows), all(abs(r.cl) < 1e-3 for r in rows)  # a round blade root has no lift
+    if least > (2.0 if bluff else 0.2):
+        got = f"a least cd of {least:g}"
+        source.add("", got, "a least cd below 0.2", "Drag counts, or columns swapped? cd is not scaled")
+
+
+# Polar save files of XFOIL (``PACC``), of XFLR5 and XOptFoil that write the same layout, and the CSV of airfoiltools.
+#
+# One file holds one Reynolds number::
+#
+#     Calculated polar for: NACA 4412
+#     1 1 Reynolds number fixed          Mach number fixed
+#     xtrf =   1.000 (top)        1.000 (bottom)
+#     Mach =   0.000     Re =     0.100 e 6     Ncrit =   9.000
+#      alpha    CL        CD       CDp       CM     Top_Xtr  Bot_Xtr
+#     ------ -------- --------- --------- -------- -------- --------
+#
+# XFLR5 may put commas between the cells. The CSV of airfoiltools.com says the same in other words::
+#
+#     Xfoil polar. Reynolds number fixed. Mach  number fixed
+#     Airfoil,n0012-il
+#     Reynolds number,100000
+#     Ncrit,9
+#     Mach,0
+#     Alpha,Cl,Cd,Cdp,Cm,Top_Xtr,Bot_Xtr
+#
+# Several such files make one polar with `read_many`.
+
+POLAR_XFOIL = "polar_xfoil"
+
+_TITLE = re.compile(r"Calculated polar for:[ \t]*(.*?)[ \t]*$", re.M)
+_STATE = re.compile(r"Mach\s*=\s*(\S+)\s+Re\s*=\s*(\S+)\s*e\s*(\d+)\s+Ncrit\s*=\s*(\S+)", re.I)
+_TYPE = re.compile(r"^\s*\d+\s+\d+\s+Reynolds number\s+(.*?)\s{2,}Mach number\s+(.*?)\s*$", re.M)
+_HEADER = re.compile(r"\s*alpha\s*[,;\s]\s*CL\s*[,;\s]\s*CD\b", re.I)
+_SITE = re.compile(r"\s*Xfoil polar\. Reynolds number (\w+)\. Mach\s+number (\w+)", re.I)
+_FACT = re.compile(r"^(Airfoil|Reynolds number|Ncrit|Mach)\s*[,;]\s*(.*?)[,;\s]*$", re.M)
+_TRIP = re.compile(r"xtrf\s*=\s*(\S+)\s*\(top\)\s*(\S+)\s*\(bottom\)")
+
+
+def sniff_polar_xfoil(head: bytes | str) -> bool:
+    r"""Tell whether a file begins like an XFOIL polar.
+
+    >>> sniff_polar_xfoil("       XFOIL         Version 6.99\n\n Calculated polar for: NACA 4412\n")
+    True
+    >>> sniff_polar_xfoil("alpha,cl,cd")
+    False
+    """
+    text = head_text(head)
+    return _TITLE.search(text) is not None or _SITE.match(text) is not None
+
+
+def read_polar_xfoil(path: str | os.PathLike[str]) -> Polar:
+    """Read one XFOIL polar file."""
+    return read_many([path])
+
+
+def read_many(paths: Iterable[str | os.PathLike[str]]) -> Polar:
+    """Read XFOIL polar files of one section at several Reynolds numbers."""
+    sources = [load_text(path) for path in paths]
+    if not sources:
+        raise InputError(Fault("", "", "no files", "one XFOIL polar or more"))
+    first, rows, notes, names = sources[0], list[PolarRow](), list[str](), list[str]()
+    for source in sources:
+        source.faults = first.faults
+        name, more, said = _parse(source)
+        names.append(name)
+        if name != names[0]:
+            source.add("", f"section {name!r}", f"section {names[0]!r} as in the first file")
+        rows += more
+        notes += said
+    return assemble(first, rows, name=names[0], kind="XFOIL polar", notes=tuple(dict.fromkeys(notes)))
+
+
+def _rewritten(text: str) -> str:
+    """Head of the CSV of airfoiltools in the words of XFOIL, on as many lines."""
+    site = _SITE.match(text)
+    if site is None:
+        return text
+    facts = dict(_FACT.findall(text))
+    re_number = number(facts.get("Reynolds number", ""))
+    if re_number is None:
+        return text
+    kind = f" 1 1 Reynolds number {site[1]}          Mach number {site[2]}"
+    state = f"Mach = {facts.get('Mach', '0')} Re = {re_number / 1e6!r} e 6 Ncrit = {facts.get('Ncrit', '?')}"
+    lines = text.splitlines()
+    head = next((i for i, line in enumerate(lines) if _HEADER.match(line)), 0)
+    if head < 3:
+        return text
+    return "\n".join(
+        [f"Calculated polar for: {facts.get('Airfoil', '')}", kind, state, *[""] * (head - 3), *lines[head:]]
+    )
+
+
+def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
+    """Name, rows and notes of one file."""
+    text = _rewritten(source.text)
+    title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
+    notes = []
+    if title is None:
+        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
+    if kind and (kind.group(1).lower() != "fixed" or kind.group(2).lower() != "fixed"):
+        got = f"Reynolds number {kind.group(1)}, Mach number {kind.group(2)}"
+        line = str(text.count("\n", 0, kind.end()) + 1)
+        source.add(line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
+    reynolds, mach = None, 0.0
+    if state is None:
+        got, hint = "no line 'Mach = ... Re = ... e 6 Ncrit = ...'", "Save the polar with viscous mode on"
+        source.add("", got, "the state of the run", hint)
+    else:
+        values = [number(state.group(k)) for k in (1, 2, 4)]
+        line = str(text.count("\n", 0, state.start()) + 1)
+        if any(v is None for v in values):
+            source.add(line, repr(state.group(0)), "numbers for Mach, Re and Ncrit")
+        else:
+            mach, reynolds = float(values[0] or 0.0), float(values[1] or 0.0) * 10.0 ** int(state.group(3))
+            notes.append(f"Ncrit {values[2]:g}")
+            if reynolds == 0.0:
+                reynolds = None
+                hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
+                source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
+    if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
+        notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
+    rows: list[PolarRow] = []
+    lines = text.splitlines()
+    start = next((i for i, line in enumerate(lines) if _HEADER.match(line)), len(lines))
+    mark = re.search("[,;]", lines[start]) if start < len(lines) else None
+    for i, line in enumerate(lines[start + 1 :], start + 2):
+        cells = [c.strip() for c in line.split(mark[0])] if mark else line.split()
+        if any(cells) and not set(line.strip()) <= {"-", " "}:
+            rows += row_of(source, i, cells, reynolds, mach, ("alpha", "CL", "CD"))
+    if not rows:
+        source.add("", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?")
+    return (title.group(1) if title else ""), rows, notes
+
+
+# C81 airfoil tables: lift and drag over angle of attack and Mach number, fixed width.
+#
+# Layout, as written in the format notes of its users (Fortran edit descriptors)::
+#
+#     name, NML NAL NMD NAD NMM NAM           A30, 6I2
+#     Mach numbers of the lift table          7X, 9F7.0   (more than nine continue on lines of the same form)
+#     alpha, cl at each Mach number           10F7.0 / (7X, 9F7.0)
+#     ... the same for drag and for the pitching moment
+#
+# NM is the count of Mach numbers and NA that of angles [deg]. The pitching moment is not used.
+
+POLAR_C81 = "polar_c81"
+
+WIDTH = 7
+_PER_LINE = 9
+_HINT = "C81 fields are 7 characters wide, nine values after the first field"
+
+
+def sniff_polar_c81(head: bytes | str) -> bool:
+    r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
+
+    >>> sniff_polar_c81("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n")
+    True
+    >>> sniff_polar_c81("alpha,cl,cd")
+    False
+    """
+    lines = head_text(head).splitlines()
+    if len(lines) < 2 or _counts(lines[0]) is None or lines[1][:WIDTH].strip():
+        return False
+    mach = [number(lines[1][k : k + WIDTH]) for k in range(WIDTH, len(lines[1].rstrip()), WIDTH)]
+    return bool(mach) and all(m is not None and 0.0 <= m <= 2.0 for m in mach)
+
+
+def resembles(text: str) -> bool:
+    """Whether a text begins as a C81 table does and goes on in columns of another width."""
+    lines = text.splitlines()
+    mach = [number(cell) for cell in lines[1].split()] if len(lines) > 1 else []
+    return bool(lines) and _counts(lines[0]) is not None and len(mach) > 1 and None not in mach
+
+
+def read_polar_c81(path: str | os.PathLike[str]) -> Polar:
+    """Read a C81 table."""
+    source = load_text(path)
+    lines = source.lines
+    counts = _counts(lines[0]) if lines else None
+    if counts is None:
+        got = repr(lines[0][30:42]) if lines else "an empty file"
+        source.refuse("1:31", got, "six counts of two digits in columns 31 to 42", _HINT)
+    at = 1
+    tables = []
+    for name, n_mach, n_alpha in (("lift", counts[0], counts[1]), ("drag", counts[2], counts[3])):
+        table, at = _table(source, name, at, n_mach, n_alpha)
+        tables.append(table)
+    source.check()
+    (a_l, m_l, cl, rows_l), (a_d, m_d, cd, _) = tables
+    mach = np.union1d(m_l, m_d)
+    alpha = np.union1d(a_l, a_d)
+    alpha = alpha[(alpha >= max(a_l[0], a_d[0])) & (alpha <= min(a_l[-1], a_d[-1]))]
+    cl, cd = _spread(a_l, m_l, cl, alpha, mach), _spread(a_d, m_d, cd, alpha, mach)
+    line = {a: n for a, n in zip(a_l.tolist(), rows_l, strict=True)}
+    rows = [
+        PolarRow(line.get(a, rows_l[0]), math.radians(a), float(cl[i, j]), float(cd[i, j]), None, float(m))
+        for j, m in enumerate(mach.tolist())
+        for i, a in enumerate(alpha.tolist())
+    ]
+    notes = [] if np.array_equal(a_l, a_d) and np.array_equal(m_l, m_d) else ["lift and drag interpolated to one grid"]
+    return assemble(source, rows, name=lines[0][:30].strip(), kind="C81", notes=notes)
+
+
+def _counts(line: str) -> tuple[int, ...] | None:
+    """Six counts of the first line, or None."""
+    fields = [line[30 + 2 * k : 32 + 2 * k].strip() for k in range(6)]
+    if len(line) < 38 or any(f and not f.isdigit() for f in fields) or line[42:].strip():
+        return None
+    counts = tuple(int(f or "0") for f in fields)
+    return counts if min(counts[:4]) >= 1 else None
+
+
+_Table = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[int]]
+
+
+def _table(source: SourceText, name: str, at: int, n_mach: int, n_alpha: int) -> tuple[_Table, int]:
+    """Angles, Mach numbers, values (Na, Nm) and line numbers of one table, and the index of the line behind it."""
+    mach, _, at = _record(source, name, at, n_mach, False)
+    alpha, values, numbers = [], [], []
+    for _ in range(n_alpha):
+        numbers.append(at + 1)
+        row, first, at = _record(source, name, at, n_mach, True)
+        alpha.append(first)
+        values.append(row)
+    for axis, label in ((mach, "Mach numbers"), (alpha, "angles")):
+        fresh = np.diff(axis)
+        if not np.any(np.isnan(axis)) and np.any(fresh <= 0.0):
+            k = int(np.flatnonzero(fresh <= 0.0)[0])
+            got = f"{label} {axis[k]:g}, {axis[k + 1]:g}"
+            where = str(numbers[k + 1] if label == "angles" else numbers[0] - 1)
+            source.add(where, got, f"ascending {label} in the {name} table")
+    return (np.array(alpha), np.array(mach), np.array(values).reshape(n_alpha, n_mach), numbers), at
+
+
+def _record(source: SourceText, name: str, at: int, count: int, leading: bool) -> tuple[list[float], float, int]:
+    """Values of one record with its continuation lines, its first field, and the index of the next line."""
+    values: list[float] = []
+    first = math.nan
+    lines = source.lines
+    while len(values) < count:
+        if at >= len(lines):
+            end = source.fault(len(lines), f"the end of the file in the {name} table", "more lines", _HINT)
+            source.faults += [end] if end not in source.faults else []
+            return values + [math.nan] * (count - len(values)), first, at
+        line = lines[at]
+        if leading and not values:
+            first = _field(source, at, line, 0, "an angle in degrees")
+        for k in range(1, min(_PER_LINE, count - len(values)) + 1):
+            values.append(_field(source, at, line, k, "a number"))
+        at += 1
+    return values, first, at
+
+
+def _field(source: SourceText, at: int, line: str, k: int, expected: str) -> float:
+    """One fixed-width number; NaN and a fault when it is none."""
+    text = line[k * WIDTH : (k + 1) * WIDTH]
+    value = number(text)
+    if value is None:
+        source.add(f"{at + 1}:{k * WIDTH + 1}", repr(text), expected, _HINT)
+        return math.nan
+    return value
+
+
+def _spread(
+    a0: NDArray[np.float64],
+    m0: NDArray[np.float64],
+    table: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    mach: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Table (Na0, Nm0) on other axes, linear, held at the ends."""
+    on_alpha = np.stack([np.interp(alpha, a0, table[:, j]) for j in range(m0.size)], axis=1)
+    return np.stack([np.interp(mach, m0, on_alpha[i]) for i in range(alpha.size)], axis=0)
+
+
+READERS = (
+    Reader(POLAR_CSV, sniff_polar_csv, read_polar_csv),
+    Reader(POLAR_XFOIL, sniff_polar_xfoil, read_polar_xfoil),
+    Reader(POLAR_C81, sniff_polar_c81, read_polar_c81),
+)

@@ -1,0 +1,323 @@
+"""Stands and databases whose files are odd: thrust_tool, a coaxial stand, Drive Calculator.
+
+Tables of the thrust_tool stand (J. Majewski), throttle steps with an error per channel, have one row per throttle
+step and headings without units::
+
+    out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff
+
+out [%], th [gf], tq [gf cm], rpm [1/min], v [V], a [A], pin [W], theff [gf/W]; ``_err`` is the stated error in the unit
+of its channel. That these units hold is checked within the file: pin = v a and theff = th/pin.
+
+Raw records have one row per sample and no time; their headings name units as ``Thrust [G]`` (gram-force), counts of the
+converters have none. ``RPM [1/min]`` is no sensor of its own: it is ``ESCT RPM`` (telemetry, hundreds of electrical
+revolutions per minute) over the pole pairs; the factor is found in the file and reported.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bemt.base import units
+from bemt.data.readers import Reader, first_cells, load_text
+from bemt.data.readers.headings import Heading, heading, known, slug
+from bemt.data.readers.recording import Builder, slip
+from bemt.data.readers.samples import Channel
+from bemt.data.readers.split import split_table
+from bemt.physics.dataset import Dataset
+
+JMAJEW = "jmajew"
+_JMAJEW_COLUMNS = {
+    "out": ("throttle", "pct"), "th": ("thrust", "gf"), "tq": ("torque", "gf_cm"), "rpm": ("", "rpm"),
+    "v": ("voltage", "V"), "a": ("current", "A"), "pin": ("electrical_power", "W"), "theff": ("efficacy", "gf/W"),
+}  # fmt: skip
+_RAW = {
+    "Motor Output": ("pulse_width", "us"), "Motor Level": ("throttle", "pct"), "Thrust": ("thrust", "gf"),
+    "Torque": ("torque", "gf_cm"), "RPM": ("", "rpm"), "VoltBatt": ("voltage", "V"), "CurrBatt": ("current", "A"),
+    "Power In": ("electrical_power", "W"), "Power Out": ("mechanical_power", "W"),
+    "Efficiency": ("motor_efficiency", "pct"), "Thrust Efficiency": ("efficacy", "gf/W"),
+}  # fmt: skip
+_RAW_KEYS = {"Motor Output", "ESCT RPM", "Thrust", "Torque"}
+
+
+def sniff_jmajew(head: bytes | str) -> bool:
+    r"""Tell whether the first line has this stand's headings.
+
+    >>> sniff_jmajew("out,th,th_err,tq,tq_err,rpm,rpm_err,v,v_err,a,a_err,pin,theff\n"), sniff_jmajew("th,tq,rpm\n")
+    (True, False)
+    """
+    cells = first_cells(head)
+    return {"out", "th", "th_err", "tq", "tq_err", "rpm"} <= cells or set(map(_base, cells)) >= _RAW_KEYS
+
+
+def read_jmajew(path: str | os.PathLike[str]) -> Dataset:
+    """Read a table or a raw record. ["form"]"""
+    build = Builder.of_stand(path, JMAJEW)
+    raw = set(map(_base, build.table.headings)) >= _RAW_KEYS
+    for k, text in enumerate(build.table.headings):
+        if raw and _base(text) in _RAW and (_base(text) != text or text == "Motor Output"):
+            build.add_usual(k, *_RAW[_base(text)])
+        else:
+            build.add(k, Heading(text, slug(text), None, "counts or telemetry") if raw else _table_heading(text))
+    if not build.faults:
+        build.need("thrust_N", "torque_Nm", "rpm")
+    form = "raw" if raw else "table"
+    said = {"stand": "thrust_tool (J. Majewski)", "form": form, **_name(Path(build.table.source.name).stem)}
+    if not build.faults:
+        with np.errstate(over="ignore", invalid="ignore"):  # damaged cells may hold any number
+            (_check_raw if raw else _check_table)(build)
+        build.flag(np.flatnonzero(build.channels["rpm"].values == 0.0), "rpm is 0")
+        if said.get("propeller") == "none":
+            build.warnings.append("recorded without a propeller: a tare of the stand, not performance data")
+        build.check_magnitudes()
+    return build.finish(said)
+
+
+def _table_heading(text: str) -> Heading:
+    base = text.removesuffix("_err")
+    if base not in _JMAJEW_COLUMNS:
+        return heading(text)
+    name, unit = _JMAJEW_COLUMNS[base]
+    return known(text, f"{name}_err".lstrip("_") if base != text and base != "theff" else name, unit)
+
+
+def _base(text: str) -> str:
+    return text.partition("[")[0].strip()
+
+
+def _name(stem: str) -> dict[str, str]:
+    """Motor, propeller, cells and duct as the file name tells them."""
+    low = stem.lower()
+    out = {"run_name": stem}
+    if cells := re.search(r"_(\d)s(_|$)", low):
+        out["battery_cells"] = cells[1]
+    if re.search(r"no-?prop", low):
+        out["propeller"] = "none"
+    elif found := re.search(r"__([^_]+)_([^_]+)_\d+s", low):
+        out["motor"], out["propeller"] = found[1], found[2]
+    if re.search(r"(^|_)duct(_|$)", low):
+        out["duct"] = "yes"
+    return out
+
+
+def _check_table(build: Builder) -> None:
+    """Units are not in the file: see that its own products agree with them."""
+    c = {name: channel.values for name, channel in build.channels.items()}
+    if {"voltage_V", "current_A", "electrical_power_W"} <= c.keys():
+        _ratio(build, c["voltage_V"] * c["current_A"], c["electrical_power_W"], "pin", "v x a", 0.05)
+    if {"thrust_N", "electrical_power_W", "efficacy_N_W"} <= c.keys():
+        with np.errstate(divide="ignore", invalid="ignore"):
+            _ratio(build, c["thrust_N"] / c["electrical_power_W"], c["efficacy_N_W"], "theff", "th/pin", 0.01)
+    for name in [n for n in c if "_err_" in n or n.endswith("err_rpm") or n == "err_rpm"]:
+        build.flag(np.flatnonzero(c[name] < 0.0), f"{name} is negative")
+        main = name.replace("_err_", "_").replace("err_rpm", "rpm")
+        if main in c:
+            usual = float(np.nanmedian(c[name]))
+            wide = np.flatnonzero(c[name] > 20.0 * max(usual, 1e-12))
+            build.flag(wide, f"stated error of {main} above 20 times its median")
+    build.flag(np.flatnonzero(c["thrust_N"] < 0.0), "thrust_N is negative")
+    if "throttle" in c:
+        build.flag(np.flatnonzero(np.diff(c["throttle"], prepend=-np.inf) <= 0.0), "throttle does not rise")
+
+
+def _ratio(build: Builder, expected: np.ndarray, got: np.ndarray, name: str, formula: str, tolerance: float) -> None:
+    top = float(np.nanmax(np.abs(np.append(expected, 0.0))))
+    good = np.isfinite(expected) & np.isfinite(got) & (np.abs(expected) > max(0.05 * top, 0.01))  # three decimals only
+    if not np.any(good):
+        return
+    ratio = got[good] / expected[good]
+    usual = float(np.median(ratio))
+    if abs(usual - 1.0) > tolerance:
+        text = f"{name} is {usual:.4g} times {formula}{slip(usual)}"
+        build.warnings.append(f"{text}: the units of this table are in doubt")
+    else:
+        build.flag(np.flatnonzero(good)[np.abs(ratio / usual - 1.0) > 5 * tolerance], f"{name} differs from {formula}")
+
+
+def _check_raw(build: Builder) -> None:
+    c = {name: channel.values for name, channel in build.channels.items()}
+    telemetry = c.get("ESCT_RPM")
+    if telemetry is not None:
+        good = (telemetry > 0) & (c["rpm"] > 0)
+        if np.count_nonzero(good) >= 3:
+            ratio = c["rpm"][good] / telemetry[good]
+            usual = float(np.median(ratio))
+            if float(np.max(np.abs(ratio / usual - 1.0))) < 1e-3:
+                pairs = 100.0 / usual
+                text = f"rpm is ESCT RPM x {usual:.5g} in all rows: ESC telemetry"
+                near = abs(pairs - round(pairs)) < 0.01
+                whole = f" of electrical speed over {round(pairs)} pole pairs" if near else ""
+                build.warnings.append(text + whole + ", not a separate sensor")
+    build.warnings.append("no time in a raw record: rows are in order of sampling")
+    build.flag_spikes("thrust_N", "torque_Nm", "rpm")
+    build.flag(np.flatnonzero(c["thrust_N"] < 0.0), "thrust_N is negative")
+
+
+# Tables of the New Dexterity coaxial stand: two rotors, ``Left`` upstream and ``Right`` downstream, a row per setting.
+#
+# PWM [us], thrust [g: gram-force], torque [Nm, its sign is the sense of rotation], voltage, current and optical speed
+# per side, in these units where the heading states no other (IEEE 9720993, An Open-Source Benchmarking Platform for
+# Coaxial Rotor Systems). If only one side turned, its columns get the plain names; two that turned keep ``left`` and
+# ``right``. The first row is read before the tare: its loads are left out.
+
+COAXIAL_STAND = "coaxial_stand"
+_SIDES = ("left", "right")
+_COAXIAL_STAND_COLUMNS = {
+    "PWM": ("pulse_width", "us"), "Thrust": ("thrust", "gf"), "Torque": ("torque", "Nm"), "Voltage": ("voltage", "V"),
+    "Current": ("current", "A"), "Speed": ("", "rpm"),
+}  # fmt: skip
+_HEAD = re.compile(r"(PWM|Thrust|Torque|Voltage|Current|Speed) (Left|Right)(?: \[[^\]]*\])?")
+_DIAMETER = re.compile(r"(?:^|_)(\d+(?:\.\d+)?)in_")
+
+
+def sniff_coaxial_stand(head: bytes | str) -> bool:
+    r"""Tell whether the first line names both sides of this stand.
+
+    >>> sniff_coaxial_stand("PWM Left,PWM Right,Thrust Left [g],Thrust Right [g],Speed Left [rpm],Speed Right [rpm]\n")
+    True
+    """
+    found = {m.groups() for c in first_cells(head) if (m := _HEAD.fullmatch(c))}
+    return {(what, side) for what in ("PWM", "Thrust", "Speed") for side in ("Left", "Right")} <= found
+
+
+def read_coaxial_stand(path: str | os.PathLike[str]) -> Dataset:
+    """Read a table."""
+    build = Builder.of_stand(path, COAXIAL_STAND)
+    for k, text in enumerate(build.table.headings):
+        if found := _HEAD.fullmatch(text.strip()):
+            name, unit = _COAXIAL_STAND_COLUMNS[found[1]]
+            build.add_usual(k, f"{name}_{found[2].lower()}".lstrip("_"), unit)
+        elif re.fullmatch(r"Time(?: \[[^\]]*\])?", text.strip()):
+            build.add_usual(k, "time", "s")
+    build.check()
+    needed = [f"{k}_{side}_{unit}" for k, unit in (("pulse_width", "s"), ("thrust", "N")) for side in _SIDES]
+    for name in (*needed, *(f"{side}_rpm" for side in _SIDES)):
+        if name not in build.channels:
+            build.fault(name, "an empty column", "numbers")
+    build.check()
+    _tare_row(build)
+    for side in _SIDES:
+        _turned_positive(build, side)
+    left, right = (build.channels[f"{s}_rpm"].values for s in _SIDES)
+    turned = [s for s, v in zip(_SIDES, (left, right), strict=True) if np.nan_to_num(v).max(initial=0.0) > 0.0]
+    if len(turned) == 2:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            build.channels["speed_ratio"] = Channel(np.where(left > 0.0, right / left, np.nan), "-")
+    if len(turned) == 1:
+        _plain(build, turned[0])
+        build.warnings.append(f"only the {turned[0]} rotor turned: its columns have the plain names")
+    else:
+        build.warnings.append("both rotors turned: choose one with rotor=left (upstream) or rotor=right (downstream)")
+    build.warnings.append("air density is not in the file")
+    build.flag_time()
+    build.check_magnitudes()
+    told = _DIAMETER.search(Path(build.table.source.name).name)
+    constants = {"diameter_m": float(told[1]) * units.INCH} if told else None
+    return build.finish({"stand": "New Dexterity coaxial platform"}, constants=constants)
+
+
+def _tare_row(build: Builder) -> None:
+    """Leave out the loads of the first row, which is read before the zero is taken."""
+    pulses = [build.channels[f"pulse_width_{s}_s"].values for s in _SIDES]
+    if not all(p.size > 2 and p[0] <= 1.0005e-3 for p in pulses):
+        return
+    for name, channel in build.channels.items():
+        if name.startswith(("thrust_", "torque_")) or name.endswith("_rpm"):
+            values = channel.values.copy()
+            values[0] = np.nan
+            build.channels[name] = Channel(values, channel.unit)
+    build.flag([0], "read before the tare", "; its loads and speeds are left out")
+
+
+def _turned_positive(build: Builder, side: str) -> None:
+    """Torque of the sense in which a rotor turned, positive."""
+    name = f"torque_{side}_Nm"
+    values = build.at(name)
+    if values is not None and np.nansum(values) < 0.0:
+        build.channels[name] = Channel(-values, build.channels[name].unit)
+        build.warnings.append(f"{name}: the sign, which is the sense of rotation here, was turned")
+
+
+def _plain(build: Builder, side: str) -> None:
+    """Columns of the rotor that turned under plain names."""
+    other = next(s for s in _SIDES if s != side)
+    for name in list(build.channels):
+        parts = name.split("_")
+        if other in parts:
+            del build.channels[name], build.headings[name]
+        elif side in parts:
+            build.rename(name, "_".join(p for p in parts if p != side))
+
+
+# Tables of Drive Calculator: propellers as power laws of the speed, and motor points.
+#
+# Propellers (``myid,tbs,Name,Dia,Pitch,a,b,...,c,d,...,n10N,n100W,...``): static thrust [gf] = a (n/1000)^b and shaft
+# power [W] = c (n/1000)^d with n in rev/min; Dia and Pitch in inches. The headings name no units, but the table proves
+# those of thrust and power itself: ``n10N`` and ``n100W`` are the speeds at 10 N and 100 W. Rows where they disagree
+# are flagged. The laws are fits of others' measurements at the altitude and temperature beside them, not measurements.
+#
+# Motor points (``id,motor_id,motor,...,U_V,n_rpm,I_A,...``) name most units in their headings.
+
+DRIVECALC = "drivecalc"
+_PROPELLERS = {"Name", "Dia", "Pitch", "a", "b", "c", "d", "n10N", "n100W"}
+_POINTS = {"motor_id", "motor", "kV", "Rm", "U_V", "n_rpm", "I_A", "no_load"}
+_KNOWN = {
+    "Dia": ("diameter", "in"), "Pitch": ("pitch", "in"), "a": ("thrust_law", "gf"), "c": ("power_law", "W"),
+    "AltThr": ("thrust_altitude", "m"), "TmpThr": ("thrust_temperature", "C"), "MaxRPM": ("max", "rpm"),
+    "AltPwr": ("power_altitude", "m"), "TmpPwr": ("power_temperature", "C"), "n10N": ("at_10_N", "rpm"),
+    "n100W": ("at_100_W", "rpm"), "b": ("thrust_exponent", "-"), "d": ("power_exponent", "-"),
+}  # fmt: skip
+
+
+def sniff_drivecalc(head: bytes | str) -> bool:
+    r"""Tell whether the first line has the headings of one of the two tables.
+
+    >>> sniff_drivecalc("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff_drivecalc("Name,Dia,Pitch\n")
+    (True, False)
+    """
+    cells = first_cells(head)
+    return cells >= _PROPELLERS or cells >= _POINTS
+
+
+def read_drivecalc(path: str | os.PathLike[str]) -> Dataset:
+    """Read one of the two tables."""
+    build = Builder(split_table(load_text(path), header=True), DRIVECALC, kind="table")
+    propellers = set(build.table.headings) >= _PROPELLERS
+    for k, text in enumerate(build.table.headings):
+        own = known(text, *_KNOWN[text]) if text in _KNOWN else replace(heading(text), unit=None, doubt="", told="")
+        build.add(k, own if propellers else heading(text))
+    if propellers and not build.faults:
+        _check(build, "thrust_law_N", "thrust_exponent", "at_10_N_rpm", 10.0)
+        _check(build, "power_law_W", "power_exponent", "at_100_W_rpm", 100.0)
+        build.warnings.append("power laws fitted to measurements of others (columns srcThr, srcPwr), no measurements")
+    elif not build.faults:
+        build.warnings.append("kV [(rev/min)/V] and Rm [ohm] carry no unit in this table")
+        build.flag_speeds("rpm")
+    return build.finish({"program": "Drive Calculator", "form": "propellers" if propellers else "motor points"})
+
+
+def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> None:
+    """Hold a law against the speed at which the table says that it gives the target."""
+    if not {law, exponent, at} <= build.channels.keys():
+        return
+    a, b, n = (build.channels[name].values for name in (law, exponent, at))
+    with np.errstate(over="ignore", invalid="ignore"):
+        ratio = a * np.clip(n, 0.0, None) ** b / 1000.0**b / target
+    used = np.isfinite(ratio) & (a > 0) & (n > 0)
+    build.flag(np.flatnonzero(used & (np.abs(ratio - 1.0) > 0.02)), f"{law} disagrees with {at}")
+    build.flag(np.flatnonzero(np.isfinite(a) & ~used), f"{law} or {at} is 0: no law")
+    if np.any(used):
+        share = float(np.mean(np.abs(ratio[used] - 1.0) <= 0.02))
+        text = f"{law}: {100 * share:.1f} % of {np.count_nonzero(used)} rows agree with {at} within 2 %"
+        build.warnings.append(text + ("" if share > 0.5 else ": its unit is in doubt"))
+
+
+READERS = (
+    Reader(JMAJEW, sniff_jmajew, read_jmajew),
+    Reader(COAXIAL_STAND, sniff_coaxial_stand, read_coaxial_stand),
+    Reader(DRIVECALC, sniff_drivecalc, read_drivecalc),
+)
