@@ -204,6 +204,9 @@ def _next(
 ) -> suggestion.Suggestion:
     """What settles the question, and what to type then."""
     chosen = _settling(found, decision, best)
+    if not chosen.kind and decision.verdict == "named":  # nothing is open: into the case with it
+        return replace(chosen, text="no further run is needed; write the case with it",
+                       commands=(f"{given.command()} --out improved",))  # fmt: skip
     other = chosen.otherwise
     if other is not None:
         other = replace(other, commands=_commands(other, given))

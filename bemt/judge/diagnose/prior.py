@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemt.judge.compare.drive_laws import PRIOR as DRIVE
-from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.compare import drive_laws
+from bemt.judge.diagnose import record
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects.duct import DuctEffect
@@ -78,7 +78,7 @@ def present(problem: Problem) -> set[str]:
 
 def kinds(problem: Problem) -> Mapping[str, float]:
     """Prior of the kinds of explanation: a drive shows in the speed alone."""
-    return DRIVE if np.all(problem.channel == CHANNELS.index("rpm")) else PRIOR
+    return drive_laws.PRIOR if np.all(problem.channel == record.CHANNELS.index("rpm")) else PRIOR
 
 
 def log_priors(
