@@ -13,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.balance import axes_of, directions
-from bemt.tools.flight.decision import GATE, NAMED
+from bemt.tools.flight.balance import ALARM, LARGEST, axes_of, directions
 from bemt.tools.flight.log import FlightLog
 
 _BLOCK_S, _EDGE_S, _BATCHES, _LONGEST = 0.5, 1.0, 10, 600  # block; least time on both sides [s]; batches; blocks
-_ALIKE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))  # chi squares that differ by less leave a name open
+_ALIKE = 2.0 * float(np.log(0.95 / 0.05))  # chi squares that differ by less leave a name open
 _SMALL = 0.05  # a change below this is not worth a word [1]
 
 
@@ -32,6 +31,7 @@ class FlightChange:
     # Change of that rotor's drive, over the whole flight for a growth, and the half width of its 95 % interval [1]
     size: float
     half: float
+    odds: tuple[float, ...] = ()  # Natural logarithm of the odds of each cause over no change [1]
 
 
 def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
@@ -62,7 +62,7 @@ def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
     z = change / np.sqrt(s2)
     T = d / length[:, None] @ z
     free = k * (_BATCHES - 1 - plain.shape[1])
-    bar = float(stats.t.ppf(1.0 - GATE / (len(ways) * (_BATCHES + 1)), free))
+    bar = float(stats.t.ppf(1.0 - ALARM / (len(ways) * (_BATCHES + 1)), free))
     i = int(np.argmax(T))
     misfit = float(z @ z) - T**2
     size, half = float(T[i] / length[i]), float(stats.t.ppf(0.975, free) / length[i])
@@ -70,8 +70,11 @@ def change_in(log: FlightLog, layout: Array | None) -> FlightChange | None:
     if T[i] < bar or size < _SMALL or misfit[i] > 0.25 * float(z @ z):
         return None
     order = np.argsort(misfit)
-    alike = tuple(list(ways)[j] for j in order if T[j] > 0.0 and misfit[j] - misfit[i] < _ALIKE)
-    return FlightChange(kind, at, alike, size, half)
+    near = [j for j in order if T[j] > 0.0 and misfit[j] - misfit[i] < _ALIKE]
+    # Student's density of what is left, times the share of the sizes and of the independent times that fit.
+    tried = np.log(np.sqrt(2.0 * np.pi) / (length * LARGEST)) - np.log(_BATCHES + 1)
+    odds = 0.5 * (free + k) * (np.log1p(float(z @ z) / free) - np.log1p(misfit / free)) + tried
+    return FlightChange(kind, at, tuple(list(ways)[j] for j in near), size, half, tuple(float(odds[j]) for j in near))
 
 
 def _regressed(y: Array, X: Array) -> tuple[Array, float, float]:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.decision import GATE
+from bemt.tools.flight.balance import ALARM
 from bemt.tools.flight.log import FlightLog
 
 _SCATTER, _FREE, _EXPONENT, _U_EXPONENT = 0.011, 4, 0.5, 0.2
@@ -37,7 +37,7 @@ def speed_changes(log: FlightLog, healthy: Sequence[FlightLog]) -> tuple[tuple[i
     free = _FREE + (n - 1) * (B - 1)
     square = (_FREE * _SCATTER**2 + float(np.sum((past - past.mean(axis=0)) ** 2))) / free * (1.0 + 1.0 / n)
     change, moved = mine[0] - past.mean(axis=0), mine[1] - commands.mean(axis=0)
-    bar = float(stats.t.ppf(1.0 - GATE / (2 * B), free))
+    bar = float(stats.t.ppf(1.0 - ALARM / (2 * B), free))
     sd = np.sqrt(square + (_U_EXPONENT * moved) ** 2)
     repaired = {s.motor - 1 for one in (log, *healthy) for s in one.sensors}
     return tuple((k, float(change[k])) for k in range(B) if abs(change[k]) > bar * sd[k] and k not in repaired)

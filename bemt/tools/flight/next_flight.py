@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.tools.flight.balance import BLADE, WEIGHT, WIND
-from bemt.tools.flight.decision import Decision
-from bemt.tools.flight.rules import DAYS
+from bemt.judge.explanation import Explanation
+from bemt.judge.loss import Decision
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
 
 _HOVER = "hover 30 s in still air and judge that flight"
 
@@ -24,7 +24,7 @@ def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) 
         text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
     elif said.effects[:1] == (WIND,):
         text, kind = _HOVER, "run"
-    elif said.rule == DAYS:
+    elif said.verdict == "insufficient" and said.leading == Explanation.of(DAY):
         text, kind = "three flights of this day that are known to be healthy, with --healthy and --healthy-day same; " \
                      "else check propellers and arms by hand", "reference"  # fmt: skip
     elif given < 3 and said.verdict != "named":

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.tools.flight.balance import TRIM, TRIM_FREE, axes_of
-from bemt.tools.flight.decision import NAMED
 from bemt.tools.flight.layout import layout_of
 from bemt.tools.flight.log import FlightLog, SpeedSensor
 
@@ -33,6 +32,7 @@ __all__ = ["checked"]
 
 _COUNTS = tuple(Fraction(k, m) for k, m in ((1, 2), (1, 3), (2, 3), (1, 4), (3, 2), (2, 1), (3, 1)))
 """Blades seen over blades that pass: of two, three and four, and doubled edges."""
+_SURE = 0.95  # probability from which a sensor is at fault [1]
 _SHARE = 0.1  # flights whose sensor of one given motor is at fault, beforehand: an assumption [1]
 _OTHER = 0.02  # of these, readings that are no such fraction: a counter counts [1]
 _SICK, _SICK_SHARE = 0.35, 0.1  # range of log speed over drive that a fault of blade or motor reaches, and its share
@@ -113,7 +113,7 @@ def _reading(reading: Array, root: Array, u: Array, placed: Array | None, refere
             logs[count] = float(v.max() + np.log(np.sum(np.exp(v - v.max())) * (_GRID[1] - _GRID[0])))
         top = max(logs.values())
         evidence = top + float(np.log(sum(np.exp(v - top) for v in logs.values())))
-        if np.exp(logs[Fraction(1)] - evidence) < 1.0 - NAMED:
+        if np.exp(logs[Fraction(1)] - evidence) < 1.0 - _SURE:
             best = max(over, key=lambda f: logs[f])
             # The level is the mean over all ways to be at fault.
             weight = np.sum([np.exp(v - logs[best]) for v in over.values()], axis=0)
