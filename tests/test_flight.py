@@ -19,18 +19,16 @@ from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.propeller import rotor_of
 from bemt.tools.flight.answer import FlightAnswer, answer_on
-from bemt.tools.flight.balance import axes_of, blade, features
+from bemt.tools.flight.balance import BUILD, axes_of, blade, features
 from bemt.tools.flight.change import change_in
-from bemt.tools.flight.decision import decide
 from bemt.tools.flight.identify import identify
 from bemt.tools.flight.inflow import inflow
-from bemt.tools.flight.judge import judge, weighed
+from bemt.tools.flight.judge import judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.mass import mass_faults
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
-from bemt.tools.flight.rules import BUILD, RULES
 from bemt.tools.flight.simulator import motor_lag, simulator_constants
 from bemt.tools.flight.wind import wind
 
@@ -156,7 +154,7 @@ def test_healthy_flights_are_accused_as_rarely_as_stated(rotors: int) -> None:
     hits, unlike = 0, np.array([0.4, 1.7, 0.8])
     for _ in range(200):
         spread = 0.01 * (rng.normal(size=(7, 3)) * unlike) @ np.linalg.pinv(axes_of(layout, rotors)).T
-        hits += decide(weighed(spread[0], spread[1:], layout, 0.01)[0], RULES).verdict != "none"
+        hits += posterior(spread[0], spread[1:], layout).said.verdict != "none"
     assert hits <= 8
 
 
@@ -350,7 +348,7 @@ def test_recorded_cuts_moved_to_two_motors(shared_data: Path) -> None:
         if a == b:
             continue
         x = calm.mean(axis=0) + np.roll(one, a - 2) + np.roll(other, b - 2)
-        said = decide(weighed(x, calm, layout, 0.01)[0], RULES)
+        said = posterior(x, calm, layout).said
         cut = {blade(a + 1), blade(b + 1)}
         assert said.verdict != "named" or set(said.effects) == cut
         both, tried = both + (cut <= set(said.effects)), tried + 1

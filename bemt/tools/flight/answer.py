@@ -154,9 +154,9 @@ def answer_on(
     """Identify and judge one flight, with healthy flights of the same vehicle.
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
-    `stated_days` and `day` are as :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have another number of rotors, or the
-    layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a mass
-    cannot have flown.
+    `stated_days` and `day` are as :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have
+    another number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
+    mass cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
     if log.rotors and others:

@@ -38,8 +38,8 @@ from bemt.tools.flight.layout import effect_matrix
 from bemt.tools.flight.log import FlightLog
 
 __all__ = [
-    "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight", "axes_of",
-    "blade", "differ", "directions", "features", "healthy_flight",
+    "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
+    "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
 ]  # fmt: skip
 
 ALARM = 0.01

@@ -1,9 +1,10 @@
 """Evidence of a cause in the balance: Student's density of what it leaves, over all sizes that it may have.
 
 Readings z are in units of the standard deviation of a healthy flight; a cause of size s moves them by s d. Sizes are
-alike beforehand from 0 to :data:`bemt.tools.flight.balance.LARGEST`. Along a line Student's density is Student's again
-(Kotz and Nadarajah 2004, Multivariate t Distributions and Their Applications, ch. 1; not checked), so the integral over
-the sizes is exact.
+alike beforehand from 0 to :data:`bemt.tools.flight.balance.LARGEST`; what healthy flights hide is part of nothing.
+Along a line Student's density is Student's again (Kotz and Nadarajah 2004, Multivariate t Distributions and Their
+Applications, ch. 1; not checked), so the integral over the sizes of one cause is exact, and that of two a mean over
+quantiles of one of them.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ __all__ = ["SMALL", "FlightEvidence", "Readings"]
 
 SMALL = 0.05
 """Change of a rotor's drive below which a cause is nothing to look for: not worth a word [1]."""
+_HIDDEN = 2.0  # standard deviations of a size between healthy flights up to which they hide it
 _ALONG = 100.0  # condition number from which two rotors load the body along one line
 _ALIKE = 0.5  # pairs whose rotors lost the same, as in one crash; the others are independent (declared) [1]
 _NODES = (np.arange(24) + 0.5) / 24
@@ -32,7 +34,7 @@ class FlightEvidence:
     # Change of that rotor's drive (of two, of the smaller one), and half the width of its 95 % interval [1]
     size: float
     half: float
-    # Natural logarithm of its density, and of the part of it below SMALL, which is nothing of weight
+    # Natural logarithm of its density, and of the part of it that healthy flights hide
     log: float
     log_small: float = float("-inf")
 
@@ -64,8 +66,8 @@ class Readings:
         width = float(np.sqrt((self.free + left) / (m * square)))
         whole = self.density(left) + np.log(width * np.sqrt(m * np.pi) / LARGEST)
         whole += gammaln(0.5 * m) - gammaln(0.5 * (m + 1.0))
-        small, large = (_within(m, (low - best) / width, (high - best) / width)
-                        for low, high in ((0.0, SMALL), (SMALL, LARGEST)))  # fmt: skip
+        limit = min(max(SMALL, _HIDDEN / np.sqrt(square)), LARGEST)
+        small, large = (_within(m, best, width, low, high) for low, high in ((0.0, limit), (limit, LARGEST)))
         return FlightEvidence(best, float(stdtrit(m, 0.975) * width), float(whole + np.log(large)),
                               float(whole + np.log(small)))  # fmt: skip
 
@@ -82,25 +84,25 @@ class Readings:
         m = self.free + self.z.size - 2.0
         spread = inverse * (self.free + left) / m
         u = np.sqrt(np.diag(spread))
-        low, high = (stdtr(m, (s - best[1]) / u[1]) for s in (SMALL, LARGEST))
-        part = _within(m, (SMALL - best[1]) / u[1], (LARGEST - best[1]) / u[1])
+        part = _within(m, best[1], u[1], SMALL, LARGEST)
+        low, high = (stdtr(m, (v - best[1]) / u[1]) for v in (SMALL, LARGEST))
         v = stdtrit(m, np.clip(low + (high - low) * _NODES, 1e-12, 1.0 - 1e-12))
-        at = best[0] + spread[0, 1] / u[1] * v
         rest = spread[0, 0] - spread[0, 1] ** 2 / spread[1, 1]
         width = np.sqrt(rest * (m + v**2) / (m + 1.0))
-        inside = float(np.mean(_within(m + 1.0, (SMALL - at) / width, (LARGEST - at) / width)))
-        area = np.log(2.0 * np.pi * u[1] * np.sqrt(rest) / LARGEST**2)
-        free = self.density(left) + float(area + np.log(max(part * inside, _LEAST)))
+        inside = _within(m + 1.0, best[0] + spread[0, 1] / u[1] * v, width, SMALL, LARGEST).mean()
+        area = 2.0 * np.pi * u[1] * np.sqrt(rest) / LARGEST**2
+        free = self.density(left) + float(np.log(area * part * inside + _LEAST))
         same = self.one(a + b).log
         k = int(np.argmin(best))
         return FlightEvidence(float(best[k]), float(stdtrit(m, 0.975) * u[k]),
                               float(np.logaddexp(np.log(1.0 - _ALIKE) + free, np.log(_ALIKE) + same)))  # fmt: skip
 
 
-def _within(free: float, low: Array | float, high: Array | float) -> Array:
-    """Probability of Student's variable between two values, exact in both tails."""
+def _within(free: float, best: Array | float, width: Array | float, low: float, high: float) -> Array:
+    """Probability of Student's variable about `best` between two values, exact in both tails."""
     from scipy.special import stdtr
 
-    turn = np.asarray(low) > 0.0
-    a, b = np.where(turn, -np.asarray(high), low), np.where(turn, -np.asarray(low), high)
+    a, b = (low - np.asarray(best)) / width, (high - np.asarray(best)) / width
+    turn = a > 0.0
+    a, b = np.where(turn, -b, a), np.where(turn, -a, b)
     return np.maximum(np.asarray(stdtr(free, b) - stdtr(free, a), dtype=float), _LEAST)

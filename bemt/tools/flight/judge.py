@@ -1,4 +1,4 @@
-"""What is wrong with a flight: one posterior and the table of costs of the diagnosis, on the balance of a body in the air.
+"""What is wrong with a flight: one posterior, and the costs of the diagnosis, on the balance of a body in the air.
 
 Explanations: nothing; a damaged blade, or two; a weight; wind where the log shows it; another day than the healthy
 flights; an uneven build, where there are none; flights that scatter more than those of other vehicles; something
@@ -133,7 +133,7 @@ def judge(
 
 
 def _visible(calm: Array, layout: Array | None, days: Array, day: int | None | str) -> float:
-    """Smallest change of one rotor's drive from which each would be said, by a flight that is healthy but for it [1]."""
+    """Smallest change of one rotor's drive from which any would be said, in a flight that is healthy but for it [1]."""
     B = calm.shape[1]
     ways, axes = directions(B, layout), axes_of(layout, B)
     D = np.array([axes @ ways[blade(k + 1)] for k in range(B)])
@@ -241,7 +241,7 @@ def posterior(
                 add(e, p, w.log + r.density(still, float(np.sum(free[:2]))), seen[e])
             elif e.pair:
                 v = r.two(*(D[i] for i in names))
-            elif names[0] in D:
+            elif names[0] in D and np.any(D[names[0]]):
                 v = r.one(D[names[0]])
             if e in (Explanation.of(i) for k in beside.shaken for i in (_shaking(k), _worn(k))):
                 # What shakes need not move the balance.
@@ -258,7 +258,7 @@ def posterior(
     logs = {e: float(np.logaddexp.reduce(v)) for e, v in weight.items()}
     top = float(np.logaddexp.reduce(list(logs.values())))
     P = {e: float(np.exp(v - top)) for e, v in logs.items()}
-    said = _said(decide(P), P, n)
+    said = _said(decide(P, still=frozenset(ELSEWHERE)), P, n)
     return Posterior(P, {e: v for e, (_, v) in found.items()}, said, float(np.sqrt(np.sum(worlds[0].sd ** 2))))
 
 
@@ -294,25 +294,27 @@ def _factors(of: Sequence[Explanation], beside: BesideBalance) -> dict[Explanati
 def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decision:
     """The decision in the words of a flight: faults first, and no claim that names none."""
     faults = [i for i in said.effects if i not in ELSEWHERE]
-    elsewhere = tuple(i for i in said.effects if i in ELSEWHERE)
-    if said.verdict in CLAIMS and faults:
+    if said.verdict in CLAIMS:
         sets = tuple(tuple(sorted(s, key=ELSEWHERE.__contains__)) for s in said.sets)
         lead = said.leading if any(i in faults for i in said.leading) else Explanation.of(faults[0])
         weights = [i for i in faults if i.startswith(f"{WEIGHT}between")]
         why = said.why
         if said.verdict == "class" and weights and sum(i.startswith(BLADE) for i in faults) > 1:
             why = "a weight between two rotors and damage to both of them load the body alike"
-        return replace(said, effects=(*faults, *elsewhere), sets=sets, leading=lead, why=why)
+        return replace(
+            said, effects=(*faults, *(i for i in said.effects if i in ELSEWHERE)), sets=sets, leading=lead, why=why
+        )
     if said.verdict == "unknown":
         return replace(said, why="the balance moved, but not as one or two rotors or one weight move it")
-    if said.verdict == "none":
-        return replace(said, why="no more than healthy flights differ")
+    elsewhere = max((Explanation.of(i) for i in ELSEWHERE), key=lambda e: P.get(e, 0.0))
+    nothing = P.get(NONE, 0.0)
+    if said.verdict == "none" and nothing >= P.get(elsewhere, 0.0):
+        return replace(said, probability=nothing, why="no more than healthy flights differ")
     said = replace(said, verdict="insufficient", effects=(), sets=())
-    if given and P.get(Explanation.of(DAY), 0.0) >= max(v for e, v in P.items() if e.ids or e.smooth):
-        return replace(said, leading=Explanation.of(DAY), why="the shares moved as they do from one day to another; "
-                       "three healthy flights of the same day would tell")  # fmt: skip
-    if given < 3:
-        known = "in healthy vehicles" if not given else "these few healthy flights allow"
-        why = f"no motor stands out by more than {known}; give three or more healthy flights with --healthy"
+    if elsewhere == Explanation.of(DAY) and P.get(elsewhere, 0.0) >= max(v for e, v in P.items() if e != UNKNOWN):
+        why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
+        return replace(said, leading=elsewhere, why=why)
+    if not given:
+        why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
         return replace(said, why=why)
     return said

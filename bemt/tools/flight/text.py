@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bemt.tools.flight.answer import FlightAnswer
 from bemt.judge.loss import Decision
+from bemt.tools.flight.answer import FlightAnswer
 from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIDE, WIND
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
