@@ -26,7 +26,10 @@ from bemt.tools.flight.balance import (
     DAY,
     IMBALANCE,
     LARGEST,
+    LOADED,
     SCATTER,
+    TOTAL,
+    TOTAL_FREE,
     WEAK,
     WEIGHT,
     WIDE,
@@ -48,6 +51,7 @@ ELSEWHERE = (DAY, BUILD, WIDE)
 _USUAL = 50.0  # weight of wind where the log shows it beside 1 for every fault: it is there in most flights [1]
 _WIDER, _ODD = 3.0, 0.1  # a vehicle out of the common: factor of its scatter, and how many are (declared) [1]
 _SEEN = 0.5  # faults of a rotor that a speed at its drive or an accelerometer shows (declared) [1]
+_LOADED = 0.5  # flights whose mass, battery or air is another, so their total drive tells nothing (declared) [1]
 _OPEN = 0.5  # flights that are of another day, and healthy flights that are of many, where nobody says [1]
 
 
@@ -165,6 +169,7 @@ class _World:
     sd: Array
     free: float
     usual: bool = True  # Whether causes are tried in it
+    total: float = float("inf")  # Standard deviation of the total drive; infinite where it is not asked [1]
 
 
 def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None | str) -> list[_World]:
@@ -189,7 +194,16 @@ def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None 
         more = differ(calm, axes, known, _WIDER * SCATTER) - differ(calm, axes, known)
         top = max(v.log for v in here)
         here.append(_World(top + np.log(_ODD) + more, Explanation.of(WIDE), w.mean, w.sd, w.free, False))
-    return here
+    return [part for w in here for part in _totals(w, calm)]
+
+
+def _totals(w: _World, calm: Array) -> list[_World]:
+    """The same where the total drive repeats as between flights, and where mass, battery or air are others."""
+    n, totals = len(calm), calm.mean(axis=1)
+    square = (float(np.sum((totals - totals.mean()) ** 2)) + TOTAL_FREE * TOTAL**2) / (n - 1 + TOTAL_FREE)
+    square *= 1.0 + 1.0 / n
+    return [replace(w, log=w.log + float(np.log(share)), total=float(np.sqrt(square + more**2)))
+            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
 
 
 def posterior(
@@ -226,19 +240,23 @@ def posterior(
         weight.setdefault(e, []).append(float(np.log(p)) + log + factor)
 
     for w in worlds:
-        r = Readings((flight @ axes.T - w.mean) / w.sd, w.sd, w.free)
+        total, sd, z = np.isfinite(w.total), w.sd, (flight @ axes.T - w.mean) / w.sd
+        if total:
+            sd, z = np.append(sd, w.total), np.append(z, (flight.mean() - calm.mean()) / w.total)
+        r = Readings(z, sd, w.free)
         chi2 = float(r.z @ r.z)
         add(w.still, PRIOR["none"], w.log + r.density(chi2), seen[NONE])
         if not w.usual:
             continue
-        D = {name: axes @ way / w.sd for name, way in ways.items()}
+        D = {name: np.append(axes @ way, [way.mean()] * int(total)) / sd for name, way in ways.items()}
         scale = np.sqrt(np.mean([D[i] ** 2 for i in blades], axis=0) * LARGEST**2 / 3.0)
         free = 0.5 * np.log1p(scale**2)
         for e, p in prior.items():
             names, v = [_as_blade(i) for i in e], None
             if e == Explanation.of(WIND):
-                still = float(r.z[2] ** 2) if known and r.z.size == 3 else 0.0
-                add(e, p, w.log + r.density(still, float(np.sum(free[:2]))), seen[e])
+                # Wind tilts the body and loads it; of yaw it knows nothing.
+                yaw = np.arange(z.size) == 2 if known and len(axes) == 3 else np.zeros(z.size, dtype=bool)
+                add(e, p, w.log + r.density(float(np.sum(z[yaw] ** 2)), float(np.sum(free[~yaw]))), seen[e])
             elif e.pair:
                 v = r.two(*(D[i] for i in names))
             elif names[0] in D and np.any(D[names[0]]):
