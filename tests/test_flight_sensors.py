@@ -143,18 +143,6 @@ def test_recorded_flights_of_another_day(shared_data: Path) -> None:
             assert both <= set(judge(x, [*calm, *small.values()], layout, days=days, day=1).said.effects), name
 
 
-def test_recorded_cuts_stay_visible_when_the_day_is_open(shared_data: Path) -> None:
-    """E8: from 3 mm on motor 3 in eight of ten, another day beside it at most; no healthy flight accused."""
-    flights, layout, found = by_name(shared_data / "flight_logs" / "crazypad_E8"), layout_of("crazyflie", 4), 0
-    calm = [x for name, x in flights.items() if name.startswith("normal")]
-    large = ("cut_propeller_M3_3mm", "cut_propeller_M3_1.5mm_", "cut_propeller_M3_2mm_", "cut_propeller_M3_4mm_")
-    for name, x in flights.items():
-        said = judge(x, calm, layout, day="").said
-        assert not said.effects or said.effects[0] == "damaged blade, motor 3", name
-        found += name.startswith(large) and "damaged blade, motor 3" in said.effects
-    assert found >= 8
-
-
 def test_sessions_shape_the_prediction() -> None:
     """Within a session a flight is predicted closely, in another as wide as sessions differ, by prior and by data."""
     rng, axes = np.random.default_rng(2), axes_of(layout_of("quad-x", 4), 4)

@@ -105,4 +105,5 @@ def _within(free: float, best: Array | float, width: Array | float, low: float, 
     a, b = (low - np.asarray(best)) / width, (high - np.asarray(best)) / width
     turn = a > 0.0
     a, b = np.where(turn, -b, a), np.where(turn, -a, b)
-    return np.maximum(np.asarray(stdtr(free, b) - stdtr(free, a), dtype=float), _LEAST)
+    inside: Array = np.maximum(np.asarray(stdtr(free, b) - stdtr(free, a), dtype=float), _LEAST)
+    return inside

@@ -50,6 +50,7 @@ ELSEWHERE = (DAY, BUILD, WIDE)
 """Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
 _USUAL = 50.0  # weight of wind where the log shows it beside 1 for every fault: it is there in most flights [1]
 _WIDER, _ODD = 3.0, 0.1  # a vehicle out of the common: factor of its scatter, and how many are (declared) [1]
+_UNEVEN = 0.5  # the same of the build, where four vehicles are all that is known (declared) [1]
 _SEEN = 0.5  # faults of a rotor that a speed at its drive or an accelerometer shows (declared) [1]
 _LOADED = 0.5  # flights whose mass, battery or air is another, so their total drive tells nothing (declared) [1]
 _OPEN = 0.5  # flights that are of another day, and healthy flights that are of many, where nobody says [1]
@@ -174,10 +175,12 @@ class _World:
 
 def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None | str) -> list[_World]:
     """Predictions of a healthy flight: of this day or another, of flights that differ as usual or more."""
-    p = healthy_flight(calm, axes, known, days, int(days[-1]) if isinstance(day, str) and len(days) else day)
+    label = [int(v) for v in days]
+    latest = label[-1] if label else None
+    p = healthy_flight(calm, axes, known, label, latest if isinstance(day, str) else day)
     if not len(calm):
-        wide = _World(np.log(_ODD), Explanation.of(BUILD), p.mean, _WIDER * p.sd, p.free, False)
-        return [_World(np.log(1.0 - _ODD), Explanation.of(BUILD), p.mean, p.sd, p.free), wide]
+        wide = _World(np.log(_UNEVEN), Explanation.of(BUILD), p.mean, _WIDER * p.sd, p.free, False)
+        return [_World(np.log(1.0 - _UNEVEN), Explanation.of(BUILD), p.mean, p.sd, p.free), wide]
     here = [_World(0.0, NONE, p.mean, p.sd, p.free)]
     apart = _World(0.0, NONE if day is None else Explanation.of(DAY), p.other_mean, p.other_sd, p.other_free)
     if isinstance(day, str):
@@ -190,7 +193,7 @@ def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None 
         here = [replace(w, log=w.log + np.log(1.0 - _OPEN) + a) for w in here]
         here.append(_World(float(np.log(_OPEN) + b), NONE, q.mean, q.sd, q.free))
     if one:
-        w = healthy_flight(calm, axes, known, days, int(days[-1]), _WIDER * SCATTER)
+        w = healthy_flight(calm, axes, known, label, latest, _WIDER * SCATTER)
         more = differ(calm, axes, known, _WIDER * SCATTER) - differ(calm, axes, known)
         top = max(v.log for v in here)
         here.append(_World(top + np.log(_ODD) + more, Explanation.of(WIDE), w.mean, w.sd, w.free, False))
