@@ -106,7 +106,7 @@ class FlightAnswer:
             "decision": {"verdict": j.said.verdict, "effects": list(j.said.effects),
                          "probability": j.said.probability, "sets": [list(s) for s in j.said.sets],
                          "why": j.said.why, "expected_loss": dict(j.said.loss)},
-            "ranking": [{"effect": str(e), "probability": p, **(asdict(j.found[e]) if e in j.found else {})}
+            "ranking": [{"effect": str(e), "probability": p, **(j.found[e].document() if e in j.found else {})}
                         for e, p in sorted(j.probability.items(), key=lambda kv: -kv[1])[:12]],
             "next_measurement": j.next.document(),
             "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95),

@@ -38,6 +38,10 @@ class FlightEvidence:
     log: float
     log_small: float = float("-inf")
 
+    def document(self) -> dict[str, float]:
+        """What JSON gives of it."""
+        return {"size": self.size, "half": self.half}
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:
