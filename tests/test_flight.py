@@ -404,7 +404,7 @@ def test_recorded_flights_alone(shared_data: Path) -> None:
 
 
 @pytest.mark.xfail(
-    strict=True, reason="motor 3 leads with 0.4 to 0.5, and a claim asks for 0.9; an uneven build is 0.2"
+    strict=True, reason="an uneven build leads, motor 3 is next with 0.1 to 0.3, and a claim asks for 0.9"
 )
 def test_recorded_cuts_are_seen_alone(shared_data: Path) -> None:
     """Without any healthy flight, in three flights or more."""
