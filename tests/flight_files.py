@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.errors import InputError
 from bemt.tools.flight.answer import answer_on
-from bemt.tools.flight.log import LAYOUTS, effect_matrix, layout_of
+from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.tools.flight.read import read_log
 from bemt.tools.flight.text import text
 

@@ -118,8 +118,8 @@ MUTANTS = (
            "test_strangers.py -k stations"),
     Mutant("bemt/base/packed.py", "if cells > MAX_CELLS:", "if cells > 1e6 * MAX_CELLS:", "test_packed.py -k ods"),
     Mutant("bemt/tools/flight/px4.py", 'params.get("PWM_MIN", 1000.0)', '1000.0', "test_flight_autopilots.py -k pulse_widths"),
-    Mutant("bemt/tools/flight/sessions.py", "SCATTER = 0.007", "SCATTER = 0.07", "test_kernel_guards.py -k scatter"),
-    Mutant("bemt/tools/flight/sessions.py", "free = SCATTER_FREE + own", "free = own or 1", "test_kernel_guards.py -k scatter"),
+    Mutant("bemt/tools/flight/repeat.py", "SCATTER = 0.007", "SCATTER = 0.07", "test_kernel_guards.py -k scatter"),
+    Mutant("bemt/tools/flight/repeat.py", "free = SCATTER_FREE + own", "free = own or 1", "test_kernel_guards.py -k scatter"),
     # bands
     Mutant("bemt/rotors/validity.py", "SINK = 0.125", "SINK = 0.0", "test_kernel_guards.py -k sink"),
     Mutant("bemt/rotors/validity.py", "SINK * np.clip(sink, 0.0, 1.0) * loads", "SINK * loads", "test_kernel_guards.py -k sink"),

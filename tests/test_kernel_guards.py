@@ -23,7 +23,7 @@ from bemt.physics.effects.tip_gap import TipGap
 from bemt.physics.sections.polars import ALPHA_GRID
 from bemt.rotors import validity
 from bemt.rotors.case import load_case
-from bemt.tools.flight.sessions import flight_scatter
+from bemt.tools.flight.repeat import flight_scatter
 
 SPACE = kernel._source()
 """The functions of the kernel as plain Python."""

@@ -71,3 +71,13 @@ def test_the_page_states_the_costs(project: Path) -> None:
     for f in fields(loss.Costs):
         found = re.search(rf"^\| `{f.name}` \| ([\d./]+) \|", text, flags=re.M)
         assert found is not None and Fraction(found[1]) == Fraction(f.default).limit_denominator(100)
+
+
+def test_what_moves_the_readings_without_a_fault_is_no_cause() -> None:
+    """It is never a name; beside a fault it may stand in a class, and alone nothing is wrong."""
+    day, blade, still = Explanation.of("another day"), Explanation.of("blade"), frozenset({"another day"})
+    assert loss.decide({day: 0.9, blade: 0.1}, still=still).verdict == "none"
+    assert loss.decide({day: 0.5, blade: 0.5}, still=still).verdict == "insufficient"
+    both = loss.decide({day: 0.15, blade: 0.85}, still=still)
+    assert both.verdict == "class" and set(both.effects) == {"another day", "blade"}
+    assert loss.decide({day: 0.01, blade: 0.99}, still=still).effects == ("blade",)

@@ -59,19 +59,28 @@ class Decision:
     by: str = "model"
 
 
-def expected(said: frozenset[str], named: bool, P: Mapping[Explanation, float], c: Costs = COSTS) -> float:
+def expected(
+    said: frozenset[str], named: bool, P: Mapping[Explanation, float], c: Costs = COSTS,
+    still: frozenset[str] = frozenset(),
+) -> float:  # fmt: skip
     """Expected loss of a name or of a class."""
     total = 0.0
     for truth, p in P.items():
-        if truth.ids and not truth.smooth and (said == truth.ids if named else truth.ids <= said):
+        if truth.ids & still:
+            total += p * (c.half if truth.ids <= said else c.wrong)
+        elif truth.ids and not truth.smooth and (said == truth.ids if named else truth.ids <= said):
             total += p * c.member * (len(said) - len(truth.ids))
         else:
             total += p * (c.half if truth.ids & said else c.wrong)
     return total
 
 
-def decide(P: Mapping[Explanation, float], costs: Costs = COSTS) -> Decision:
-    """Answer of least expected loss.
+def decide(
+    P: Mapping[Explanation, float], costs: Costs = COSTS, still: frozenset[str] = frozenset()
+) -> Decision:  # fmt: skip
+    """Answer of least expected loss; `still` are effects that move the readings where nothing is wrong.
+
+    These are no cause: they stand in a class beside one at most.
 
     Examples
     --------
@@ -85,22 +94,23 @@ def decide(P: Mapping[Explanation, float], costs: Costs = COSTS) -> Decision:
     none, unknown, doubt = (P.get(k, 0.0) for k in (NONE, UNKNOWN, DOUBT))
     listed = dict(sorted(((k, p) for k, p in P.items() if k.ids and p > _NOTHING), key=lambda kv: -kv[1]))
     counted = {**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}
-    cause = sum(listed.values())
+    moved = sum(p for k, p in listed.items() if k.ids & still)
+    cause, calm = sum(listed.values()) - moved, none + moved
     answers: dict[tuple[str, tuple[str, ...]], float] = {
         ("none", ()): c.missed * (cause + unknown) + c.wrong * doubt,
-        ("unknown", ()): c.phantom * none + c.missed * cause + c.wrong * doubt,
-        ("insufficient", ()): c.silent * (cause + unknown) + c.timid * none,
+        ("unknown", ()): c.phantom * calm + c.missed * cause + c.wrong * doubt,
+        ("insufficient", ()): c.silent * (cause + unknown) + c.timid * calm,
     }
-    for k in list(listed)[:_NAMES]:
-        answers["named", tuple(k)] = expected(k.ids, True, counted, c)
+    for k in [k for k in listed if not k.ids & still][:_NAMES]:
+        answers["named", tuple(k)] = expected(k.ids, True, counted, c, still)
     for pool in (listed, [k for k in listed if not k.pair]):
         members: tuple[str, ...] = ()
         for k in pool:
             members += tuple(i for i in k if i not in members)
             if len(members) > _MEMBERS:
                 break
-            if len(members) > 1:
-                answers["class", members] = expected(frozenset(members), False, counted, c)
+            if len(members) > 1 and not still.issuperset(members):
+                answers["class", members] = expected(frozenset(members), False, counted, c, still)
     verdict, said = min(answers, key=lambda k: answers[k])
     least: dict[str, float] = {}
     for (kind, _), v in answers.items():

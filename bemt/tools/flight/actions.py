@@ -92,7 +92,7 @@ class FlightsAnswer:
 
 def layouts() -> dict[str, str]:
     """Layouts by name: angle of each motor from ahead to the left [deg], with + for one that turns to the left."""
-    from bemt.tools.flight.log import LAYOUTS
+    from bemt.tools.flight.layout import LAYOUTS
 
     return dict(LAYOUTS)
 
@@ -110,7 +110,6 @@ def fly(
     healthy: Sequence[StrPath | Sequence[StrPath]] = (),
     healthy_day: Literal["same", "other", ""] = "",
     healthy_mass_kg: float | None = None,
-    false_alarm: float = 0.01,
     out_case: StrPath | None = None,
     picture: StrPath | None = None,
     out_csv: StrPath | None = None,
@@ -136,8 +135,6 @@ def fly(
         Whether the logs are of the last session of `healthy`, or of none; empty: by date, else it is left open.
     healthy_mass_kg : float
         Mass of the healthy flights [kg]: gives the mass of this one.
-    false_alarm : float
-        Accepted share of healthy flights that are accused [1], above 0 and below 0.5.
     out_case : path
         Folder for the case with the rotor as these flights show it; needs the mass.
     picture : path
@@ -165,8 +162,6 @@ def fly(
     faults = []
     if not given:
         faults.append(Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg"))
-    if not 0.0 < false_alarm < 0.5:
-        faults.append(Fault("", "false_alarm", f"{false_alarm:g}", "a probability above 0 and below 0.5"))
     if healthy_day not in ("", "same", "other"):
         faults.append(Fault("", "healthy_day", repr(healthy_day), "same, other, or nothing"))
     if out_case is not None and case is None:
@@ -190,7 +185,7 @@ def fly(
         days = [d for _, d in others] if stated else []
         try:
             answer = answer_on(found[path], [found[p] for p, _ in others], mass_kg, layout, healthy_mass_kg,
-                               false_alarm, days, day)  # fmt: skip
+                               days, day)  # fmt: skip
         except InputError as error:
             if not folder:
                 raise
@@ -252,7 +247,7 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
 
     from bemt.judge.diagnose.rotor_calibration import document, text, write
     from bemt.rotors.case.load import with_changes
-    from bemt.tools.flight.identify import learn_from_flights
+    from bemt.tools.flight.rotor_case import learn_from_flights
 
     files = [a.log.file for a in answers]
     from bemt.rotors.propeller import rotor_of

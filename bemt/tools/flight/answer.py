@@ -13,17 +13,23 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
+from bemt.judge.loss import Decision
 from bemt.tools.flight.balance import axes_of, features
-from bemt.tools.flight.decision import FlightDecision
+from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
-from bemt.tools.flight.inflow import Inflow, Wind, inflow, mass_faults, wind
-from bemt.tools.flight.judge import FALSE_ALARM, FlightVerdict, judge
-from bemt.tools.flight.log import FlightLog, layout_of
-from bemt.tools.flight.rules import BesideBalance, FlightChange, change_in
-from bemt.tools.flight.sessions import Sessions, flight_scatter, sessions
-from bemt.tools.flight.simulator import simulator_constants, thrust_curve
-from bemt.tools.flight.speed_sensor import checked, speed_changes
+from bemt.tools.flight.inflow import Inflow, inflow
+from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
+from bemt.tools.flight.layout import layout_of
+from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.mass import mass_faults
+from bemt.tools.flight.motor_speed import speed_changes
+from bemt.tools.flight.repeat import flight_scatter
+from bemt.tools.flight.sessions import Sessions, sessions
+from bemt.tools.flight.simulator import simulator_constants
+from bemt.tools.flight.speed_sensor import checked
+from bemt.tools.flight.thrust_curve import thrust_curve
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
+from bemt.tools.flight.wind import Wind, wind
 
 _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that may move the trim [m/s]
 _FULL = 0.98  # share of full drive that is a limit [1]
@@ -63,7 +69,7 @@ class FlightAnswer:
     # At the frequencies of the rotors
     vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
     shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.tools.flight.vibration.shaken` gives it
-    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.speed_sensor.speed_changes` gives it
+    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.motor_speed.speed_changes` gives it
     inflow: Inflow | None = None  # Thrust over the flow
     mass: Constant | None = None  # Mass from healthy flights of known mass [kg]
     predicted: Predicted | None = None  # The case in this flight
@@ -99,9 +105,8 @@ class FlightAnswer:
                 {"thrust_constant": said.constant, "u": said.u, "unit": "N/rpm^2"},
             "decision": {"verdict": j.said.verdict, "effects": list(j.said.effects),
                          "probability": j.said.probability, "sets": [list(s) for s in j.said.sets],
-                         "p_value": j.p_value, "left_over": j.said.left_over, "why": j.said.why,
-                         "rule": j.said.rule},
-            "ranking": [{"effect": str(e), "probability": p, **(asdict(j.found[e]) if e in j.found else {})}
+                         "why": j.said.why, "expected_loss": dict(j.said.loss)},
+            "ranking": [{"effect": str(e), "probability": p, **(j.found[e].document() if e in j.found else {})}
                         for e, p in sorted(j.probability.items(), key=lambda kv: -kv[1])[:12]],
             "next_measurement": j.next.document(),
             "error_rate": {"accused": j.accused, "healthy": j.healthy, "interval95": list(j.rate95),
@@ -143,17 +148,15 @@ def answer_on(
     mass_kg: float | None = None,
     layout: str = "",
     healthy_mass_kg: float | None = None,
-    false_alarm: float = FALSE_ALARM,
     stated_days: Sequence[str] = (),
     day: str = "",
 ) -> FlightAnswer:
     """Identify and judge one flight, with healthy flights of the same vehicle.
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
-    `false_alarm` is the accepted probability that a healthy flight is accused [1]; `stated_days` and `day` are as
-    :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have another number of rotors, or the
-    layout (as :func:`bemt.tools.flight.log.layout_of` takes it) does not fit, or a mass
-    cannot have flown.
+    `stated_days` and `day` are as :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have
+    another number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
+    mass cannot have flown.
     """
     others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
     if log.rotors and others:
@@ -176,7 +179,7 @@ def answer_on(
         why = "the log shows no flight with all motors running"
         if not log.rotors:
             why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
-        said = FlightDecision("insufficient", (), NONE, 1.0, float("nan"), why, "no flight")
+        said = Decision("insufficient", (), NONE, 1.0, why)
         step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
                "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
         judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
@@ -188,7 +191,7 @@ def answer_on(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
         )  # fmt: skip
-        judged = judge(mine, [x for x, _ in kept], placed, false_alarm, _windy(log, healthy, air), beside,
+        judged = judge(mine, [x for x, _ in kept], placed, _windy(log, healthy, air), beside,
                        [days.days[k] for _, k in kept], days.day)  # fmt: skip
     mass = None
     if healthy_mass_kg is not None and found.weight_per_drive is not None:

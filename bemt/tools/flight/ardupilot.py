@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.tools.flight.log import LAYOUTS, SPARSE, FlightLog, Source, Stretches, joined, layout_of, mixed
+from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined
 
 KIND = "ArduPilot DataFlash"
 _HEAD, _FORMATS, _FORMAT_SIZE, _CHUNK = b"\xa3\x95", 128, 89, 1 << 20

@@ -34,12 +34,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.log import FlightLog, effect_matrix
+from bemt.tools.flight.layout import effect_matrix
+from bemt.tools.flight.log import FlightLog
 
 __all__ = [
-    "BLADE", "DAY", "WEIGHT", "WIND", "HealthyFlight", "axes_of", "blade", "directions", "features", "healthy_flight",
+    "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
+    "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
 ]  # fmt: skip
 
+ALARM = 0.01
+"""Probability that a flag beside the balance (a speed, a shake, a change in flight) is raised where nothing is wrong
+[1]."""
+
+LARGEST = 0.5
+"""Change of a rotor's drive up to which sizes are alike beforehand: beyond, a motor has no more [1]."""
 SCATTER, SCATTER_FREE = 0.0075, 4
 """Standard deviation of a reading between flights of one vehicle [1], and the degrees of freedom it counts as."""
 TRIM = (0.012, 0.012, 0.060)
@@ -48,10 +56,15 @@ TRIM_FREE = 4
 """Vehicles behind it."""
 SESSION, SESSION_FREE = (0.012, 0.012, 0.022), 4
 """Standard deviation of roll, pitch and yaw between sessions of one vehicle [1], and its degrees of freedom."""
+TOTAL, TOTAL_FREE, LOADED = 0.015, 4, 0.1
+"""Standard deviation of the total drive between flights of one vehicle: CrazyPAD E9 0.4 % within a day and 1.5 % from
+day to day, E8 2.0 %; Crazyflies at equal voltage 0.3 to 0.8 %; the degrees of freedom that it counts as; and where
+mass, battery or air are others than in the healthy flights (declared) [1]."""
 BLADE, WEIGHT, WIND = "damaged blade, motor ", "weight ", "wind or forward flight"
+WEAK, IMBALANCE = "weak motor, bearing or controller, motor ", "imbalance or tape, "
 DAY = "another day than the healthy flights"
+BUILD, WIDE = "an uneven build of this vehicle", "flights of this vehicle differ more than usual"
 _COMMON = 6  # flights as which the common scatter weighs against that of a reading (docs/flight_logs.md)
-_DRAWS = 10_000
 
 
 def blade(motor: int) -> str:
@@ -86,7 +99,7 @@ def axes_of(layout: Array | None, rotors: int) -> Array:
 
 
 def directions(B: int, layout: Array | None) -> dict[str, Array]:
-    """Change of the log shares of each cause, (B,), for unit change of that rotor's drive."""
+    """Change of the logs of the drives by each cause, (B,), for unit change of that rotor's drive."""
     out = {blade(k + 1): np.eye(B)[k] for k in range(B)}
     if layout is not None:
         A = effect_matrix(layout)
@@ -102,7 +115,7 @@ def directions(B: int, layout: Array | None) -> dict[str, Array]:
         for i, j in _neighbours([motors[0] - 1 for motors in places.values()], layout[:, 0]):
             a, b = sorted((i + 1, j + 1))
             out[f"{WEIGHT}between motors {a} and {b}"] = level @ (A[:, i] + A[:, j]) / 2.0
-    return {cause: d - d.mean() for cause, d in out.items()}
+    return out
 
 
 def _neighbours(motors: list[int], angle: Array) -> list[tuple[int, int]]:
@@ -119,21 +132,21 @@ class HealthyFlight:
     # (k,) Of the readings [1]
     mean: Array
     sd: Array
-    draws: Array  # (D, k) From the prediction, less the mean, over sd [1]
     free: float  # Degrees of freedom behind sd
     # (k,) The same of a flight of another day [1]
     other_mean: Array
     other_sd: Array
+    other_free: float
 
 
 def healthy_flight(
-    calm: Array, axes: Array, known: bool, days: Sequence[int] = (), day: int | None = 0
+    calm: Array, axes: Array, known: bool, days: Sequence[int] = (), day: int | None = 0, usual: float = SCATTER
 ) -> HealthyFlight:
     """Predict the next healthy flight from the features (n, B) of none, one or more.
 
     `known`: whether the layout is known, so that the readings on the axes of :func:`axes_of` are roll, pitch and yaw.
     `days` numbers the session of each flight (all one where it is empty), `day` is that of the next flight; None: one
-    of none of them.
+    of none of them. `usual` is the standard deviation of a reading that other vehicles have [1].
     """
     n, k = len(calm), len(axes)
     x, label = calm @ axes.T, np.array(days if len(days) == n else [0] * n, dtype=int)
@@ -141,7 +154,7 @@ def healthy_flight(
     G = len(groups)
     own = sum((np.sum((g - g.mean(axis=0)) ** 2, axis=0) for g in groups), np.zeros(k))
     within = n - G if n else 0
-    common = (float(own.sum()) + SCATTER_FREE * SCATTER**2) / (k * within + SCATTER_FREE)
+    common = (float(own.sum()) + SCATTER_FREE * usual**2) / (k * within + SCATTER_FREE)
     free = within + _COMMON
     s2 = (own + _COMMON * common) / free
     trim, session = (np.array(v)[:k] if known and k == 3 else np.full(k, max(v)) for v in (TRIM, SESSION))
@@ -168,10 +181,22 @@ def healthy_flight(
     t2 = factor * session**2 if n else np.zeros(k)
     mean, var = predicted(s2, trim**2, t2, here)
     other_mean, other = predicted(s2, trim**2, t2, None)
-    rng = np.random.default_rng(20)
-    drawn = s2 * free / rng.chisquare(free, (_DRAWS, k))
-    width = trim**2 * TRIM_FREE / rng.chisquare(TRIM_FREE, (_DRAWS, 1))
-    apart = t2 * between / rng.chisquare(between, (_DRAWS, 1))
-    draws = rng.normal(size=(_DRAWS, k)) * np.sqrt(predicted(drawn, width, apart, here)[1] / var)
-    least = free if here is not None else min(free, between)
-    return HealthyFlight(mean, np.sqrt(var), draws, least if n else TRIM_FREE, other_mean, np.sqrt(other))
+    least = min(free, between)
+    return HealthyFlight(mean, np.sqrt(var), (free if here is not None else least) if n else TRIM_FREE, other_mean,
+                         np.sqrt(other), least if n else TRIM_FREE)  # fmt: skip
+
+
+def differ(calm: Array, axes: Array, known: bool, common: float = SCATTER, days: bool = False) -> float:
+    """Log density of how healthy flights (n, B) of one session differ, but for a constant of n [1].
+
+    `common` is the standard deviation of a reading that is usual [1]; `days`: each is of a session of its own.
+    """
+    n, k = len(calm), len(axes)
+    if n < 2:
+        return 0.0
+    x = calm @ axes.T
+    t = np.array(SESSION)[:k] if known and k == 3 else np.full(k, max(SESSION))
+    square = common**2 + (t**2 if days else np.zeros(k))
+    misfit = float(np.sum((x - x.mean(axis=0)) ** 2 / square))
+    free = SCATTER_FREE + k * (n - 1)
+    return -0.5 * float((n - 1) * np.log(square).sum() + free * np.log1p(misfit / SCATTER_FREE))

@@ -2,82 +2,21 @@
 
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
-Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.identify`).
+Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.batches`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.judge.diagnose.rotor_calibration import learn
-from bemt.rotors.model import air_fields, air_of_points
+from bemt.tools.flight.batches import BATCHES, half_width, jackknifed
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.sessions import flight_scatter
-
-if TYPE_CHECKING:
-    from bemt.rotors.as_measured import AsMeasured
-    from bemt.rotors.case import Case
-
-
-# Uncertainty of a time series from pieces of it: samples of one flight are not independent, its tenths nearly are.
-#
-# Batch means (Law, Simulation Modeling and Analysis, ch. 9), and for a regression the delete-a-group jackknife (Kott,
-# J. Official Statistics 17, 2001; neither checked there).
-
-BATCHES = 10
-"""Pieces of a flight."""
-
-
-def u_of_mean(values: ArrayLike) -> float:
-    """Standard uncertainty of the mean of a series in order of time, 10 values or more.
-
-    >>> u_of_mean(np.ones(40))
-    0.0
-    """
-    means = [b.mean() for b in np.array_split(np.asarray(values, dtype=float), BATCHES)]
-    return float(np.std(means, ddof=1) / np.sqrt(BATCHES))
-
-
-def half_width(of_batches: ArrayLike) -> float:
-    """Half width of the 95 % interval of a mean, from its value in each batch.
-
-    >>> round(half_width([1.0, 2.0, 3.0]), 3)
-    2.484
-    """
-    from scipy import stats
-
-    v = np.asarray(of_batches, dtype=float)
-    return float(stats.t.ppf(0.975, v.size - 1) * v.std(ddof=1) / np.sqrt(v.size))
-
-
-def jackknifed(X: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares of readings in order of time, with standard uncertainties from ten fits that each lack a tenth.
-
-    >>> x = np.linspace(0.0, 1.0, 50)
-    >>> jackknifed(x[:, None], 2.0 * x)[0]
-    array([2.])
-    """
-
-    def fitted(keep: NDArray[np.bool_]) -> Array:
-        return np.asarray(np.linalg.lstsq(X[keep], y[keep], rcond=None)[0], dtype=float)
-
-    every = np.ones(y.size, dtype=bool)
-    parts = []
-    for p in np.array_split(np.arange(y.size), BATCHES):
-        keep = every.copy()
-        keep[p] = False
-        parts.append(fitted(keep))
-    spread = np.array(parts) - np.mean(parts, axis=0)
-    return fitted(every), np.asarray(np.sqrt((BATCHES - 1) * np.mean(spread**2, axis=0)))
-
 
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
@@ -201,7 +140,7 @@ def _yaw(
     log: FlightLog, on: NDArray[np.bool_], power: Array, speeds: bool, out: dict[str, Constant], unseen: list[str]
 ) -> None:
     """Angular acceleration in yaw over the difference of the two directions of turning."""
-    from bemt.tools.flight.log import layout_of
+    from bemt.tools.flight.layout import layout_of
 
     known = layout_of(log.layout, log.rotors)
     if log.rates is None or known is None:
@@ -247,37 +186,3 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
             out["battery resistance"] = Constant(float(-line[0]), float(half[0]), "ohm")
             return
     unseen.append("battery resistance: log the current, and change thrust in steps")
-
-
-# The rotor of a flight as a case: its thrust constant is a reference run at hover.
-
-AIR = 0.03
-"""Uncertainty of the density, which logs do not hold, against that of the case: 8 K or 300 m of altitude [1]."""
-
-
-def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Identified]) -> AsMeasured:
-    """Condition the rotor of a case on hovering flights, one point a flight, by the names of their logs.
-
-    Thrust is that of the rotor where it sits: body in its wash and neighbours included. Flights differ by what
-    :func:`bemt.tools.flight.sessions.flight_scatter` says; all share the uncertainty of the density. InputError when a
-    flight has no thrust constant in N/rpm^2, or one that is not of this propeller.
-    """
-    faults, k, own, rpm = [], [], [], []
-    for file, flight in zip(files, flights, strict=True):
-        c = flight.constants.get("thrust constant")
-        if c is None or c.unit != "N/rpm^2":
-            got = "no speeds of the rotors" if c is None else "no mass"
-            faults.append(Fault(file, "", f"{got}, so no thrust", "a flight with rotor speeds, and --mass-kg"))
-            continue
-        k.append(c.value)
-        own.append(c.half / c.value / 2.0)
-        rpm.append(float(np.mean(flight.rotors["mean rpm"])))
-    if faults:
-        raise InputError(faults)
-    air = {name: np.broadcast_to(v, len(k)) for name, v in air_fields(case.air()).items()}
-    CT = 3600.0 * np.array(k) / (air["rho"] * case.diameter_m**4)
-    sd, _ = flight_scatter(k)
-    u = CT * np.hypot(own, sd)
-    unseen = np.full(CT.shape, np.nan)
-    still = np.zeros(CT.shape)
-    return learn(case, files, [CT, unseen], [u, still], np.array(rpm), still, air_of_points(air), (AIR, AIR))

@@ -1,111 +1,85 @@
-"""What is wrong with a flight: the judge of :mod:`bemt.diagnose` on the balance of a body in the air.
+"""What is wrong with a flight: one posterior, and the costs of the diagnosis, on the balance of a body in the air.
 
-Its decision, prior, thresholds, words and way of asking (one ordered list, the first that holds answers, the last ones
-may revise it) are those of the diagnosis; the signatures are those of :mod:`bemt.tools.flight.balance`.
-
-The evidence of a cause is Student's density of what it leaves, at the size that fits best, times the share of the
-sizes that fit as well (Laplace's approximation; MacKay, Information Theory, Inference and Learning Algorithms, ch. 28;
-not checked there). That of something unlisted has sizes of its own in roll, pitch and yaw.
-
-The gate is the p-value of the largest statistic over all causes when a healthy flight is drawn from its prediction, so
-many causes are paid for once, by what they have in common (max-T; Westfall and Young, Resampling-Based Multiple
-Testing, 1993).
+Explanations: nothing; a damaged blade, or two; a weight; wind where the log shows it; another day than the healthy
+flights; an uneven build, where there are none; flights that scatter more than those of other vehicles; something
+unlisted. What else the log shows (speeds at their drive, shaking, a change within the flight) are factors of their
+evidence. :func:`bemt.judge.loss.decide` says the answer; one that names only a day or a build is that nobody can tell.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.prior import log_priors
+from bemt.judge.diagnose.prior import LEFT_OUT, PRIOR
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
-from bemt.judge.loss import CLAIMS
-from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND, axes_of, directions, healthy_flight
-from bemt.tools.flight.decision import GATE, FlightDecision, decide
-from bemt.tools.flight.rules import DAYS, RULES, BesideBalance, FlightEvidence, FlightQuery
+from bemt.judge.loss import CLAIMS, Decision, decide
+from bemt.tools.flight.balance import (
+    ALARM,
+    BLADE,
+    BUILD,
+    DAY,
+    IMBALANCE,
+    LARGEST,
+    LOADED,
+    SCATTER,
+    TOTAL,
+    TOTAL_FREE,
+    WEAK,
+    WEIGHT,
+    WIDE,
+    WIND,
+    axes_of,
+    blade,
+    differ,
+    directions,
+    healthy_flight,
+)
+from bemt.tools.flight.change import FlightChange
+from bemt.tools.flight.evidence import FlightEvidence, Readings
+from bemt.tools.flight.next_flight import next_flight
 
-# What to do next with the vehicle: the step that tells the causes apart which a flight leaves open.
+__all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior"]
 
-_HOVER = "hover 30 s in still air and judge that flight"
-
-
-def next_flight(said: FlightDecision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
-    """Choose the next step after a decision that compared with so many `given` healthy flights."""
-    motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
-    others = [i for i in said.effects if not i.startswith(BLADE)]
-    several = "s" if len(motors) > 1 else ""
-    looked = f"look at the propeller{several} of motor{several} {' and '.join(map(str, motors))}"
-    text, kind = "no further flight is needed", ""
-    if said.verdict == "none":
-        text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
-    elif said.effects[:1] == (WIND,):
-        text, kind = _HOVER, "run"
-    elif said.rule == DAYS:
-        text, kind = "three flights of this day that are known to be healthy, with --healthy and --healthy-day same; " \
-                     "else check propellers and arms by hand", "reference"  # fmt: skip
-    elif given < 3 and said.verdict != "named":
-        text, kind = "three or more healthy flights of this vehicle, in still air, with --healthy", "reference"
-        if motors:
-            text = f"{looked}, and give {text}"
-    elif said.verdict in ("unknown", "insufficient"):
-        text, kind = f"{_HOVER}; check arms, motor tilt and propellers by hand", "run"
-    elif any(i.startswith("imbalance") for i in others):
-        text, kind = "look for tape, dirt and nicks on the blades and balance the propeller", "look"
-    elif len(motors) > 1 and any(i.startswith(WEIGHT) for i in others):
-        text, kind = f"weigh the vehicle, look where battery and payload sit, and {looked}", "look"
-    elif motors and any(i.startswith(WEIGHT) for i in others):
-        swap = _partner(motors[0], layout)
-        text, kind = f"{looked}; if it looks right, exchange it {swap} and fly again: damage moves with it, a weight " \
-                     "stays", "run"  # fmt: skip
-    elif motors:
-        text, kind = f"{looked} and replace what is damaged; the next flight should be within the healthy ones", "look"
-    elif any(i.startswith(WEIGHT) for i in others):
-        text, kind = "look where battery and payload sit", "look"
-    elif others:
-        text, kind = _HOVER, "run"
-    return Suggestion(text, (), said.effects[:2], 0.0, 0.0, kind)
+ELSEWHERE = (DAY, BUILD, WIDE)
+"""Explanations that say nothing of a fault: the healthy flights are of another day, or the vehicle is of its own."""
+_USUAL = 50.0  # weight of wind where the log shows it beside 1 for every fault: it is there in most flights [1]
+_WIDER, _ODD = 3.0, 0.1  # a vehicle out of the common: factor of its scatter, and how many are (declared) [1]
+_UNEVEN = 0.5  # the same of the build, where four vehicles are all that is known (declared) [1]
+_SEEN = 0.5  # faults of a rotor that a speed at its drive or an accelerometer shows (declared) [1]
+_LOADED = 0.5  # flights whose mass, battery or air is another, so their total drive tells nothing (declared) [1]
+_OPEN = 0.5  # flights that are of another day, and healthy flights that are of many, where nobody says [1]
 
 
-def _partner(motor: int, layout: NDArray[np.float64] | None) -> str:
-    """With which propeller it can be exchanged: one that turns the same way, far from it."""
-    if layout is None:
-        return "with one that turns the same way"
-    angle, turn, _ = layout.T
-    away = np.where(turn == turn[motor - 1], -np.cos(angle - angle[motor - 1]), -np.inf)
-    away[motor - 1] = -np.inf
-    return f"with that of motor {int(np.argmax(away)) + 1}" if np.isfinite(away).any() else "with a new one"
+@dataclass(frozen=True)
+class BesideBalance:
+    """What else the log shows of the rotors."""
 
-
-__all__ = ["FALSE_ALARM", "FlightVerdict", "judge", "weighed"]
-
-FALSE_ALARM = GATE
-"""Usual probability that a healthy flight is accused, over all causes together: the gate of the diagnosis."""
-_USUAL = 50.0  # weight of wind beside 1 for every fault: it is there in most flights [1]
-_ALONG = 100.0  # condition number from which two rotors load the body along one line
-_OTHER = 0.1  # share of the false alarms that is left to what no single cause explains [1]
-_LARGEST = 0.5  # change of a rotor's drive up to which sizes are alike beforehand: beyond, a motor has no more [1]
+    # Motors, from one, that turn faster or slower at their drive, or shake more, than in healthy flights; 0: a rotor
+    faster: tuple[int, ...] = ()
+    slower: tuple[int, ...] = ()
+    shaken: tuple[int, ...] = ()
+    change: FlightChange | None = None  # A change of the balance within the flight
+    healthy: tuple[bool, ...] = ()  # Of each healthy flight, whether a rotor shakes or the balance changes within it
 
 
 @dataclass(frozen=True, eq=False)
 class FlightVerdict:
     """The answer of the judge on a flight."""
 
-    said: FlightDecision  # As of a diagnosis
+    said: Decision  # As of a diagnosis
     readings: Array  # (B,) Change of the log of each rotor's share of the drive [1]
     next: Suggestion  # What would decide, or confirm
-    found: dict[Explanation, FlightEvidence] = field(default_factory=dict)  # All that is listed
-    # Of these, of nothing and of something unlisted [1]
-    probability: dict[Explanation, float] = field(default_factory=dict)
-    p_value: float = float("nan")  # Share of healthy flights that look as bad [1]
+    found: dict[Explanation, FlightEvidence] = field(default_factory=dict)  # All that has a size
+    probability: dict[Explanation, float] = field(default_factory=dict)  # Of all [1]
     # Standard deviation of a share between healthy flights, or between vehicles where none is given [1]
     scatter: float = float("nan")
-    visible: float = float("nan")  # Smallest change of one rotor's drive that would be named here [1]
+    visible: float = float("nan")  # Smallest change of any one rotor's drive that would be said here [1]
     # Healthy flights accused when each is judged by the others, of how many
     accused: int = 0
     healthy: int = 0
@@ -115,13 +89,13 @@ class FlightVerdict:
     total_half: float = float("nan")
     given: int = 0  # Healthy flights to compare with
     sessions: int = 1  # Sessions of them that are known
+    in_flight: bool = False  # Whether what is said changed within the flight
 
 
 def judge(
     flight: Array,
     healthy: Sequence[Array],
     layout: Array | None,
-    false_alarm: float = FALSE_ALARM,
     windy: bool = False,
     beside: BesideBalance | None = None,
     days: Sequence[int] = (),
@@ -129,124 +103,239 @@ def judge(
 ) -> FlightVerdict:
     """Judge the features of a flight, (B,), by those of healthy flights of the same vehicle [1].
 
-    Without a layout no weights are tried, and every rotor stands for itself. `false_alarm` is the accepted probability
-    that a healthy flight is accused [1]. `windy`: the rotors met wind that they do not meet in the healthy flights; it
-    tilts the body, so roll and pitch may change in any way, and yaw does not. `beside` is what else the log shows.
-    `days` numbers the session of each healthy flight, `day` is that of this one: None where it is known to be another,
-    empty where nobody knows; then another day is an explanation, as likely as not.
+    Without a layout no weights are tried, and every rotor stands for itself. `windy`: the rotors met wind that they do
+    not meet in the healthy flights; it tilts the body, so roll and pitch may change in any way, and yaw does not.
+    `beside` is what else the log shows. `days` numbers the session of each healthy flight, `day` is that of this one:
+    None where it is known to be another, empty where nobody knows; then another day is as likely as not.
     """
     from scipy import stats
 
-    calm = np.array(healthy).reshape(-1, flight.size)
-    query, out = weighed(flight, calm, layout, false_alarm, windy, days, day)
-    query.beside = beside or BesideBalance()
-    said = decide(query, RULES)
-    out = replace(out, said=said, next=next_flight(said, layout, query.given))
-    if query.few:
+    calm, beside = np.array(healthy).reshape(-1, flight.size), beside or BesideBalance()
+    n = len(calm)
+    label = np.array(days if len(days) == n else [0] * n, dtype=int)
+    sure = posterior(flight, calm, layout, windy, beside, label, day)
+    change = flight - (calm.mean(axis=0) if n else flight.mean())
+    totals, half = calm.mean(axis=1), float("nan")
+    if n > 1:
+        half = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
+    cause = beside.change.causes if beside.change is not None else ()
+    out = FlightVerdict(
+        sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,
+        _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
+        given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
+    )  # fmt: skip
+    if n < 3:
         return out
-    bad, label = [], np.array(days if len(days) == len(calm) else [0] * len(calm))
-    several = np.unique(label).size > 1
+    bad, several = [], np.unique(label).size > 1
     for k, h in enumerate(calm):
         # Of several sessions each is left out; of one, each flight.
-        keep = label != label[k] if several else np.arange(len(calm)) != k
-        other, _ = weighed(h, calm[keep], layout, false_alarm, days=label[keep], day=None if several else label[k])
-        moved = any(query.beside.healthy[k : k + 1])
-        bad.append(moved or decide(other, RULES).verdict in (*CLAIMS, "unknown"))
+        keep = label != label[k] if several else np.arange(n) != k
+        other = posterior(h, calm[keep], layout, days=label[keep], day=None if several else label[k]).said
+        bad.append(any(beside.healthy[k : k + 1]) or other.verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
     return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)),
                    sessions=int(np.unique(label).size))  # fmt: skip
 
 
-def _latest(days: Sequence[int]) -> int:
-    return int(days[-1]) if len(days) else 0
+def _visible(calm: Array, layout: Array | None, days: Array, day: int | None | str) -> float:
+    """Smallest change of one rotor's drive from which any would be said, in a flight that is healthy but for it [1]."""
+    B = calm.shape[1]
+    ways, axes = directions(B, layout), axes_of(layout, B)
+    D = np.array([axes @ ways[blade(k + 1)] for k in range(B)])
+    hidden, base = int(np.argmin(np.linalg.norm(D, axis=1))), calm.mean(axis=0) if len(calm) else np.zeros(B)
+    for size in np.geomspace(0.02, 2.0 * LARGEST, 24):
+        x = base + size * ways[blade(hidden + 1)]
+        if blade(hidden + 1) in posterior(x, calm, layout, days=days, day=day).said.effects:
+            return float(size)
+    return float("nan")
 
 
-def weighed(
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What is sure of a flight, and what is said."""
+
+    P: dict[Explanation, float]  # Probability of each explanation [1]
+    found: dict[Explanation, FlightEvidence]  # Of those that have a size
+    said: Decision
+    scatter: float  # Standard deviation of a share between healthy flights [1]
+
+
+@dataclass(frozen=True, eq=False)
+class _World:
+    """One way in which the healthy flights may bear on this one."""
+
+    log: float  # Natural logarithm of its prior
+    still: Explanation  # What it is where nothing else is at work
+    mean: Array  # (k,) Of the readings [1]
+    sd: Array
+    free: float
+    usual: bool = True  # Whether causes are tried in it
+    total: float = float("inf")  # Standard deviation of the total drive; infinite where it is not asked [1]
+
+
+def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None | str) -> list[_World]:
+    """Predictions of a healthy flight: of this day or another, of flights that differ as usual or more."""
+    label = [int(v) for v in days]
+    latest = label[-1] if label else None
+    p = healthy_flight(calm, axes, known, label, latest if isinstance(day, str) else day)
+    if not len(calm):
+        wide = _World(np.log(_UNEVEN), Explanation.of(BUILD), p.mean, _WIDER * p.sd, p.free, False)
+        return [_World(np.log(1.0 - _UNEVEN), Explanation.of(BUILD), p.mean, p.sd, p.free), wide]
+    here = [_World(0.0, NONE, p.mean, p.sd, p.free)]
+    apart = _World(0.0, NONE if day is None else Explanation.of(DAY), p.other_mean, p.other_sd, p.other_free)
+    if isinstance(day, str):
+        here = [replace(here[0], log=np.log(1.0 - _OPEN)), replace(apart, log=np.log(_OPEN))]
+    one = np.unique(days).size < 2
+    if one and len(calm) > 1 and (day is None or isinstance(day, str)):
+        # Flights that differ as days do are of many days; then another one is nothing new.
+        q = healthy_flight(calm, axes, known, range(len(calm)), None)
+        a, b = (differ(calm, axes, known, days=v) for v in (False, True))
+        here = [replace(w, log=w.log + np.log(1.0 - _OPEN) + a) for w in here]
+        here.append(_World(float(np.log(_OPEN) + b), NONE, q.mean, q.sd, q.free))
+    if one:
+        w = healthy_flight(calm, axes, known, label, latest, _WIDER * SCATTER)
+        more = differ(calm, axes, known, _WIDER * SCATTER) - differ(calm, axes, known)
+        top = max(v.log for v in here)
+        here.append(_World(top + np.log(_ODD) + more, Explanation.of(WIDE), w.mean, w.sd, w.free, False))
+    return [part for w in here for part in _totals(w, calm)]
+
+
+def _totals(w: _World, calm: Array) -> list[_World]:
+    """The same where the total drive repeats as between flights, and where mass, battery or air are others."""
+    n, totals = len(calm), calm.mean(axis=1)
+    square = (float(np.sum((totals - totals.mean()) ** 2)) + TOTAL_FREE * TOTAL**2) / (n - 1 + TOTAL_FREE)
+    square *= 1.0 + 1.0 / n
+    return [replace(w, log=w.log + float(np.log(share)), total=float(np.sqrt(square + more**2)))
+            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
+
+
+def posterior(
     flight: Array,
     calm: Array,
     layout: Array | None,
-    alarm: float,
     windy: bool = False,
-    days: Sequence[int] = (),
+    beside: BesideBalance | None = None,
+    days: Sequence[int] | Array = (),
     day: int | None | str = 0,
-) -> tuple[FlightQuery, FlightVerdict]:
-    """Weigh all explanations; gives what the rules ask, and the answer that has no decision yet."""
-    from scipy import stats
+) -> Posterior:
+    """Weigh all explanations of the features of a flight, (B,), and say the answer; arguments as of :func:`judge`."""
+    B, n, beside = flight.size, len(calm), beside or BesideBalance()
+    axes, ways, known = axes_of(layout, B), directions(B, layout), layout is not None
+    label = np.array(days if len(days) == n else [0] * n, dtype=int)
+    worlds = _worlds(calm, axes, known, label, day)
+    blades = [i for i in ways if i.startswith(BLADE)]
+    loads = [i for i in ways if i.startswith(WEIGHT)]
+    # A damaged blade is as likely as a weight, wherever each is.
+    prior = {Explanation.of(i): 1.0 if i in blades else len(blades) / len(loads) for i in ways}
+    prior |= {Explanation.of(WIND): _USUAL} if windy else {}
+    prior |= {Explanation.of(WEAK + str(k)): LEFT_OUT for k in beside.slower}
+    prior |= {Explanation.of(_shaking(k)): LEFT_OUT for k in beside.shaken}
+    prior |= {Explanation.of(_worn(k)): 1.0 for k in beside.shaken}
+    total = sum(prior.values())
+    prior = {e: PRIOR["single"] * w / total for e, w in prior.items()}
+    both = [Explanation.of(i, j) for i, j in combinations(blades, 2)]
+    prior |= {e: PRIOR["pair"] / len(both) for e in both}
+    weight: dict[Explanation, list[float]] = {}
+    found: dict[Explanation, tuple[float, FlightEvidence]] = {}
+    seen = _factors([NONE, UNKNOWN, *prior], beside)
 
-    B, n = flight.size, len(calm)
-    change = flight - (calm.mean(axis=0) if n else flight.mean())
-    axes, ways = axes_of(layout, B), directions(B, layout)
-    unknown = isinstance(day, str)
-    p = healthy_flight(calm, axes, layout is not None, days, _latest(days) if isinstance(day, str) else day)
-    z = (flight @ axes.T - p.mean) / p.sd
-    D = np.stack([axes @ way for way in ways.values()]) / p.sd
-    length = np.linalg.norm(D, axis=1)
-    T, null = D / length[:, None] @ z, p.draws @ (D / length[:, None]).T
-    most, square = null.max(axis=1), np.sum(p.draws**2, axis=1)
-    # Both tests share the false alarms; a cause pays for the larger part.
-    best = float(np.mean(most >= T.max())) / (1.0 - _OTHER)
-    any_way = float(np.mean(square >= float(z @ z))) / _OTHER
-    wide = np.quantile(np.abs(null), 0.95, axis=0) / stats.norm.ppf(0.975)  # a sd as the draws have it
+    def add(e: Explanation, p: float, log: float, factor: float) -> None:
+        weight.setdefault(e, []).append(float(np.log(p)) + log + factor)
 
-    def density(chi2: float) -> float:
-        return -0.5 * (p.free + z.size) * float(np.log1p(chi2 / p.free))
-
-    def over_nothing(chi2: float, share: float) -> float:
-        return density(chi2) - density(float(z @ z)) + float(np.log(min(share, 1.0)))
-
-    found = {}
-    names = list(ways)
-    for name, t, size, w in zip(names, T, length, wide, strict=True):
-        left = float(z @ z) - max(float(t), 0.0) ** 2
-        fits = float(np.sqrt(2.0 * np.pi) * w / size / _LARGEST)
-        found[Explanation.of(name)] = FlightEvidence(
-            float(t / size), float(1.96 * w / size), float(t), left, over_nothing(left, fits)
-        )
-    blades = [i for i, name in enumerate(names) if name.startswith(BLADE)]
-    for i, j in combinations(blades, 2):
-        pair = D[[i, j]].T
-        sizes, *_ = np.linalg.lstsq(pair, z, rcond=None)
-        if np.linalg.cond(pair) > _ALONG or sizes.min() <= 0.0:
+    for w in worlds:
+        total, sd, z = np.isfinite(w.total), w.sd, (flight @ axes.T - w.mean) / w.sd
+        if total:
+            sd, z = np.append(sd, w.total), np.append(z, (flight.mean() - calm.mean()) / w.total)
+        r = Readings(z, sd, w.free)
+        chi2 = float(r.z @ r.z)
+        add(w.still, PRIOR["none"], w.log + r.density(chi2), seen[NONE])
+        if not w.usual:
             continue
-        inverse = np.linalg.inv(pair.T @ pair)
-        u, w = np.sqrt(np.diag(inverse)), float(np.sqrt(wide[i] * wide[j]))
-        k, left = int(np.argmin(sizes)), float(np.sum((z - pair @ sizes) ** 2))
-        fits = float(2.0 * np.pi * w**2 * np.sqrt(np.linalg.det(inverse)) / _LARGEST**2)
-        found[Explanation.of(names[i], names[j])] = FlightEvidence(
-            float(sizes[k]), float(1.96 * w * u[k]), float(sizes[k] / u[k]), left, over_nothing(left, fits)
-        )
-    # Readings as wide as those of damaged blades of any size.
-    scale = np.sqrt(np.mean(D[blades] ** 2, axis=0) * _LARGEST**2 / 3.0)
-    free = np.log1p(scale**2)
-    if windy:
-        still = float(z[2] ** 2) if layout is not None and z.size == 3 else 0.0
-        tilt = float(np.exp(-0.5 * np.sum(free[:2])))
-        found[Explanation.of(WIND)] = FlightEvidence(0.0, float("nan"), 0.0, still, over_nothing(still, tilt))
-    if unknown and n:
-        moved = float(np.sum(((flight @ axes.T - p.other_mean) / p.other_sd) ** 2))
-        found[Explanation.of(DAY)] = FlightEvidence(
-            0.0, float("nan"), 0.0, moved, over_nothing(moved, float(np.prod(p.sd / p.other_sd)))
-        )
-    unlisted = float(np.sum(z**2 / (1.0 + scale**2)))
-    log_bayes = {e: v.log_bayes for e, v in found.items()}
-    log_bayes |= {NONE: 0.0, UNKNOWN: over_nothing(unlisted, float(np.exp(-0.5 * np.sum(free))))}
-    # Wind is only listed where the log shows it, so it is as likely as physics that every rotor has.
-    names_ = (i for e in found if not e.pair for i in e if i != DAY)
-    prior = log_priors({i: _USUAL if i == WIND else 1.0 for i in names_})
-    prior[Explanation.of(DAY)] = prior[NONE]  # as likely as not
-    weight = {e: v + prior[e] for e, v in log_bayes.items()}
-    top = max(weight.values())
-    total = sum(float(np.exp(v - top)) for v in weight.values())
-    P = {e: float(np.exp(v - top)) / total for e, v in weight.items()}
-    query = FlightQuery(found, P, log_bayes, min(best, any_way, 1.0), alarm, n)
+        D = {name: np.append(axes @ way, [way.mean()] * int(total)) / sd for name, way in ways.items()}
+        scale = np.sqrt(np.mean([D[i] ** 2 for i in blades], axis=0) * LARGEST**2 / 3.0)
+        free = 0.5 * np.log1p(scale**2)
+        for e, p in prior.items():
+            names, v = [_as_blade(i) for i in e], None
+            if e == Explanation.of(WIND):
+                # Wind tilts the body and loads it; of yaw it knows nothing.
+                yaw = np.arange(z.size) == 2 if known and len(axes) == 3 else np.zeros(z.size, dtype=bool)
+                add(e, p, w.log + r.density(float(np.sum(z[yaw] ** 2)), float(np.sum(free[~yaw]))), seen[e])
+            elif e.pair:
+                v = r.two(*(D[i] for i in names))
+            elif names[0] in D and np.any(D[names[0]]):
+                v = r.one(D[names[0]])
+            if e in (Explanation.of(i) for k in beside.shaken for i in (_shaking(k), _worn(k))):
+                # What shakes need not move the balance.
+                add(e, p if v is None else 0.5 * p, w.log + r.density(chi2), seen[e])
+            if v is None:
+                continue
+            add(e, p, w.log + v.log, seen[e])
+            if not e.pair:
+                add(w.still, p, w.log + v.log_small, seen[NONE])
+            if e not in found or w.log + v.log > found[e][0]:
+                found[e] = w.log + v.log, v
+        add(UNKNOWN, PRIOR["unknown"], w.log + r.density(float(np.sum(r.z**2 / (1.0 + scale**2))), float(free.sum())),
+            seen[UNKNOWN])  # fmt: skip
+    logs = {e: float(np.logaddexp.reduce(v)) for e, v in weight.items()}
+    top = float(np.logaddexp.reduce(list(logs.values())))
+    P = {e: float(np.exp(v - top)) for e, v in logs.items()}
+    said = _said(decide(P, still=frozenset(ELSEWHERE)), P, n)
+    return Posterior(P, {e: v for e, (_, v) in found.items()}, said, float(np.sqrt(np.sum(worlds[0].sd ** 2))))
 
-    totals = calm.mean(axis=1)
-    spread = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)) if n > 1 else float("nan")
-    bar = float(np.quantile(most, 1.0 - (1.0 - _OTHER) * alarm))
-    nothing = Suggestion("", (), (), 0.0, 0.0, "")
-    answer = FlightVerdict(
-        query.says("none", ""), change - change.mean(), nothing, found, P, query.p_value,
-        float(np.sqrt(np.sum(p.sd**2))), bar / float(length[blades].min()),
-        total=float(change.mean()) if n else float("nan"), total_half=spread, given=n,
-    )  # fmt: skip
-    return query, answer
+
+def _shaking(motor: int) -> str:
+    return IMBALANCE + (f"motor {motor}" if motor else "a rotor")
+
+
+def _worn(motor: int) -> str:
+    return blade(motor) if motor else "damaged blade, a rotor"
+
+
+def _as_blade(cause: str) -> str:
+    """A weak motor is driven harder as one with a damaged blade is."""
+    return cause.replace(WEAK, BLADE)
+
+
+def _factors(of: Sequence[Explanation], beside: BesideBalance) -> dict[Explanation, float]:
+    """Logarithm of how likely what else the log shows is under each explanation, less a factor of all.
+
+    A flag is raised for no reason in ALARM of the flights, and by the fault that it is a sign of in half of them.
+    """
+    out = dict.fromkeys(of, 0.0)
+    flags = [{blade(k)} for k in beside.faster] + [{WEAK + str(k)} for k in beside.slower]
+    flags += [{_shaking(k), _worn(k)} for k in beside.shaken]
+    for e in out:
+        out[e] = sum(float(np.log(_SEEN if signs & e.ids else ALARM)) for signs in flags)
+        if beside.change is not None:
+            odds = dict(zip(beside.change.causes, beside.change.odds, strict=True))
+            out[e] += max((odds[i] for i in e if i in odds), default=0.0)
+    return out
+
+
+def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decision:
+    """The decision in the words of a flight: faults first, and no claim that names none."""
+    faults = [i for i in said.effects if i not in ELSEWHERE]
+    if said.verdict in CLAIMS:
+        sets = tuple(tuple(sorted(s, key=ELSEWHERE.__contains__)) for s in said.sets)
+        lead = said.leading if any(i in faults for i in said.leading) else Explanation.of(faults[0])
+        weights = [i for i in faults if i.startswith(f"{WEIGHT}between")]
+        why = said.why
+        if said.verdict == "class" and weights and sum(i.startswith(BLADE) for i in faults) > 1:
+            why = "a weight between two rotors and damage to both of them load the body alike"
+        return replace(
+            said, effects=(*faults, *(i for i in said.effects if i in ELSEWHERE)), sets=sets, leading=lead, why=why
+        )
+    if said.verdict == "unknown":
+        return replace(said, why="the balance moved, but not as one or two rotors or one weight move it")
+    elsewhere = max((Explanation.of(i) for i in ELSEWHERE), key=lambda e: P.get(e, 0.0))
+    nothing = P.get(NONE, 0.0)
+    if said.verdict == "none" and nothing >= P.get(elsewhere, 0.0):
+        return replace(said, probability=nothing, why="no more than healthy flights differ")
+    said = replace(said, verdict="insufficient", effects=(), sets=())
+    if elsewhere == Explanation.of(DAY) and P.get(elsewhere, 0.0) >= max(v for e, v in P.items() if e != UNKNOWN):
+        why = "the shares moved as they do from one day to another; three healthy flights of the same day would tell"
+        return replace(said, leading=elsewhere, why=why)
+    if not given:
+        why = "no motor stands out by more than in healthy vehicles; give three or more healthy flights with --healthy"
+        return replace(said, why=why)
+    return said

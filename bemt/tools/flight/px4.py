@@ -20,18 +20,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
-from bemt.tools.flight.log import (
-    LAYOUTS,
-    SPARSE,
-    FlightLog,
-    Source,
-    Stretches,
-    joined,
-    layout_of,
-    layout_text,
-    mixed,
-    thrust_axis,
-)
+from bemt.tools.flight.layout import LAYOUTS, layout_of, layout_text, mixed
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
 
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bemt.judge.loss import Decision
 from bemt.tools.flight.answer import FlightAnswer
-from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIND
-from bemt.tools.flight.decision import BESIDE_IT, FlightDecision
+from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIDE, WIND
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
-from bemt.tools.flight.rules import IN_FLIGHT, WIDE
 from bemt.tools.flight.vibration import Vibration
 
 _OFTEN = 0.005  # share of the time at full command that is worth a word [1]
@@ -122,9 +121,9 @@ def _look(a: FlightAnswer) -> str:
     if first == WIND or first == DAY or not (first.startswith((BLADE, WEIGHT))):
         return f"No motor stands out: {_alternatives(said.effects)} would do this."
     size = ""
-    if found is not None and found.size and np.isfinite(found.half) and said.rule != IN_FLIGHT:
+    if found is not None and found.size and np.isfinite(found.half) and not j.in_flight:
         size = f"{100 * found.size:.0f} ± {100 * found.half:.0f} % "
-    if a.change is not None and said.rule == IN_FLIGHT:
+    if a.change is not None and j.in_flight:
         size, others = f"{100 * a.change.size:.0f} ± {100 * a.change.half:.0f} % ", "before"
         others += f" {a.change.at_s:.1f} s" if np.isfinite(a.change.at_s) else ""
     if first.startswith(BLADE) and said.leading.pair and len(motors) > 1:
@@ -182,7 +181,7 @@ def _seen(answer: FlightAnswer) -> list[str]:
     for s in answer.log.sensors:
         lines.append(f"  {sensor_text(s)}; repaired to ± {200 * s.u:.1f} % before any constant was fitted.")
     c, shake = answer.change, answer.vibration
-    if c is not None and answer.judged.said.rule != IN_FLIGHT:
+    if c is not None and not answer.judged.in_flight:
         when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
         lines.append(f"  {when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
                      f"{', '.join(c.causes)}.")  # fmt: skip
@@ -277,10 +276,10 @@ def headline(j: FlightVerdict) -> str:
     said = j.said
     found = j.found.get(said.leading)
     size = ""
-    sized = said.rule != IN_FLIGHT and any(i in said.leading for i in said.effects)
+    sized = not j.in_flight and any(i in said.leading for i in said.effects)
     if found is not None and found.size and sized:
         size = f" ({100 * found.size:+.0f} ± {100 * found.half:.0f} % drive)"
-    if said.rule == BESIDE_IT:
+    if said.beside:
         return f"Cause found: {said.effects[0]}{size}; possibly also {' or '.join(said.effects[1:])}"
     words = {
         "none": "No cause found",
@@ -292,7 +291,7 @@ def headline(j: FlightVerdict) -> str:
     return words[said.verdict]
 
 
-def _open(said: FlightDecision) -> str:
+def _open(said: Decision) -> str:
     """Members of a class; of two at work, each with its look-alikes."""
     if len(said.sets) > 1:
         return "; with one of: ".join(" or ".join(s) for s in said.sets)

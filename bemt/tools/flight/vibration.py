@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.decision import GATE
+from bemt.tools.flight.balance import ALARM
 from bemt.tools.flight.log import FlightLog
 
 _WINDOWS_S, _MOST_S, _LOW_HZ, _LEAST = (1.0, 2.0, 4.0), 120.0, 20.0, 3  # lengths tried; longest used; least windows
@@ -215,6 +215,6 @@ def shaken(mine: Vibration, healthy: Sequence[Vibration]) -> tuple[tuple[int, fl
         free = _FREE + n - 1
         square = (_FREE * _SPREAD**2 + float(np.sum((before - before.mean()) ** 2))) / free * (1.0 + 1.0 / n)
         change = float(logs[k] - before.mean())
-        if change > float(stats.t.ppf(1.0 - GATE / logs.size, free)) * np.sqrt(square):
+        if change > float(stats.t.ppf(1.0 - ALARM / logs.size, free)) * np.sqrt(square):
             out.append((-1 if total else k, float(np.exp(change)), bool(past.size)))
     return tuple(out)
