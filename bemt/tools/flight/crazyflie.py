@@ -15,7 +15,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
-from bemt.data.readers import crazyflie_log
+from bemt.data.readers import crazyflie
 from bemt.tools.flight.layout import layout_of, mixed
 from bemt.tools.flight.log import FlightLog, joined, thrust_axis
 
@@ -24,7 +24,7 @@ KIND = "Crazyflie usdlog"
 
 def sniff(head: bytes) -> bool:
     """Whether the first bytes are those of such a log."""
-    return crazyflie_log.sniff(head)
+    return crazyflie.sniff_crazyflie_log(head)
 
 
 def read(path: Path) -> FlightLog:
@@ -33,7 +33,7 @@ def read(path: Path) -> FlightLog:
     whole = len(data) > 8 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
     body = data[:-4] if whole else data
     try:
-        tables, end = crazyflie_log.log_tables(body, partly=True)
+        tables, end = crazyflie.log_tables(body, partly=True)
     except (struct.error, KeyError, ValueError, IndexError, MemoryError) as error:
         got = f"a header that cannot be read ({error})"
         raise InputError(Fault(name, "header", got, "a whole header", "Copy the file again")) from error
