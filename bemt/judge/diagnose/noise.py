@@ -33,9 +33,10 @@ _AR = (0.0, 0.6)
 _WHITE = 0.2
 # How good the solver is: smooth error over advance ratio as a share of the largest coefficient, and a factor on its own
 # nuisances, alike beforehand.  Declared after volume 1 of the UIUC database: thrust and torque at rest are off
-# by 3 and 5 % (median) and one propeller in ten by more than 10 %. A reference shows that error, however large.
-_MODEL = ((0.01, 0.33), (0.03, 1.0), (0.08, 1.0))
-_MODEL_SHOWN = (*_MODEL, (0.25, 1.0))
+# by 3 and 5 % (median) and one propeller in ten by more than 10 %. A reference shows that error, however large, and
+# then the laws that the case has on may be better known than published, too; alone no recording tells that.
+_MODEL = ((0.01, 1.0), (0.03, 1.0), (0.08, 1.0))
+_MODEL_SHOWN = ((0.01, 0.33), *_MODEL[1:], (0.25, 1.0))
 # From this size on the rotor may be any real one of which no more is known than the case says.
 _REAL = 0.03
 _MODEL_RPM = 0.1
