@@ -30,8 +30,8 @@ SCHEMA = "bemt.plan/1"
 
 # What a plan may count on: noise as stated, and a solver error that earlier comparisons suggest; and the best that it
 # may meet, the solver being as good as any rotor has shown it.
-_HYPER = (1.0, 0.0, 0.01, 0.6)
-_BEST = (1.0, 0.0, 0.003, 0.3)
+_HYPER = (1.0, 0.0, 0.01, 1.0)
+_BEST = (1.0, 0.0, 0.003, 1.0)
 _ONE_IN_20 = 1.645
 DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
 """Words for people."""
