@@ -124,13 +124,13 @@ MUTANTS = (
     Mutant("bemt/rotors/validity.py", "SINK = 0.125", "SINK = 0.0", "test_kernel_guards.py -k sink"),
     Mutant("bemt/rotors/validity.py", "SINK * np.clip(sink, 0.0, 1.0) * loads", "SINK * loads", "test_kernel_guards.py -k sink"),
     # exports
-    Mutant(f"{X}px4.py", "rho * n**2 * D**5 / (2.0 * np.pi)", "rho * n**2 * D**5 / np.pi", EXPORTS.format("px4")),
-    Mutant(f"{X}gazebo.py", "{kQ / kT:.12e}", "{kT / kQ:.12e}", EXPORTS.format("gazebo")),
-    Mutant(f"{X}rotorpy.py", "float(scale * a)", "float(2.0 * scale * a)", EXPORTS.format("rotorpy")),
-    Mutant(f"{X}ardupilot.py", "ROTORS * np.pi * t.diameter_m**2 / 4.0", "ROTORS * np.pi * t.diameter_m**2",
+    Mutant(f"{X}autopilots.py", "rho * n**2 * D**5 / (2.0 * np.pi)", "rho * n**2 * D**5 / np.pi", EXPORTS.format("px4")),
+    Mutant(f"{X}simulators.py", "{kQ / kT:.12e}", "{kT / kQ:.12e}", EXPORTS.format("gazebo")),
+    Mutant(f"{X}simulators.py", "float(scale * a)", "float(2.0 * scale * a)", EXPORTS.format("rotorpy")),
+    Mutant(f"{X}autopilots.py", "ROTORS * np.pi * t.diameter_m**2 / 4.0", "ROTORS * np.pi * t.diameter_m**2",
            "test_exports.py -k sweeps_its_disks"),
     Mutant(f"{X}rotor_disk.py", "cl = thrust / (q * p.blades)", "cl = thrust / q", "test_exports.py -k own_formula"),
-    Mutant(f"{X}xrotor.py", "{p.Rhub / p.R:.10g} {p.Rhub / p.R:.10g}", "{p.Rhub:.10g} {p.Rhub:.10g}", EXPORTS.format("xrotor")
+    Mutant(f"{X}design_codes.py", "{p.Rhub / p.R:.10g} {p.Rhub / p.R:.10g}", "{p.Rhub:.10g} {p.Rhub:.10g}", EXPORTS.format("xrotor")
            .replace("nobody_fitted", "(nobody_fitted or comes_back)")),
     # costs: energy, time, heat
     Mutant("bemt/tools/drive/mission.py", "share = 3600.0 * drive", "share = 3000.0 * drive", DRIVE),

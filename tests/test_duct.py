@@ -27,7 +27,7 @@ from bemt.base.arrays import Array
 from bemt.physics.air import Air
 from bemt.physics.bem import duct as duct_model
 from bemt.physics.bem import solver
-from bemt.physics.bem.duct import Stream, jet_area
+from bemt.physics.bem.duct_stream import Stream, jet_area
 from bemt.physics.bem.model import Model, flow_of, respond
 from bemt.physics.effects.oblique_inflow import ObliqueInflow
 from bemt.physics.effects.tip_gap import TipGap

@@ -8,10 +8,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mutants
 import pytest
 
 NAMED = ("PITT_PETERS", "0.1 * cl0", "PWM_MIN", "SCATTER", "SINK", "t[0] == 0.0")
 """What must not survive in any case."""
+
+
+@pytest.mark.parametrize("mutant", mutants.MUTANTS, ids=lambda m: m.name[:50])
+def test_each_wrong_change_still_has_its_place(project: Path, mutant: mutants.Mutant) -> None:
+    """A text that moved to another file would go unnoticed until the slow run."""
+    assert (project / mutant.file).read_text(encoding="utf-8").count(mutant.text) == 1
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Jet of a duct with a sheet that follows its stream: ``python reports/studies/duct_jet.py`` (two minutes).
 
-`bemt.physics.bem.duct` leaves the sheet between jet and stream a cylinder.  Here its shape is iterated as well,
+`bemt.physics.bem.duct_stream` leaves the sheet between jet and stream a cylinder.  Here its shape is iterated as well,
 until the stream function is the same all along it, and two things are asked: how far the mass flow through the exit is
 from that of the cylinder, and whether the pressures on duct and body, added to the rotor's force, are the momentum of
 the jet.
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.physics.bem import duct as ds
+from bemt.physics.bem import duct_stream as ds
 from geometry.duct import Duct
 
 Array = NDArray[np.float64]

@@ -34,8 +34,10 @@ SESSION = {"thrust": 0.007, "torque": 0.010, "speed": 0.015, "electrical": 0.02,
 """Standard deviation of the level of one run where the recordings do not show it, share: two runs differ by 1.4 times
 this. Repeated runs of one stand that were set up anew differ by 1 % in thrust and 1.4 % in torque (runs of the UIUC
 Propeller Database and of J. Majewski's stand, seen here)."""
-# Electrical power for torque: efficiency of a drive that is warm or cold; speed where the voltage is known.
-_BY_POWER, _AT_KNOWN_VOLTAGE = 0.03, 0.01
+BY_POWER = 0.03
+"""What the losses of a motor differ by from run to run, where electrical power stands for torque, share."""
+# Level of the speed where the voltage is known.
+_AT_KNOWN_VOLTAGE = 0.01
 BY_THERMOMETER = 0.012
 """Standard deviation of the density ratio of two days at one site where temperatures alone are known: pressures of days
 differ by 8 hPa. [1]"""
@@ -223,7 +225,7 @@ def density_change(a: StandRun, b: StandRun) -> tuple[float, float]:
 def _set_up(name: str, channel: str, a: StandRun, b: StandRun) -> float:
     """Standard deviation of the level of one run where the recordings do not show it."""
     if name in LOADS and channel == "electrical_power_W":
-        return _BY_POWER
+        return BY_POWER
     if name == "speed" and all("voltage_V" in r.points for r in (a, b)):
         return _AT_KNOWN_VOLTAGE
     return SESSION[name]

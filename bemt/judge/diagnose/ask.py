@@ -179,7 +179,7 @@ def diagnosed(
                               reference_case=theirs)  # fmt: skip
     if repeatability_pct is not None:
         records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
-    chosen = cases * len(files) if len(cases) == 1 else cases
+    chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
     asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
                    reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
@@ -189,8 +189,7 @@ def diagnosed(
     except InputError as error:
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
-        # one point cannot be diagnosed: it is shown beside the model
-        # grids of one condition
+        # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
         found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []}
         return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")

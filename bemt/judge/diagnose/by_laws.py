@@ -13,12 +13,11 @@ from bemt.base.arrays import Array
 from bemt.judge import loss
 from bemt.judge.compare import recordings
 from bemt.judge.compare.drive_laws import Judgement
-from bemt.judge.compare.matched import LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
+from bemt.judge.compare.matched import BY_POWER, LOADS, MARGIN, SESSION, density_change, like_voltage, log_range
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
-from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.record import Record, thinned
 from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
@@ -232,8 +231,7 @@ def _record(
         if shift[c]:
             zero[k] = shift[c] * full
         if c == "electrical_power_W":  # a motor takes power without any load
-            unloaded = PRIORS["losses of a motor from run to run"] * full
-            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), unloaded)
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), BY_POWER * full)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.compare.drive_laws import BY_LOAD, TOLD_VOLTAGE
-from bemt.judge.compare.matched import SESSION
+from bemt.judge.compare.matched import BY_POWER, SESSION
 from bemt.judge.compare.smooth_change import BEND
 from bemt.judge.diagnose.noise import law_of, smooth_modes
 from bemt.judge.diagnose.record import CHANNELS
@@ -33,7 +33,6 @@ PRIORS = {
     "density not recorded": 0.015, "airspeed": 0.005, "parameter of the model": 0.25,
     "level of thrust": 0.06, "level of torque": 0.08, "slope over J": 0.05, "bend over J": 0.02,
     "jet area of a duct": 0.15,
-    "losses of a motor from run to run": 0.03,
     "form of the model": 0.2, "form in a variable of its own": 0.45,
 }  # fmt: skip
 """Standard deviations: shares [1], zeros of full scale [1], parameters of active effects as a share of their published
@@ -93,8 +92,8 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             tag = f" ({p.record.name})" if len(rows) > 1 else ""
             add(f"{name} zero{tag}", np.where(here & (problem.part == i), zero, 0.0))
             if c == 1 and p.record.electrical:
-                losses = PRIORS["losses of a motor from run to run"]
-                add(f"losses of the motor{tag}", np.where(here & (problem.part == i), losses * y, 0.0), of_reading=True)
+                mine = here & (problem.part == i)
+                add(f"losses of the motor{tag}", np.where(mine, BY_POWER * y, 0.0), of_reading=True)
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
@@ -130,11 +129,11 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             add(f"pulse width^{k}{tag}", np.where(turning, 0.05 * at_pulse**k * top, 0.0))
         for i, part in drives.items():
             if part.drive is not None and not part.record.reference:
-                # two runs differ, and as little as a battery empties alike, their speeds bend against each other
+                # two runs differ, and their speeds bend against each other: no battery empties twice alike
                 varies = math.sqrt(2.0) * SESSION["speed"] * f0
-                x = at_pulse
+                bend = BEND * (2.0 * at_pulse**2 - 1.0)
                 mine = turning & (problem.part == i)
-                for word, shape in (("", 1.0), (" (slope)", BEND * x), (" (bend)", BEND * (2.0 * x**2 - 1.0))):
+                for word, shape in (("", 1.0), (" (slope)", BEND * at_pulse), (" (bend)", bend)):
                     add(f"supply of the run{tag}{word}", np.where(mine, varies * shape, 0.0))
                 follows = np.concatenate(
                     [_by_volts(p) if p is part else np.zeros(len(p.record)) for p in problem.parts]
