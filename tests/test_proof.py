@@ -35,7 +35,7 @@ from bemt.judge.proof import (
     truth_world,
 )
 from bemt.judge.proof.items import Bench, Item
-from bemt.judge.proof.rows import Answer, Entry, Estimate, Key, Ranked, Step
+from bemt.judge.proof.rows import Entry, Estimate, Key, Ranked, Step, ToldAnswer
 from bemt.judge.proof.stand import Stand, covariance, full_scales, record
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
@@ -379,10 +379,10 @@ def test_the_key_is_sealed_before_any_diagnosis(patched: Any, tmp_path: Path, mo
     out = tmp_path / "proof"
     order: list[bool] = []
 
-    def spy(folder: Path) -> tuple[Answer, str]:
+    def spy(folder: Path) -> tuple[ToldAnswer, str]:
         text = (out / seal.KEY).read_text(encoding="utf-8")
         order.append((out / seal.SEAL).read_text(encoding="utf-8").strip() == seal.sha256(text))
-        return Answer(), "spy"
+        return ToldAnswer(), "spy"
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
     document = prove.prove(str(out), "tiny", 3, 1)
@@ -407,9 +407,9 @@ def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
     out, seen = tmp_path / "proof", []
     open_ = {"verdict": "insufficient", "effects": [], "ranking": [], "next_measurement": {"kind": "reference"}}
 
-    def spy(folder: Path) -> tuple[Answer, str]:
+    def spy(folder: Path) -> tuple[ToldAnswer, str]:
         seen.append((folder.parent.name, folder.name))
-        return Answer.from_document(open_ if folder.name != "0001" else {**open_, "verdict": "none"}), ""
+        return ToldAnswer.from_document(open_ if folder.name != "0001" else {**open_, "verdict": "none"}), ""
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
     monkeypatch.setattr(items, "_REFERENCED", 0.0)
@@ -446,10 +446,10 @@ def entry(kind: str, *ids: str, separation: float = 12.0, alike: tuple[str, ...]
     })  # fmt: skip
 
 
-def answer(verdict: str, *effects: str, ranking: tuple[str, ...] | None = None, **more: Any) -> Answer:
+def answer(verdict: str, *effects: str, ranking: tuple[str, ...] | None = None, **more: Any) -> ToldAnswer:
     names = ranking or (("+".join(effects),) if verdict in ("named", "sensor") else (verdict,))
     held = {"before": 4.0, "after": 1.0, "noise": 1.0, "gp_only": 1.1, "holdout_before": 4.0, "holdout_after": 1.1}
-    return Answer.from_document({
+    return ToldAnswer.from_document({
         "verdict": verdict, "effects": list(effects), "probability": 0.99, "location": {"variable": "rpm"},
         "ranking": [{"effect": n, "probability": 0.9, "parameters": {}} for n in names], "fit": {"thrust_N": held},
         **more,
@@ -502,7 +502,7 @@ def test_a_tool_that_never_speaks_is_not_praised() -> None:
         (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "section"), False),
         (entry("pair", "untwist", "section", separation_together=[12.0, 2.0]), answer("named", "nacelle"), False),
         (entry("null"), answer("class", "untwist", "section"), False),  # a class is a claim
-        (entry("single", "untwist"), Answer(), False),
+        (entry("single", "untwist"), ToldAnswer(), False),
     ],
 )
 def test_judgement(there: dict[str, Any], said: dict[str, Any] | None, right: bool) -> None:
@@ -545,7 +545,7 @@ def test_a_recommended_run_is_tried_on_the_truth() -> None:
 
 
 def test_no_answer_is_no_virtue() -> None:
-    rows = {r.what: r for r in score.score([score.judge(e, Answer()) for e, _ in SCENES])}
+    rows = {r.what: r for r in score.score([score.judge(e, ToldAnswer()) for e, _ in SCENES])}
     assert rows["failed"].met is False
     assert rows["claims on nulls, noise"].met is None
     assert rows["top 1, visible"].value == 0.0
@@ -564,7 +564,7 @@ def weighed(patched: Any) -> tuple[items.Bench, Item]:
 
 
 def _followed(
-    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[Answer],
+    weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[ToldAnswer],
     runs: int = 3,
 ) -> tuple[loop.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
     """Course of the item whose answers are given, with the commands and the files that were seen."""
@@ -576,7 +576,7 @@ def _followed(
     asked: list[list[str]] = []
     seen = [dict(made.files)]
 
-    def spy(folder: Path, words: list[str]) -> tuple[Answer, str]:
+    def spy(folder: Path, words: list[str]) -> tuple[ToldAnswer, str]:
         if "--out" in words:  # a name goes into the case
             home = folder / words[words.index("--out") + 1]
             home.mkdir()
@@ -716,7 +716,7 @@ def test_the_score_counts_what_was_found_and_what_was_claimed_wrongly() -> None:
     def judged(kind: str, causes: list[str], verdict: str, effects: list[str]) -> score.Judged:
         n = len(causes)
         entry = Entry(set=kind, causes=tuple(causes), alike=((),) * n, separation=(99.0,) * n)
-        return score.judge(entry, Answer(verdict, tuple(effects)))
+        return score.judge(entry, ToldAnswer(verdict, tuple(effects)))
 
     rows = score.score_real([
         judged("real duct", ["duct"], "named", ["duct"]), judged("real duct", ["duct"], "named", ["section"]),

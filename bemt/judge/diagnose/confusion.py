@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.form import Form, Law, columns, form_modes
+from bemt.judge.diagnose.form import Form, LawError, columns, form_modes
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.posterior import Evidence
@@ -73,7 +73,7 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
     matrix = np.zeros((len(ids), len(ids)))
     if ids:
         own = [columns(found.problem, c, g, modes[c.id]) for c, g in zip(found.candidates, at, strict=True)]
-        forms = [Law.of(state.white.changes(x), width).at(np.zeros(state.r.size)) for width, x in own]
+        forms = [LawError.of(state.white.changes(x), width).at(np.zeros(state.r.size)) for width, x in own]
         starts = [found.spans[i].start for i in ids]
         for k, s in enumerate(chosen):
             square = _squares(s[:, None] - state.S, forms[k])

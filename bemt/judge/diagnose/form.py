@@ -36,7 +36,7 @@ class Form(LinearTerms):
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class LawError:
     """Whitened columns of the error of one law or of two, of which those of the modes come in several sizes."""
 
     B: Array  # (M, Q) Of unit size [1]
@@ -44,7 +44,7 @@ class Law:
     roots: tuple[tuple[float, Array, Array], ...]  # Size, scale of the columns, Cholesky factor of 1 + B^T B
 
     @classmethod
-    def of(cls, B: Array, *widths: int) -> Law:
+    def of(cls, B: Array, *widths: int) -> LawError:
         """Columns of which blocks of these widths are in turn modes and others, which have their own size."""
         kinds: list[bool] = []
         for k, width in enumerate(widths):

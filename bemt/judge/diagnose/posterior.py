@@ -247,7 +247,7 @@ def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
         total, best = gain[span], int(np.argmax(gain[span]))
         for _ in range(2):  # the error of the law follows the size of the best setting, which depends on it
             width, columns = bank.columns(name, best)
-            law = form.Law.of(white.changes(columns), width)
+            law = form.LawError.of(white.changes(columns), width)
             total = gain[span] + law.gain(r[:, None] - S[:, span])
             if (again := int(np.argmax(total))) == best:
                 break
@@ -291,7 +291,7 @@ def _pairs(bank: _Bank, state: State) -> None:
         A, B = some[a][0], some[b][0]
         i, j = np.unravel_index(int(np.argmax(total)), total.shape)
         each = [bank.columns(k, int(c) - bank.spans[k].start) for k, c in ((a, A[i]), (b, B[j]))]
-        law = form.Law.of(state.white.changes(np.concatenate([x for _, x in each], axis=1)),
+        law = form.LawError.of(state.white.changes(np.concatenate([x for _, x in each], axis=1)),
                           *(part for width, x in each for part in (width, x.shape[1] - width)))  # fmt: skip
         value = total + law.gain_of_two(state.r, state.S[:, A], state.S[:, B])
         state.log_z[pair] = none + float(log_sum(value.ravel()))

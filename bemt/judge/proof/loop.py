@@ -36,7 +36,7 @@ from bemt.judge.proof import draw, prove, score, seal
 from bemt.judge.proof.causes import CAUSES
 from bemt.judge.proof.items import Bench, further_run, recorded_again
 from bemt.judge.proof.rigs import Rig
-from bemt.judge.proof.rows import Answer, Entry, Step
+from bemt.judge.proof.rows import Entry, Step, ToldAnswer
 from bemt.physics import effects
 
 SCHEMA = "bemt.loop/1"
@@ -56,7 +56,7 @@ class Course:
     """How one item went."""
 
     folder: str  # Item
-    answers: list[Answer]  # First answer, then one after each step
+    answers: list[ToldAnswer]  # First answer, then one after each step
     # What each step was: ``reference``, ``run``, ``look``, ``mend`` (recorded once more without what was named) or
     # ``model`` (into the case, no run)
     steps: list[str] = field(default_factory=list)
@@ -69,7 +69,7 @@ class Course:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Course:
         """Course that was kept."""
-        return cls(**{**document, "answers": [Answer.from_document(a) for a in document["answers"]]})
+        return cls(**{**document, "answers": [ToldAnswer.from_document(a) for a in document["answers"]]})
 
     def document(self) -> dict[str, Any]:
         """The course to be kept."""
@@ -254,7 +254,7 @@ class _Item:
         return list(words)
 
 
-def _recommended(item: _Item, answer: Answer) -> _Taken | str:
+def _recommended(item: _Item, answer: ToldAnswer) -> _Taken | str:
     """Take the step that follows from an answer; else say why there is none."""
     step = answer.step
     if answer.verdict in _DONE:
@@ -340,7 +340,7 @@ def _fixed(item: _Item, number: int, wanted: Sequence[Points]) -> _Taken | str:
 
 
 def _course(
-    out: Path, entry: Entry, bench: Bench, first: Answer, runs: int, fixed: bool, hand: Hand | None = None
+    out: Path, entry: Entry, bench: Bench, first: ToldAnswer, runs: int, fixed: bool, hand: Hand | None = None
 ) -> Course:  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
         for file in (out / "items" / entry.folder).iterdir():
@@ -359,7 +359,7 @@ def _course(
 
 
 def follow(
-    box: Path, first: Answer, hand: Hand, runs: int, *, wanted: Sequence[Points] | None = None, enough: float = 0.0,
+    box: Path, first: ToldAnswer, hand: Hand, runs: int, *, wanted: Sequence[Points] | None = None, enough: float = 0.0,
     tell: Callable[[Course], None] | None = None,
 ) -> Course:  # fmt: skip
     """Take the step that follows from each answer, for so many runs.
@@ -368,8 +368,8 @@ def follow(
     ----------
     box : Path
         Folder with recording.csv, case.toml and perhaps reference.csv, as in ``first``; runs are added.
-    first : Answer
-        Answer on these.
+    first : ToldAnswer
+        ToldAnswer on these.
     hand : Hand
         What makes the runs.
     runs : int
@@ -411,7 +411,7 @@ def follow(
     raise AssertionError("a course has an end")
 
 
-def _expected(answer: Answer) -> float:
+def _expected(answer: ToldAnswer) -> float:
     """Expected loss of what was said. [one "insufficient"]"""
     value = dict(answer.whole.get("expected_loss") or {}).get(answer.verdict)
     return float(value) if isinstance(value, int | float) else math.inf
@@ -436,7 +436,7 @@ def loop(
         if entry.set in _SETS and answer:
             todo.append((entry, answer))
 
-    def one(task: tuple[Entry, Answer]) -> Course:
+    def one(task: tuple[Entry, ToldAnswer]) -> Course:
         entry, answer = task
         file = kept / f"{entry.folder}.json"
         if file.exists():
@@ -467,7 +467,7 @@ def _rank(entry: Entry) -> int:
     """Place of an item in the order of work: visible pairs, the others in mixed order, last what no plan can see."""
     if not entry.causes or entry.set == "unlisted":
         return 1
-    return (0 if entry.set == "pair" else 1) if score.judge(entry, Answer()).separation >= score.VISIBLE else 2
+    return (0 if entry.set == "pair" else 1) if score.judge(entry, ToldAnswer()).separation >= score.VISIBLE else 2
 
 
 def _named(entry: Entry, course: Course, at: int) -> list[str]:

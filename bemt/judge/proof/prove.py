@@ -24,7 +24,7 @@ from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.proof import draw, items, proof_text, real, resolve, score, seal
-from bemt.judge.proof.rows import Answer, Key, Miss, Proof
+from bemt.judge.proof.rows import Key, Miss, Proof, ToldAnswer
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -89,7 +89,7 @@ def on_threads(one: Callable[[T], R], todo: Sequence[T], jobs: int, tell: Callab
     return found
 
 
-def diagnose_folder(folder: Path) -> tuple[Answer, str]:
+def diagnose_folder(folder: Path) -> tuple[ToldAnswer, str]:
     """Run the diagnosis on one folder, as a process of its own that sees a copy of recording and case only."""
     with tempfile.TemporaryDirectory(prefix="bemt-") as box:
         given = [name for name in _GIVEN if (folder / name).exists()]
@@ -98,7 +98,7 @@ def diagnose_folder(folder: Path) -> tuple[Answer, str]:
         return asked(Path(box), question(folder))
 
 
-def asked(folder: Path, words: Sequence[str]) -> tuple[Answer, str]:
+def asked(folder: Path, words: Sequence[str]) -> tuple[ToldAnswer, str]:
     """Answer to a command in a folder, an empty one and what went wrong where there is none."""
     command = [sys.executable, "-m", "bemt", *words, "--json"]
     # the numerical libraries' own threads would fight over the cores that --jobs shares out
@@ -108,11 +108,11 @@ def asked(folder: Path, words: Sequence[str]) -> tuple[Answer, str]:
     try:
         ran = subprocess.run(command, cwd=folder, env={**os.environ, **one, "PYTHONPATH": path}, capture_output=True,
                              text=True, timeout=TIME_LIMIT_S, check=False)  # fmt: skip
-        return Answer.from_document(json.loads(ran.stdout)), ran.stderr.strip()
+        return ToldAnswer.from_document(json.loads(ran.stdout)), ran.stderr.strip()
     except subprocess.TimeoutExpired:
-        return Answer(), f"no answer within {TIME_LIMIT_S:g} s"
+        return ToldAnswer(), f"no answer within {TIME_LIMIT_S:g} s"
     except ValueError:
-        return Answer(), ran.stderr.strip() or "no JSON document on the output"
+        return ToldAnswer(), ran.stderr.strip() or "no JSON document on the output"
 
 
 def question(folder: Path) -> list[str]:
@@ -134,7 +134,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
     _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, teller("reference given", say))
 
 
-def asks(answer: Answer) -> bool:
+def asks(answer: ToldAnswer) -> bool:
     """Whether an answer leaves the cause open and asks for a reference."""
     return answer.verdict in ("insufficient", "unknown") and answer.step.kind == "reference"
 

@@ -7,14 +7,14 @@ import numpy as np
 from bemt.judge.proof.causes import CAUSES
 from bemt.judge.proof.items import Bench
 from bemt.judge.proof.rigs import extended
-from bemt.judge.proof.rows import Answer, Entry
+from bemt.judge.proof.rows import Entry, ToldAnswer
 from bemt.judge.proof.separation import yardstick
 from bemt.judge.proof.stand import Stand
 
 _ENOUGH = 3.0
 
 
-def resolves(bench: Bench, entry: Entry, answer: Answer) -> bool | None:
+def resolves(bench: Bench, entry: Entry, answer: ToldAnswer) -> bool | None:
     """Whether the recommended points separate the concealed cause from what it was confused with."""
     points = answer.step.points
     if len(entry.causes) != 1 or not points or answer.verdict not in ("class", "insufficient"):

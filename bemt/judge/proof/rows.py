@@ -82,7 +82,7 @@ class Ranked(Documented):
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
 
 
-class Fit(Documented):
+class ToldFit(Documented):
     """Errors of a channel."""
 
     noise: float = math.nan
@@ -91,7 +91,7 @@ class Fit(Documented):
     holdout_after: float = math.nan
 
 
-class Location(Documented):
+class ToldLocation(Documented):
     """Where the residual lies."""
 
     variable: str = ""
@@ -109,15 +109,15 @@ class Step(Documented):
     otherwise: Step | None = None
 
 
-class Answer(Documented):
+class ToldAnswer(Documented):
     """A diagnosis or comparison, as far as the proof reads it; without a verdict, none."""
 
     verdict: str = ""
     effects: tuple[str, ...] = ()
     ranking: tuple[Ranked, ...] = ()
     sets: tuple[tuple[str, ...], ...] = ()
-    fit: Mapping[str, Fit] = field(default_factory=dict)
-    location: Location | None = None
+    fit: Mapping[str, ToldFit] = field(default_factory=dict)
+    location: ToldLocation | None = None
     next_measurement: Step | None = None
     log_bayes: Mapping[str, float] | None = None
     nearest_signature: str | None = None
@@ -154,7 +154,7 @@ class Answer(Documented):
 class Stored(Documented):
     """File of an answer."""
 
-    answer: Answer = Answer()
+    answer: ToldAnswer = ToldAnswer()
     error: str = "no answer"
     seconds: float = math.nan
 

@@ -10,7 +10,7 @@ from itertools import permutations
 import numpy as np
 
 from bemt.judge.proof.causes import CAUSES
-from bemt.judge.proof.rows import Answer, Entry, Location, Risk, ScoreRow, Stratum
+from bemt.judge.proof.rows import Entry, Risk, ScoreRow, Stratum, ToldAnswer, ToldLocation
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
@@ -44,7 +44,7 @@ class Judged:
     """One item with its answer."""
 
     entry: Entry
-    answer: Answer  # Empty when it failed
+    answer: ToldAnswer  # Empty when it failed
     claims: bool  # Whether a cause or a class of causes was claimed
     # Whether the claim holds, or, where nothing is to be claimed, nothing was.  A claim holds when every effect it
     # names is at work and none is missing that the plan can see; of a class, when one of its members is
@@ -72,7 +72,7 @@ class Judged:
         return "+".join(self.answer.effects) if verdict in ("named", "sensor") else verdict
 
 
-def judge(entry: Entry, answer: Answer) -> Judged:
+def judge(entry: Entry, answer: ToldAnswer) -> Judged:
     """Judge one answer."""
     if not answer:
         return Judged(entry, answer, False, False, False, False)
@@ -174,7 +174,7 @@ def _held_out(j: Judged) -> tuple[float, float]:
 
 
 def _located(j: Judged) -> bool:
-    where = j.answer.location or Location()
+    where = j.answer.location or ToldLocation()
     # what rises and falls together in this plan is one variable to it
     words = [v.lower() for v in (where.variable, *where.ties)]
     families = j.entry.variables[0]

@@ -41,7 +41,7 @@ _EXPECTED = "rpm=5400,thrust_g=410 and, if known, airspeed_m_s=, power_W= or tor
 
 
 @dataclass(frozen=True)
-class Reading:
+class RotorReading:
     """One reading of a rotor; NaN where it says nothing."""
 
     rpm: float  # [rev/min]
@@ -51,7 +51,7 @@ class Reading:
     density_kg_m3: float
 
 
-def parse_reading(text: str, where: str = "--reading") -> tuple[Reading, ...]:
+def parse_reading(text: str, where: str = "--reading") -> tuple[RotorReading, ...]:
     """Read readings as people type them: ``name=value`` with commas between, readings with semicolons.
 
     Names carry their unit: ``rpm``, ``thrust_g`` (gram-force), ``thrust_N``, ``airspeed_m_s``, ``torque_Nm``,
@@ -67,7 +67,7 @@ def parse_reading(text: str, where: str = "--reading") -> tuple[Reading, ...]:
         ...
     bemt.base.errors.InputError: --reading: got 'rpm=6000'; expected a thrust, a torque or a power beside the speed.
     """
-    out: list[Reading] = []
+    out: list[RotorReading] = []
     faults: list[Fault] = []
     for part in filter(str.strip, text.split(";")):
         found: dict[str, float] = {}
@@ -88,7 +88,7 @@ def parse_reading(text: str, where: str = "--reading") -> tuple[Reading, ...]:
             faults.append(Fault(where, "", repr(part.strip()), "a speed, such as rpm=5400", _EXPECTED))
         if "power" in found and not faults:
             torque = found["power"] / (rpm * math.pi / 30.0)
-        out.append(Reading(rpm, found.get("thrust", math.nan), torque, found.get("airspeed", 0.0),
+        out.append(RotorReading(rpm, found.get("thrust", math.nan), torque, found.get("airspeed", 0.0),
                            found.get("density", DENSITY)))  # fmt: skip
     if not out and not faults:
         faults.append(Fault(where, "", repr(text), _EXPECTED))

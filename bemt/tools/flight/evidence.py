@@ -16,7 +16,7 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.tools.flight.balance import LARGEST
 
-__all__ = ["SMALL", "FlightEvidence", "Readings"]
+__all__ = ["SMALL", "FlightEvidence", "FlightReadings"]
 
 SMALL = 0.05
 """Change of a rotor's drive below which a cause is nothing to look for: not worth a word [1]."""
@@ -44,7 +44,7 @@ class FlightEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class FlightReadings:
     """The readings beside one prediction of a healthy flight."""
 
     z: Array  # (k,) Over the standard deviation

@@ -41,7 +41,7 @@ from bemt.tools.flight.balance import (
     healthy_flight,
 )
 from bemt.tools.flight.change import FlightChange
-from bemt.tools.flight.evidence import FlightEvidence, Readings
+from bemt.tools.flight.evidence import FlightEvidence, FlightReadings
 from bemt.tools.flight.next_flight import next_flight
 
 __all__ = ["ELSEWHERE", "BesideBalance", "FlightVerdict", "judge", "posterior"]
@@ -151,7 +151,7 @@ def _visible(calm: Array, layout: Array | None, days: Array, day: int | None | s
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class FlightPosterior:
     """What is sure of a flight, and what is said."""
 
     P: dict[Explanation, float]  # Probability of each explanation [1]
@@ -217,7 +217,7 @@ def posterior(
     beside: BesideBalance | None = None,
     days: Sequence[int] | Array = (),
     day: int | None | str = 0,
-) -> Posterior:
+) -> FlightPosterior:
     """Weigh all explanations of the features of a flight, (B,), and say the answer; arguments as of :func:`judge`."""
     B, n, beside = flight.size, len(calm), beside or BesideBalance()
     axes, ways, known = axes_of(layout, B), directions(B, layout), layout is not None
@@ -246,7 +246,7 @@ def posterior(
         total, sd, z = np.isfinite(w.total), w.sd, (flight @ axes.T - w.mean) / w.sd
         if total:
             sd, z = np.append(sd, w.total), np.append(z, (flight.mean() - calm.mean()) / w.total)
-        r = Readings(z, sd, w.free)
+        r = FlightReadings(z, sd, w.free)
         chi2 = float(r.z @ r.z)
         add(w.still, PRIOR["none"], w.log + r.density(chi2), seen[NONE])
         if not w.usual:
@@ -280,7 +280,7 @@ def posterior(
     top = float(np.logaddexp.reduce(list(logs.values())))
     P = {e: float(np.exp(v - top)) for e, v in logs.items()}
     said = _said(decide(P, still=frozenset(ELSEWHERE)), P, n)
-    return Posterior(P, {e: v for e, (_, v) in found.items()}, said, float(np.sqrt(np.sum(worlds[0].sd ** 2))))
+    return FlightPosterior(P, {e: v for e, (_, v) in found.items()}, said, float(np.sqrt(np.sum(worlds[0].sd ** 2))))
 
 
 def _shaking(motor: int) -> str:
