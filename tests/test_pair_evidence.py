@@ -15,7 +15,7 @@ def test_the_error_of_both_laws_is_that_of_the_whole_covariance(seed: int) -> No
     rng = np.random.default_rng(seed)
     r, a, b, modes = (rng.standard_normal((12, n)) for n in (1, 5, 4, 3))
     columns = np.concatenate([a[:, 1:2] * modes, 0.1 * modes[:, :1], b[:, 2:3] * modes], axis=1)
-    law = form.Law.of(columns, 3, 1, 3)
+    law = form.LawError.of(columns, 3, 1, 3)
     found = law.gain_of_two(r[:, 0], a, b)
     kind = np.array([1, 1, 1, 0, 1, 1, 1], dtype=bool)
     for i in range(5):
@@ -30,6 +30,6 @@ def test_the_error_of_both_laws_is_that_of_the_whole_covariance(seed: int) -> No
 
 
 def test_instruments_have_no_error_of_a_law() -> None:
-    law = form.Law.of(np.zeros((6, 0)), 0)
+    law = form.LawError.of(np.zeros((6, 0)), 0)
     assert not law.gain(np.ones((6, 2))).any()
     assert not law.gain_of_two(np.ones(6), np.ones((6, 2)), np.ones((6, 3))).any()
