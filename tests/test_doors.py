@@ -251,9 +251,9 @@ def test_one_run_is_compared_at_its_recorded_angle(channel: str, factor: float, 
     angles = (0.0, 60.0)
     rows = "".join(f"6000,10,1.225,{angle * factor:.12g},3,0.06\n" for angle in angles)
     (tmp_path / "cfd.csv").write_text(f"rpm,airspeed_m_s,density_kg_m3,{channel},thrust_N,torque_Nm\n{rows}")
-    points = compare_run(tmp_path / "cfd.csv", label)["points"]
+    points = compare_run(tmp_path / "cfd.csv", label).points
     expected = propagate(label, 6000.0, 10.0, 1.225, angle_deg=angles, bands=False).points
-    assert [point["loads"]["thrust_N"]["bemt"] for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
+    assert [point.loads["thrust_N"].bemt for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
 
 
 @pytest.mark.parametrize("table", ["operating]\nangle_deg = 30", "sweep]\nangle_deg = [0, 30]"])

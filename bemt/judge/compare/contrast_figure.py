@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from bemt.base import canvas
 from bemt.base.arrays import Array
+from bemt.judge.compare.change_document import ComparedRuns
 from bemt.judge.compare.contrast_text import WORD, headline
 from bemt.judge.compare.matched import POWER_OF_SPEED
 
@@ -36,7 +37,7 @@ _STEADY = 0.05
 _WIDE = 110
 
 
-def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
+def picture(change: RunChange, doc: ComparedRuns) -> bytes:
     """Draw it as PNG."""
     import matplotlib
 
@@ -52,22 +53,22 @@ def picture(change: RunChange, doc: Mapping[str, Any]) -> bytes:
         return canvas.png(figure, canvas.DPI)
 
 
-def title(doc: Mapping[str, Any]) -> str:
+def title(doc: ComparedRuns) -> str:
     """Both files, with the rows that were chosen, and the answer.
 
-    >>> doc = {"recordings": ["mon/a.csv", "tue/a.csv"], "rows": {"A": [], "B": ["rotor=left"]}}
-    >>> print(title(doc | {"verdict": "unknown", "effects": [], "ratios": {}, "ranking": []}))
+    >>> files, rows = ("mon/a.csv", "tue/a.csv"), {"A": (), "B": ("rotor=left",)}
+    >>> print(title(ComparedRuns("unknown", (), None, None, Densities(None, None, None), recordings=files, rows=rows)))
     A: mon/a.csv
     B: tue/a.csv (rotor=left)
     Something changed, and no listed cause explains it.
     """
-    paths = [Path(name) for name in doc["recordings"]]
+    paths = [Path(name) for name in doc.recordings]
     names = [path.name for path in paths]
     if names[0] == names[1] and paths[0] != paths[1]:
         names = [str(path.relative_to(path.parent.parent)) for path in paths]
     lines = []
     for letter, name in zip("AB", names, strict=True):
-        rows = ", ".join(doc["rows"][letter])
+        rows = ", ".join(doc.rows[letter])
         lines.append(f"{letter}: {name}" + (f" ({rows})" if rows else ""))
     return "\n".join(part for line in (*lines, headline(doc)) for part in textwrap.wrap(line, _WIDE))
 
@@ -126,12 +127,12 @@ def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     r = change.ratios[c.channel]
     word = WORD[c.channel].removesuffix(" at equal command")
     (low, high), (slow, fast) = c.common(), c.common_advance()
-    if r["extrapolated"] and slow > fast:
+    if r.extrapolated and slow > fast:
         axis.set_axis_off()
         told = f"{word}: no ratio B / A, since A and B have\nno {_advance(change)[0].partition(' [')[0]} in common"
         axis.text(0.5, 0.5, told, ha="center", va="center", transform=axis.transAxes)
         return
-    curve = np.array(r["curve"]) * np.array([1.0, 1.0, r["density_ratio"], r["density_ratio"], r["density_ratio"]])
+    curve = np.array(r.curve) * np.array([1.0, 1.0, *[r.density_ratio] * 3])
     label, scaled = _axis(change, c)
     curve = curve[np.argsort(curve[:, _along(c)], kind="stable")]
     shared = (curve[:, 1] >= slow) & (curve[:, 1] <= fast)
@@ -141,8 +142,8 @@ def _ratio(axis: Any, change: RunChange, c: MatchedChannel) -> None:
     axis.fill_between(x, curve[:, 3], curve[:, 4], color=_BAND, alpha=0.3, lw=0.0, label="95 %")
     axis.plot(x, curve[:, 2], color=_A, label="B over A")
     axis.axhline(1.0, color=_GREY, lw=0.8)
-    if r["density_ratio"] != 1.0:
-        axis.axhline(r["density_ratio"], color=_B, lw=1.0, ls="--", label="recorded density")
+    if r.density_ratio != 1.0:
+        axis.axhline(r.density_ratio, color=_B, lw=1.0, ls="--", label="recorded density")
     if c.name not in _OVER_COMMAND:
         both = f"equal speed and {_advance(change)[0].partition(' [')[0]}" if c.advance_moves() else "equal speed"
         far = low > high + _STEADY
