@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bemt.app import cli
-from bemt.base import cache, folders
+from bemt.base import cache, given
 from bemt.base.errors import InputError
 from bemt.data.recordings import database as data
 from bemt.data.recordings import database as data_archive
@@ -120,14 +120,14 @@ def left(folder: Path) -> set[str]:
 
 
 def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
-    assert folders.find_data("uiuc") is None
+    assert given.find_data("uiuc") is None
     assert cli.main(["fetch", "uiuc", "--url", url(server), "--json"]) == 0
     doc = json.loads(capsys.readouterr().out)
     folder = no_cache_but / "data" / "uiuc"
     assert doc["schema"] == "bemt.data/1" and doc["propellers"] == 2 and doc["files"] == 4
     assert (doc["checksum"], doc["fetched"], doc["folder"]) == ("first use", True, str(folder))
     assert (folder / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM  # the one top folder is left off
-    assert folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
+    assert given.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
     assert cli.main(["calibrate", "--quiet"]) == 0  # reads the fetched data when no file is named
 
 
@@ -136,10 +136,10 @@ def test_a_named_folder_comes_before_the_cache(server, no_cache_but, tmp_path, m
     mine = tmp_path / "mine"
     (mine / "uiuc").mkdir(parents=True)
     monkeypatch.setenv("BEMT_DATA", str(mine))
-    assert folders.find_data("uiuc") == mine / "uiuc"
+    assert given.find_data("uiuc") == mine / "uiuc"
     monkeypatch.setenv("BEMT_CACHE", "off")
     (mine / "uiuc").rmdir()
-    assert folders.find_data("uiuc") is None
+    assert given.find_data("uiuc") is None
 
 
 def test_what_is_there_is_not_fetched_again(server, tmp_path):

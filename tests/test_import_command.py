@@ -14,7 +14,7 @@ import pytest
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.data.recordings.choice import Choice
+from bemt.data.recordings.adapt import Choice
 from bemt.data.recordings.load import document, import_file
 
 PERIOD = 0.5

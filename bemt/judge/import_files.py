@@ -94,7 +94,7 @@ def import_(
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
-    from bemt.data.recordings.choice import asked
+    from bemt.data.recordings.adapt import asked
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
@@ -155,7 +155,7 @@ def _beside(
 ) -> tuple[str, dict[str, Any]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
     from bemt.base.tables import write_atomic
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     speed = [rpm] if rpm is not None and not stated else []

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import find_data
+from bemt.base.given import find_data
 from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.data import readers as importers

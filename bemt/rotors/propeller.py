@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.base.action import in_words_of_the_library, worded
+from bemt.base.action import in_words_of_the_library, table_html, worded
 from bemt.base.errors import Fault, InputError
-from bemt.base.face import table_html
 from bemt.base.given import number, numbers, path_text
 from bemt.base.tables import number_of
 from bemt.physics.bem.coaxial import LOADS, RATIOS

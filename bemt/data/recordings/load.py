@@ -37,7 +37,9 @@ from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
+    Choice,
     adapt,
+    averaged,
     damaged_export,
     findings,
     is_recording,
@@ -48,7 +50,6 @@ from bemt.data.recordings.adapt import (
 )
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_study import merged, of_table
-from bemt.data.recordings.choice import Choice, averaged
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.action import Told
+from bemt.base.action import Told, as_html
 from bemt.base.errors import Fault, InputError, system_fault
-from bemt.base.face import as_html
 from bemt.base.given import path_text
 from bemt.data.recordings.cfd_study import together
 from bemt.data.recordings.load import as_stated, import_file

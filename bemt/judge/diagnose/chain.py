@@ -27,15 +27,17 @@ from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.nuisance import following
+from bemt.judge.diagnose.prior import ALWAYS
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.diagnose.shared_physics import ask_reference
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.compare.drive_laws import Judgement
     from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
+    from bemt.judge.diagnose.signatures import Candidate
     from bemt.rotors.case import Case
 
 __all__ = ["MOTOR", "Diagnosis", "diagnose"]
@@ -262,3 +264,23 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     order = [lead, rivals[0], *sorted(rivals[1:], key=lambda i: -weight[i])][:_MOST_RIVALS]
     open_ = decision.verdict in ("class", "unknown", "insufficient")
     return suggestion.suggest(found, rivals_of(order), found.probability[UNKNOWN], reference=open_)
+
+
+# Physics that the case leaves out and a reference shows as well: what every rotor has is in both runs.
+#
+# The runs do not differ in it, yet it is why the case fits neither. The reference alone is asked whether it shows it:
+# the recording may have another cause, which must not answer for it.
+def ask_reference(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
+    """Problem that knows what its runs share; candidates were solved in both.
+
+    Of what a reference clearly lacks (a code that can switch it off made it) only the recording's part stays.
+    """
+    asked = [c for c in candidates if c.id in problem.missing]
+    if not asked:
+        return replace(problem, shared=frozenset()), tuple(candidates)
+    rows = ~problem.free
+    shows = posterior.log_odds(problem.of(rows), [c.seen_as(c.signatures[rows]) for c in asked])
+    both = frozenset(i for i, odds in shows.items() if odds + np.log(ALWAYS) > 0.0)
+    alone = problem.missing - both
+    kept = (c.seen_as(np.where(rows[:, None], 0.0, c.signatures)) if c.id in alone else c for c in candidates)
+    return replace(problem, shared=both, predicted={}), tuple(kept)

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt.base.action import Told
+from bemt.base.action import Told, as_html
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError
-from bemt.base.face import as_html
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, Invocation, RankedCause, document, next_step
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
 from bemt.judge.compare.selection import conditions_of, selected, with_air
@@ -213,7 +212,7 @@ def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str
     """Write comparison.json, its text, a picture, and the recordings inside the prediction band of the case."""
     from bemt.base.page import FIRST
     from bemt.base.tables import json_text, write_atomic
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     out.mkdir(parents=True, exist_ok=True)

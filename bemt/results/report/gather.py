@@ -252,7 +252,7 @@ def diagnose_into(
     from bemt.judge.diagnose import folder
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     cases = find_cases(paths)

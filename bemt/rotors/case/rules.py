@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import InputError
-from bemt.base.folders import inside
+from bemt.base.given import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.rotors.case.reading import parse_reading

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import find_data
+from bemt.base.given import find_data
 from bemt.base.tables import json_text, or_null, write_atomic
 from bemt.rotors.population import population
 from bemt.rotors.validate.points import (

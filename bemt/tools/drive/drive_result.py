@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.action import as_html
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case

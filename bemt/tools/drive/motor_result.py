@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import inside
+from bemt.base.given import inside
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import FieldLimits, Table, entry, read_model
 from bemt.data import readers as importers

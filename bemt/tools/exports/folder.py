@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bemt.base.action import as_html
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.base.face import as_html
 from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import check_field, shown

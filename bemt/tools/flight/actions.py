@@ -247,7 +247,7 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
 
     from bemt.judge.diagnose.rotor_calibration import document, text, write
     from bemt.rotors.case.load import with_changes
-    from bemt.tools.flight.rotor_case import learn_from_flights
+    from bemt.tools.flight.identify import learn_from_flights
 
     files = [a.log.file for a in answers]
     from bemt.rotors.propeller import rotor_of

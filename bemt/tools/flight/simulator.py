@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.tools.flight.batches import BATCHES, half_width
 from bemt.tools.flight.identify import Constant, Identified
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.repeat import flight_scatter
+from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width
 
 _RAD_S = np.pi / 30.0  # rad/s of one rev/min
 _SLOWEST_S, _LEAST_SEEN = 0.5, 0.5  # longest lag tried [s]; share of the variance that it must explain
