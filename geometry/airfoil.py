@@ -351,11 +351,9 @@ def parse_dat(text: str, name: str = "") -> Airfoil:
         faults.add("section file", f"{len(rows)} points", "7 points or more", "Is it a coordinate file?")
     if counts is not None and sum(counts) != len(rows) and not faults.found:
         faults.add(
-            "section file",
-            f"{len(rows)} points",
-            f"{counts[0]} + {counts[1]} as its second line says",
+            "section file", f"{len(rows)} points", f"{counts[0]} + {counts[1]} as its second line says",
             "Truncated file?",
-        )
+        )  # fmt: skip
     faults.check()
     points = np.array([row[1:] for row in rows])
     if not (abs(points[:, 0].max() - 1) <= 0.02 and abs(points[:, 0].min()) <= 0.02):

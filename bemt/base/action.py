@@ -63,14 +63,9 @@ class Told:
 
 
 def action(
-    group: str,
-    example: str,
-    *,
-    words: tuple[str, ...] = (),
-    common: tuple[str, ...] = (),
-    shown: bool = False,
+    group: str, example: str, *, words: tuple[str, ...] = (), common: tuple[str, ...] = (), shown: bool = False,
     command: str = "",
-) -> Callable[[Callable[P, T]], Callable[P, T]]:
+) -> Callable[[Callable[P, T]], Callable[P, T]]:  # fmt: skip
     """Declare a public function as an action."""
 
     def declare(function: Callable[P, T]) -> Callable[P, T]:

@@ -12,18 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 __all__ = [
-    "EXIT_INPUT",
-    "EXIT_INTERNAL",
-    "EXIT_OK",
-    "EXIT_UNCONVERGED",
-    "BemtWarning",
-    "ConvergenceWarning",
-    "Fault",
-    "InputError",
-    "RangeWarning",
-    "needs",
-    "system_fault",
-]
+    "EXIT_INPUT", "EXIT_INTERNAL", "EXIT_OK", "EXIT_UNCONVERGED", "BemtWarning", "ConvergenceWarning", "Fault",
+    "InputError", "RangeWarning", "needs", "system_fault",
+]  # fmt: skip
 
 EXIT_OK = 0
 """Everything fine."""

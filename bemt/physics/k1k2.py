@@ -106,13 +106,9 @@ def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
 
 
 def thrust(
-    diameter_m: ArrayLike,
-    pitch_m: ArrayLike,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    rho: ArrayLike = RHO_FIXED,
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
     hub_diameter_m: ArrayLike = 0.0,
-) -> Any:
+) -> Any:  # fmt: skip
     """Thrust by the K1/K2 model. [N]
 
     Reference [1] of the module, final equation of part 1.  Its worked example: 10x6 at 10 500 rev/min, 1619 gf.
@@ -162,14 +158,9 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 
 
 def estimate(
-    diameter_m: ArrayLike,
-    pitch_m: ArrayLike,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    air: Air | None = None,
-    hub_diameter_m: ArrayLike = 0.0,
-    ducted: bool = False,
-) -> Dataset:
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
+    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
+) -> Dataset:  # fmt: skip
     """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
 
     >>> from bemt.base.units import KGF

@@ -265,11 +265,9 @@ X_MAX = 0.8
 """J/(P/D) up to which relative errors in flight are counted: thrust vanishes soon after [-]."""
 X_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 _EDGES: dict[str, tuple[float, ...]] = {
-    "P/D": (0.0, 0.4, 0.6, 0.8, 1.0, np.inf),
-    "diameter [in]": (0.0, 6.0, 9.0, 12.0, 16.0, np.inf),
-    "tip Mach": (0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, np.inf),
-    "blades": (1.5, 2.5, 3.5, 4.5, np.inf),
-}
+    "P/D": (0.0, 0.4, 0.6, 0.8, 1.0, np.inf), "diameter [in]": (0.0, 6.0, 9.0, 12.0, 16.0, np.inf),
+    "tip Mach": (0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, np.inf), "blades": (1.5, 2.5, 3.5, 4.5, np.inf),
+}  # fmt: skip
 
 
 def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, K1K2]:
@@ -371,11 +369,8 @@ def _set(name: str, found: Scores) -> list[str]:
         for k in s.models
     ]
     first = [
-        "thrust, made/measured: median, % in 13, 26 %",
-        "at rest",
-        "in flight",
-        *[str(b.band) for b in found.x[:5]],
-    ]
+        "thrust, made/measured: median, % in 13, 26 %", "at rest", "in flight", *[str(b.band) for b in found.x[:5]],
+    ]  # fmt: skip
     models = [k for k in ("thesis", "refit") if k in s.models]
     rows = [
         [str(r.quantity), str(r.band), str(r.motion), str(r.propellers), str(r.points),

@@ -134,14 +134,9 @@ def together(parts: Sequence[Dataset], cells: Sequence[float] | None = None, nam
     about.pop("means", None)
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
     whole = Dataset(
-        "cfd",
-        name or f"{parts[first].name} and {len(parts) - 1} coarser",
-        join("values"),
-        join("u"),
-        (),
-        about,
+        "cfd", name or f"{parts[first].name} and {len(parts) - 1} coarser", join("values"), join("u"), (), about,
         notes=notes,
-    )
+    )  # fmt: skip
     return by_grid(whole, n)
 
 

@@ -235,13 +235,9 @@ def _check_own(folder: Path, known: dict[str, Any]) -> None:
 
 
 def get(
-    kind: str,
-    folder: Path,
-    source: str | Path | None = None,
-    url: str | None = None,
-    refresh: bool = False,
+    kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, refresh: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Put a database into a folder."""
     from bemt.data.readers.uiuc import scan_folder
 

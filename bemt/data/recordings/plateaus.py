@@ -147,11 +147,8 @@ def _running_median(v: Array, half: int) -> Array:
 
 
 def find(
-    time_s: ArrayLike | None,
-    channels: Mapping[str, ArrayLike],
-    signal: str,
-    command: ArrayLike | None = None,
-) -> Plateaus:
+    time_s: ArrayLike | None, channels: Mapping[str, ArrayLike], signal: str, command: ArrayLike | None = None,
+) -> Plateaus:  # fmt: skip
     """Find the plateaus of a recording.
 
     >>> t = np.arange(60) * 0.1
@@ -340,14 +337,8 @@ def _outliers(v: Array) -> NDArray[np.intp]:
 
 
 def _reduce(
-    t: Array,
-    data: Mapping[str, Array],
-    signal: str,
-    command: ArrayLike | None,
-    start: int,
-    stop: int,
-    span: float,
-) -> tuple[Plateau | None, list[Dropped]]:
+    t: Array, data: Mapping[str, Array], signal: str, command: ArrayLike | None, start: int, stop: int, span: float,
+) -> tuple[Plateau | None, list[Dropped]]:  # fmt: skip
     rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
     if len(rows) < LEAST_SAMPLES:
         return None, [Dropped(start, stop, f"fewer than {LEAST_SAMPLES} samples")]

@@ -22,13 +22,10 @@ if TYPE_CHECKING:
 
 _A, _B, _BAND, _GREY = canvas.BLUE, canvas.RED, canvas.SKY, canvas.GREY
 _LABEL = {
-    "thrust_N": "thrust / n² [N s²]",
-    "torque_Nm": "torque / n² [N m s²]",
-    "power_W": "shaft power / n³ [W s³]",
-    "electrical_power_W": "electrical power / n³ [W s³]",
-    "rpm": "speed of rotation [rev/min]",
+    "thrust_N": "thrust / n² [N s²]", "torque_Nm": "torque / n² [N m s²]", "power_W": "shaft power / n³ [W s³]",
+    "electrical_power_W": "electrical power / n³ [W s³]", "rpm": "speed of rotation [rev/min]",
     "voltage_V": "voltage [V]",
-}
+}  # fmt: skip
 _COMMAND = {"pwm_s": ("pulse width [µs]", 1e6), "throttle": ("throttle [-]", 1.0)}
 _OVER_COMMAND = ("speed", "voltage")
 # Speeds that vary by less than this share are one.

@@ -14,16 +14,10 @@ from bemt.judge.compare.smooth_change import Ratio
 from bemt.physics.effects import catalogue
 
 WORD = {
-    "thrust_N": "thrust",
-    "torque_Nm": "torque",
-    "power_W": "shaft power",
-    "CT": "CT",
-    "CP": "CP",
-    "CQ": "CQ",
-    "electrical_power_W": "electrical power",
-    "rpm": "speed at equal command",
+    "thrust_N": "thrust", "torque_Nm": "torque", "power_W": "shaft power", "CT": "CT", "CP": "CP", "CQ": "CQ",
+    "electrical_power_W": "electrical power", "rpm": "speed at equal command",
     "voltage_V": "voltage at equal command",
-}
+}  # fmt: skip
 # Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
 _NO_SLOPE = 1.0
 _ROWS, _NOTES = 8, 4

@@ -114,11 +114,9 @@ def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter,
     """Scatter and bend that make the readings likeliest with such a change, and the logarithm of that likelihood."""
     change, y = free_change(c) if change is None else change, c.y - c.y.mean()
     ways = {
-        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES),
-        "bend": _BENDS,
-        "wiggle": _WIGGLES,
+        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES), "bend": _BENDS, "wiggle": _WIGGLES,
         "floor": _FLOORS if c.name in LOADS else (0.0,),
-    }
+    }  # fmt: skip
     best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
     for _ in range(2):
         for name, values in ways.items():

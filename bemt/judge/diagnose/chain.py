@@ -50,15 +50,10 @@ _MOST_RIVALS = 5
 
 
 def diagnose(
-    records: Sequence[Record],
-    cases: Sequence[Case],
-    only: Sequence[str] | None = None,
-    progress: Callable[[str], None] | None = None,
-    baseline: str = "bemt",
-    given: suggestion.Given | None = None,
-    channels: Sequence[str] | None = None,
-    change: RunChange | None = None,
-) -> Diagnosis:
+    records: Sequence[Record], cases: Sequence[Case], only: Sequence[str] | None = None,
+    progress: Callable[[str], None] | None = None, baseline: str = "bemt", given: suggestion.Given | None = None,
+    channels: Sequence[str] | None = None, change: RunChange | None = None,
+) -> Diagnosis:  # fmt: skip
     """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
@@ -100,15 +95,10 @@ def diagnose(
 
 
 def _diagnose(
-    records: Sequence[Record],
-    cases: Sequence[Case],
-    only: Sequence[str] | None,
-    say: Callable[[str], None],
-    baseline: str,
-    given: suggestion.Given,
-    ratios: Callable[[Collection[str]], RunChange | None],
+    records: Sequence[Record], cases: Sequence[Case], only: Sequence[str] | None, say: Callable[[str], None],
+    baseline: str, given: suggestion.Given, ratios: Callable[[Collection[str]], RunChange | None],
     rotor: Diagnosis | None,
-) -> Diagnosis:
+) -> Diagnosis:  # fmt: skip
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
     if question := other_rotor.finding(problem):

@@ -142,13 +142,10 @@ def compare(
     if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
         raise InputError(
             Fault(
-                names[0],
-                "",
-                "the same recording twice",
-                "two recordings, or two choices of rows",
+                names[0], "", "the same recording twice", "two recordings, or two choices of rows",
                 _two_choices(names[0]),
             )
-        )
+        )  # fmt: skip
     read: list[Dataset] = []
     faults: list[Fault] = []
     for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):

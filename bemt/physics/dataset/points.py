@@ -277,11 +277,9 @@ class Dataset:
         0.03101
         """
         factors = {
-            "CT_rotor": ("CT", co.CT_PER_ROTOR),
-            "CP_rotor": ("CP", co.CP_PER_ROTOR),
-            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR),
-            "mu_axial": ("J", math.pi),
-        }
+            "CT_rotor": ("CT", co.CT_PER_ROTOR), "CP_rotor": ("CP", co.CP_PER_ROTOR),
+            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR), "mu_axial": ("J", math.pi),
+        }  # fmt: skip
 
         def convert(channels: Mapping[str, ArrayLike]) -> dict[str, Array]:
             pairs = ((*factors.get(key, (key, 1.0)), array) for key, array in channels.items())

@@ -198,12 +198,8 @@ Recorded = tuple[Row, int, dict[str, float]]
 
 
 def _recorded_rows(
-    case: Case,
-    refs: list[Reference],
-    diameter: float,
-    points: list[tuple[float, float, float]],
-    nominal: Dataset,
-) -> list[Recorded]:
+    case: Case, refs: list[Reference], diameter: float, points: list[tuple[float, float, float]], nominal: Dataset,
+) -> list[Recorded]:  # fmt: skip
     """Rows of all recorded values, coefficients derived."""
     if not refs:
         return []

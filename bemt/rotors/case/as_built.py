@@ -118,12 +118,7 @@ def _posterior(path: Path) -> CaseAsBuilt:
 def posterior_document(prior: Prior, reference: ReferenceRun, provenance: dict[str, object]) -> dict[str, object]:
     """Document that `blade.as_built.file` names."""
     return {
-        "schema": _SCHEMA,
-        "latents": list(NAMES),
-        "mean": prior.mean.tolist(),
-        "cov": prior.cov.tolist(),
-        "sizes": prior.sizes.tolist(),
-        "weights": prior.weights.tolist(),
-        "reference": reference.document(),
+        "schema": _SCHEMA, "latents": list(NAMES), "mean": prior.mean.tolist(), "cov": prior.cov.tolist(),
+        "sizes": prior.sizes.tolist(), "weights": prior.weights.tolist(), "reference": reference.document(),
         "provenance": provenance,
-    }
+    }  # fmt: skip

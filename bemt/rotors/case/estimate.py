@@ -53,14 +53,9 @@ def length_fault(option: str, value: float, unit: str, diameter_m: float, limits
 
 
 def case_of_label(
-    label: str,
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    reading: str | None = None,
-) -> Case:
+    label: str, blades: int | None = None, chord_mm: float | None = None, measured_pitch_in: float | None = None,
+    series: str | None = None, density: float | None = None, reading: str | None = None,
+) -> Case:  # fmt: skip
     """Case of a label with what else was measured of the propeller; a measured value is no unknown any more.
 
     A chord at 0.75 R scales the chord law; a pitch measured there replaces that of the label, which the population of
@@ -88,17 +83,10 @@ def case_of_label(
 
 
 def document(
-    label: str,
-    speeds: Sequence[float],
-    airspeeds: Sequence[float] = (),
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    angles: Sequence[float] = (),
-    reading: str | None = None,
-) -> dict[str, Any]:
+    label: str, speeds: Sequence[float], airspeeds: Sequence[float] = (), blades: int | None = None,
+    chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
+    density: float | None = None, angles: Sequence[float] = (), reading: str | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Estimate every speed [rev/min] with every airspeed [m/s] at every angle between wind and shaft [deg].
 
     ``bemt.estimate/2``; unknown numbers are null. ``u_...`` is the rotor's own, ``u_reading_...`` what a stand shows
@@ -229,17 +217,10 @@ class RotorEstimate(Dataset):
 
 
 def of_label(
-    label: str,
-    rpm: Any,
-    airspeed_m_s: Any = 0.0,
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    angle_deg: Any = 0.0,
-    reading: str | None = None,
-) -> RotorEstimate:
+    label: str, rpm: Any, airspeed_m_s: Any = 0.0, blades: int | None = None, chord_mm: float | None = None,
+    measured_pitch_in: float | None = None, series: str | None = None, density: float | None = None,
+    angle_deg: Any = 0.0, reading: str | None = None,
+) -> RotorEstimate:  # fmt: skip
     """`document` as a Dataset, standard uncertainties in ``u``."""
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)

@@ -136,11 +136,9 @@ class Solver:
 
 
 def compare(
-    propeller: UiucPropeller,
-    effects: Sequence[Effect],
-    fixed_re: float | None = None,
+    propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None = None,
     stations: Stations | None = None,
-) -> Rows:
+) -> Rows:  # fmt: skip
     """Solve every measured point of one propeller."""
     return rows(propeller, Solver(propeller, effects, fixed_re, stations))
 

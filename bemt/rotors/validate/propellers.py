@@ -154,13 +154,9 @@ SCHEMA = "bemt.validation/1"
 
 
 def validate(
-    folder: Path | Sequence[Path],
-    effects: Sequence[Effect] | None = None,
-    fixed_re: float | None = None,
-    progress: Callable[[str], None] | None = None,
-    match_J0: bool = False,
-    as_drawn: bool = False,
-) -> dict[str, Any]:
+    folder: Path | Sequence[Path], effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
+    progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
+) -> dict[str, Any]:  # fmt: skip
     """Compare a folder."""
     from bemt.physics import effects as registry
     from bemt.physics.sections import rule as section_rule
@@ -207,12 +203,9 @@ def validate(
     doc["unconverged"] = unconverged
     doc["effects"] = [e.describe() for e in eff]
     doc["polar"] = {
-        "rule": "bemt.physics.sections.rule",
-        "n_crit": section_rule.N_CRIT,
-        "drag_level": section_rule.DRAG_LEVEL,
-        "fixed_re": fixed_re,
-        "calibrated_on": "UIUC volume 1",
-    }
+        "rule": "bemt.physics.sections.rule", "n_crit": section_rule.N_CRIT, "drag_level": section_rule.DRAG_LEVEL,
+        "fixed_re": fixed_re, "calibrated_on": "UIUC volume 1",
+    }  # fmt: skip
     doc["propellers"] = rows
     doc["skipped"] = [{"name": name, "reason": why} for name, why in found.skipped]
     doc["faults"] = list(found.faults)

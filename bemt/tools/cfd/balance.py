@@ -169,14 +169,9 @@ def balance_of(run: Path, settings: Settings) -> Balance:
 
 
 def _relative(
-    s: Settings,
-    on_rotor: tuple[float, float],
-    mass: tuple[float, float],
-    axial: tuple[float, float],
-    angular: float,
-    swirl: float,
-    place: str,
-) -> Balance:
+    s: Settings, on_rotor: tuple[float, float], mass: tuple[float, float], axial: tuple[float, float], angular: float,
+    swirl: float, place: str,
+) -> Balance:  # fmt: skip
     """Residuals of one sector over the measures of one sector; (residual, made by the sides) of mass and momentum."""
     n, D, area = s.rpm / 60, 2 * s.R, math.pi * s.R**2
     thrust = max(s.sectors * abs(on_rotor[0]), LEAST_CT * s.rho * n**2 * D**4)

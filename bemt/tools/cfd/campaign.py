@@ -249,13 +249,9 @@ def _radial_text(found: Summary) -> list[str]:
 
 
 def run_campaign(
-    campaign: Campaign,
-    work: Path,
-    only: int | None = None,
-    ranks: int = 2,
-    tell: Callable[[str], None] | None = None,
-    keep: bool = True,
-) -> CampaignRecord:
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
+    tell: Callable[[str], None] | None = None, keep: bool = True,
+) -> CampaignRecord:  # fmt: skip
     """Run the points of a campaign that are not recorded yet."""
     keys: list[tuple[str, str, Settings]] = []
     faults: list[Fault] = []

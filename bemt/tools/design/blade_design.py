@@ -37,15 +37,8 @@ HUB_RATIO = 0.15
 THIN_FROM = 0.5
 """r/R from which the thickness is the outer one [1]."""
 FAMILY = (
-    (0.12, 0.09),
-    (0.15, 0.09),
-    (0.18, 0.12),
-    (0.21, 0.12),
-    (0.24, 0.15),
-    (0.28, 0.15),
-    (0.28, 0.18),
-    (0.30, 0.21),
-)
+    (0.12, 0.09), (0.15, 0.09), (0.18, 0.12), (0.21, 0.12), (0.24, 0.15), (0.28, 0.15), (0.28, 0.18), (0.30, 0.21),
+)  # fmt: skip
 """Thickness at the hub and on the outer half that are tried, while stress limits the blade; the first is tabulated
 without NeuralFoil [1]."""
 FAR = 0.8  # Share of the thrust below which the next but one is tried [1]

@@ -243,13 +243,9 @@ def required(
     for p in points:
         check("--thrust-N", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
         check(
-            "--airspeed-m-s",
-            p.airspeed_m_s,
-            0.0,
-            FAST,
-            "m/s",
+            "--airspeed-m-s", p.airspeed_m_s, 0.0, FAST, "m/s",
             "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "",
-        )
+        )  # fmt: skip
         check("--points", p.weight, 0.0, 1e6, "", "weight is a share of time")
         if p.rpm is not None:
             check("--rpm", p.rpm, 100.0, 3e5, "rev/min", "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else "")

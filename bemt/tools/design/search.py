@@ -120,27 +120,13 @@ class Target:
 
 
 def choose(
-    thrust_N: float | None = None,
-    cells: int | None = None,
-    *,
-    kv: float | Sequence[float] = (80.0, 8000.0),
-    motors: Sequence[KnownMotor] | str | os.PathLike[str] = (),
-    labels: str | Sequence[str] = (),
-    blades: int | Sequence[int] = (2,),
-    mass_kg: float | None = None,
-    rest_kg: float | None = None,
-    rotors: int = 1,
-    airspeed_m_s: float = 0.0,
-    max_diameter_in: float | None = None,
-    arm_mm: float | None = None,
-    max_tip_mach: float = 0.8,
-    capacity_Ah: float | None = None,
-    minutes: float | None = None,
-    fan: bool = False,
-    fluid: str = "air",
-    coaxial: bool = False,
-    sure: float = 0.9,
-) -> pd.DataFrame:
+    thrust_N: float | None = None, cells: int | None = None, *, kv: float | Sequence[float] = (80.0, 8000.0),
+    motors: Sequence[KnownMotor] | str | os.PathLike[str] = (), labels: str | Sequence[str] = (),
+    blades: int | Sequence[int] = (2,), mass_kg: float | None = None, rest_kg: float | None = None, rotors: int = 1,
+    airspeed_m_s: float = 0.0, max_diameter_in: float | None = None, arm_mm: float | None = None,
+    max_tip_mach: float = 0.8, capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
+    fluid: str = "air", coaxial: bool = False, sure: float = 0.9,
+) -> pd.DataFrame:  # fmt: skip
     """Rank propellers and motors for a thrust or a mass; arguments as those of :func:`bemt.choose`.
 
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,

@@ -232,12 +232,8 @@ Ask = Callable[[Case, Drive], dict[str, Array]]
 
 
 def _carried(
-    case: Case,
-    airspeed_m_s: float,
-    off: Sequence[str],
-    ask: Ask,
-    bands: bool = True,
-) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:
+    case: Case, airspeed_m_s: float, off: Sequence[str], ask: Ask, bands: bool = True,
+) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:  # fmt: skip
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()

@@ -185,14 +185,9 @@ class MapResult:
 
 
 def fit(
-    files: Sequence[str],
-    sign: int = 1,
-    nodes: int = 41,
-    name: str | None = None,
-    thrust: float | None = None,
-    voltage: float | None = None,
-    out: str | None = None,
-) -> MapResult:
+    files: Sequence[str], sign: int = 1, nodes: int = 41, name: str | None = None, thrust: float | None = None,
+    voltage: float | None = None, out: str | None = None,
+) -> MapResult:  # fmt: skip
     """Fit a map to recordings of one drive and write it where told; faults of options and files come at once."""
     parts: list[Dataset] = []
     faults = _option_faults(thrust, voltage, nodes, name)
@@ -299,11 +294,7 @@ def _sources(path: Path, got: object) -> set[Path]:
 def _write(folder: Path, name: str, chart: bench_map.BenchMap, nodes: int, text: str) -> None:
     forward, inverse = tables(chart, nodes)
     contents: Iterable[bytes | str] = (
-        text,
-        table_csv(forward),
-        table_csv(inverse),
-        c_header(chart, name, nodes),
-        outputs.bench_map(chart, name),
-    )
+        text, table_csv(forward), table_csv(inverse), c_header(chart, name, nodes), outputs.bench_map(chart, name),
+    )  # fmt: skip
     for form, content in zip(RESULTS, contents, strict=True):
         write_atomic(folder / form.format(name), content)

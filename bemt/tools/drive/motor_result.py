@@ -314,13 +314,9 @@ def document(trials: MotorTrials, verdict: motor_constant.Verdict) -> dict[str, 
 
 
 _UNITS = {
-    "back_emf.offset": "V",
-    "torque.offset": "N m",
-    "torque.shunt": "times the resistor assumed",
-    "data_sheet.gain": "times",
-    "back_emf.gain": "times",
-    "torque.gain": "times",
-}
+    "back_emf.offset": "V", "torque.offset": "N m", "torque.shunt": "times the resistor assumed",
+    "data_sheet.gain": "times", "back_emf.gain": "times", "torque.gain": "times",
+}  # fmt: skip
 
 
 def verdict_text(made: dict[str, Any]) -> list[str]:

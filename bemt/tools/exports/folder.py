@@ -165,16 +165,10 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 
 
 def export_cases(
-    path: str | Case,
-    out: str,
-    formats: Sequence[str],
-    unit: str = "mm",
-    fillet_mm: float = 0.0,
-    min_thickness_mm: float = 0.0,
-    given: Mapping[str, Any] | None = None,
-    hold: tuple[str, ...] = (),
+    path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
+    min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
     printed: Print | None = None,
-) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:
+) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:  # fmt: skip
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
     `given` is the operating point (``rpm``, ``airspeed_m_s``) and the options of single targets
@@ -309,15 +303,11 @@ def text(manifest: dict[str, Any], out: Path) -> str:
         return "\n".join(targets)
     rows = [
         [
-            item["path"],
-            item["format"],
-            item["unit"],
-            f"{item['bytes'] / 1e6:.2f}",
-            ", ".join(s["name"] for s in item["surfaces"]),
-            item["sha256"][:12],
+            item["path"], item["format"], item["unit"], f"{item['bytes'] / 1e6:.2f}",
+            ", ".join(s["name"] for s in item["surfaces"]), item["sha256"][:12],
         ]
         for item in manifest["files"]
-    ]
+    ]  # fmt: skip
     volumes, checks = manifest["volumes_m3"], manifest["checks_m"]
     lines = [
         f"{manifest['name']}: {manifest['blades']} blades, in {out}",

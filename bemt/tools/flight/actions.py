@@ -102,18 +102,11 @@ def layouts() -> dict[str, str]:
     common=("healthy", "mass_kg", "case", "layout", "picture", "out_csv", "healthy_day"),
 )  # fmt: skip
 def fly(
-    logs: StrPath | Sequence[StrPath],
-    *,
-    case: StrPath | None = None,
-    mass_kg: float | None = None,
-    layout: str = "",
-    healthy: Sequence[StrPath | Sequence[StrPath]] = (),
-    healthy_day: Literal["same", "other", ""] = "",
-    healthy_mass_kg: float | None = None,
-    out_case: StrPath | None = None,
-    picture: StrPath | None = None,
+    logs: StrPath | Sequence[StrPath], *, case: StrPath | None = None, mass_kg: float | None = None, layout: str = "",
+    healthy: Sequence[StrPath | Sequence[StrPath]] = (), healthy_day: Literal["same", "other", ""] = "",
+    healthy_mass_kg: float | None = None, out_case: StrPath | None = None, picture: StrPath | None = None,
     out_csv: StrPath | None = None,
-) -> FlightsAnswer | Told:
+) -> FlightsAnswer | Told:  # fmt: skip
     """Identify the rotors of flight logs, and compare each with healthy flights.
 
     Parameters

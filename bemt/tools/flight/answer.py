@@ -140,14 +140,9 @@ class FlightAnswer:
 
 
 def answer_on(
-    log: FlightLog,
-    healthy: Sequence[FlightLog] = (),
-    mass_kg: float | None = None,
-    layout: str = "",
-    healthy_mass_kg: float | None = None,
-    stated_days: Sequence[str] = (),
-    day: str = "",
-) -> FlightAnswer:
+    log: FlightLog, healthy: Sequence[FlightLog] = (), mass_kg: float | None = None, layout: str = "",
+    healthy_mass_kg: float | None = None, stated_days: Sequence[str] = (), day: str = "",
+) -> FlightAnswer:  # fmt: skip
     """Identify and judge one flight, with healthy flights of the same vehicle.
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.

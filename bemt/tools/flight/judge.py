@@ -92,14 +92,9 @@ class FlightVerdict:
 
 
 def judge(
-    flight: Array,
-    healthy: Sequence[Array],
-    layout: Array | None,
-    windy: bool = False,
-    beside: BesideBalance | None = None,
-    days: Sequence[int] = (),
-    day: int | None | str = "",
-) -> FlightVerdict:
+    flight: Array, healthy: Sequence[Array], layout: Array | None, windy: bool = False,
+    beside: BesideBalance | None = None, days: Sequence[int] = (), day: int | None | str = "",
+) -> FlightVerdict:  # fmt: skip
     """Judge the features of a flight, (B,), by those of healthy flights of the same vehicle [1].
 
     Without a layout no weights are tried, and every rotor stands for itself. `windy`: the rotors met wind that they do
@@ -209,14 +204,9 @@ def _totals(w: _World, calm: Array) -> list[_World]:
 
 
 def posterior(
-    flight: Array,
-    calm: Array,
-    layout: Array | None,
-    windy: bool = False,
-    beside: BesideBalance | None = None,
-    days: Sequence[int] | Array = (),
-    day: int | None | str = 0,
-) -> FlightPosterior:
+    flight: Array, calm: Array, layout: Array | None, windy: bool = False, beside: BesideBalance | None = None,
+    days: Sequence[int] | Array = (), day: int | None | str = 0,
+) -> FlightPosterior:  # fmt: skip
     """Weigh all explanations of the features of a flight, (B,), and say the answer; arguments as of :func:`judge`."""
     B, n, beside = flight.size, len(calm), beside or BesideBalance()
     axes, ways, known = axes_of(layout, B), directions(B, layout), layout is not None
