@@ -20,9 +20,9 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
 from bemt.judge.compare.change_document import document
-from bemt.judge.compare.contrast_figure import picture
 from bemt.judge.compare.contrast_text import text
 from bemt.judge.compare.drive_laws import LAWS
+from bemt.judge.compare.first_picture import picture
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.compare.stand_run import StandRun, stand_run

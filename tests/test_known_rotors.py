@@ -17,10 +17,10 @@ from bemt.rotors.case.motor import class_resistance, full_speed, named_motor
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.reading import parse_reading, with_reading
+from bemt.rotors.conditioning import CAMPAIGN
 from bemt.rotors.measured import find, measured_rotors, records
 from bemt.rotors.model import coefficients
 from bemt.rotors.propeller import rotor_of
-from bemt.rotors.reference import CAMPAIGN
 from bemt.rotors.validate.points import measured
 from bemt.tools.drive import drive_result
 from geometry.common import GeometryError

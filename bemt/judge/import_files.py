@@ -106,7 +106,7 @@ def import_(
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
     lines, insist = [], any(told.values()) or any(run.values()) or out is not None
     if insist and (table := _table(names, run)):
-        from bemt.data.recordings.stated import write_recording
+        from bemt.data.recordings.cfd_options import write_recording
 
         if out is None:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"

@@ -20,10 +20,9 @@ from population_fit import fit
 from bemt import __version__
 from bemt.base.tables import json_text, plain, write_atomic
 from bemt.physics.coefficients import M_tip
-from bemt.rotors.conditioning import condition
+from bemt.rotors.conditioning import ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import Prior
 from bemt.rotors.population import WEIGHTS, Population
-from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validate.points import (
     J_SHARE,
     KINDS,

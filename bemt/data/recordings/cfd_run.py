@@ -23,9 +23,8 @@ from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
 from bemt.data.recordings.cfd_setup import with_grid_floor
-from bemt.data.recordings.cfd_study import by_grid, groups, together
 from bemt.data.recordings.channels import moves
-from bemt.data.recordings.grid_study import COVERAGE
+from bemt.data.recordings.grid_study import COVERAGE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
 __all__ = ["NO_LOAD", "assemble", "document", "is_run", "run_at", "run_text"]

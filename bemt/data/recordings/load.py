@@ -49,7 +49,7 @@ from bemt.data.recordings.adapt import (
     reduction_of,
 )
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
-from bemt.data.recordings.cfd_study import merged, of_table
+from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault

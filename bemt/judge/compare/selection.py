@@ -15,7 +15,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
-from bemt.data.recordings.windmilling import zero_thrust_speed
+from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
 

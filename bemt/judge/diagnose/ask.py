@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.action import Told, as_html
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.given import path_text
-from bemt.data.recordings.cfd_study import together
+from bemt.data.recordings.grid_study import together
 from bemt.data.recordings.load import as_stated, import_file
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
@@ -110,7 +110,7 @@ class Answer:
     @property
     def improved(self) -> Propeller | None:
         """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
-        from bemt.judge.diagnose.improve import improved_case
+        from bemt.judge.diagnose.folder import improved_case
 
         text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None

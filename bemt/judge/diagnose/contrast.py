@@ -87,7 +87,7 @@ class Contrast:
 
     def picture(self) -> bytes:
         """The two recordings and what changed, as PNG."""
-        from bemt.judge.compare.contrast_figure import picture
+        from bemt.judge.compare.first_picture import picture
 
         return picture(self.change, self.said)
 

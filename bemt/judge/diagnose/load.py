@@ -277,7 +277,7 @@ _File = tuple[Any, "Case", float | None, float | None]
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, float | None, Dataset | None]]:
     """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import run_at
-    from bemt.data.recordings.cfd_study import are_grids, together
+    from bemt.data.recordings.grid_study import are_grids, together
 
     runs: dict[int, Dataset] = {}
     for i, (path, _, rpm, wind) in enumerate(files if len(files) > 1 else ()):

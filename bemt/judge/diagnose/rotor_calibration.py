@@ -20,7 +20,7 @@ from bemt.base.action import in_words_of_the_library
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.judge.diagnose.improve import beside, elsewhere
+from bemt.judge.diagnose.folder import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.judge.diagnose.other_rotor import FACTOR
 from bemt.physics.air import Air
@@ -30,11 +30,11 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.as_built import posterior_document
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.reading import SETTLED
+from bemt.rotors.conditioning import SESSION
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.propeller import Propeller
 from bemt.rotors.propeller import load as load_rotor
-from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"

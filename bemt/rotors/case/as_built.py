@@ -14,10 +14,10 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
+from bemt.rotors.conditioning import ReferenceRun
 from bemt.rotors.latents import NAMES, Prior
 from bemt.rotors.measured import records
 from bemt.rotors.population import label_angle_deg, population
-from bemt.rotors.reference import ReferenceRun
 
 if TYPE_CHECKING:
     from pathlib import Path

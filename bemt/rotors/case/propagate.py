@@ -24,10 +24,10 @@ from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.pair_error import PairError
+from bemt.rotors.conditioning import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import LEVELS, zero_thrust
-from bemt.rotors.reference import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.validity import Validity, aside
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ class Propagated:
     def u_reading(self, channel: str) -> Array:
         """Standard uncertainty of what a stand shows, (P,); the bands of the points are those of the rotor itself.
 
-        A stand that nobody calibrated has `bemt.rotors.reference.STAND` besides, a rotor that others measured their
+        A stand that nobody calibrated has `bemt.rotors.conditioning.STAND` besides, a rotor that others measured their
         campaign; a rotor that its own run calibrated is met again on that stand.
         """
         return self._on_stand(channel, self.points.u[channel], 1.0)

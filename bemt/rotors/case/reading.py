@@ -19,8 +19,8 @@ from bemt.base.units import UNITS, split_suffix
 from bemt.physics.air import Air
 from bemt.rotors.as_measured import as_measured
 from bemt.rotors.case.as_built import MOVED, CaseAsBuilt, as_built_of
+from bemt.rotors.conditioning import SESSION, apart
 from bemt.rotors.measured import records
-from bemt.rotors.reference import SESSION, apart
 
 if TYPE_CHECKING:
     from bemt.rotors.case.load import Case

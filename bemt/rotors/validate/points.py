@@ -16,10 +16,10 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
+from bemt.rotors.conditioning import ReferenceRun
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.population import Population, label_angle_deg
 from bemt.rotors.predict import LEVELS, half_width, inside, predict, sense
-from bemt.rotors.reference import ReferenceRun
 
 if TYPE_CHECKING:
     from bemt.data.readers.uiuc import UiucPropeller

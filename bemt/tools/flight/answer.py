@@ -18,13 +18,11 @@ from bemt.tools.flight.balance import axes_of, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
 from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
-from bemt.tools.flight.layout import layout_of
+from bemt.tools.flight.layout import layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.mass import mass_faults
 from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
-from bemt.tools.flight.simulator import simulator_constants
 from bemt.tools.flight.speed_sensor import checked, speed_changes
-from bemt.tools.flight.thrust_curve import Inflow, inflow, thrust_curve
+from bemt.tools.flight.thrust_curve import Inflow, inflow, simulator_constants, thrust_curve
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
 from bemt.tools.flight.wind import Wind, wind
 

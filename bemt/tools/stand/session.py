@@ -19,7 +19,7 @@ from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.page import render
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.actions import plan
-from bemt.judge.diagnose.improve import beside
+from bemt.judge.diagnose.folder import beside
 from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import prove
 from bemt.judge.proof.loop import A_RUN, Course, Points, follow
