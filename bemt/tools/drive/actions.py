@@ -172,8 +172,9 @@ def motor(file: Path, *, out: Path | None = None) -> Told:
     """
     from bemt.tools.drive import motor_result
 
-    trials, found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
-    return Told(found, motor_result.text(trials, found), exit_code=EXIT_OK if found["agree"] else EXIT_UNCONVERGED)
+    found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
+    code = EXIT_OK if found.agree else EXIT_UNCONVERGED
+    return Told(found.document(), motor_result.text(found), exit_code=code)
 
 
 @action("Drive", "thrusters thrusters.toml --force-N 40", words=("file",))
