@@ -116,17 +116,19 @@ def import_(
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
-    found = load.document(names, format, choice, made, insist)
-    if out is not None and found["runs"]:
-        made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
+    found = load.import_files(names, format, choice, made, insist)
+    if out is not None and found.runs:
+        own = tuple(found.runs[-1].provenance["files"])
+        made = made.model_copy(update={"run": made.run.model_copy(update={"files": own})})
         wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
+    document = found.document()
     if case is not None:
         runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
-        rest = [f["path"] for f in found["files"] if f["kind"] != "cfd"] if runs else names
+        rest = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
         seen = [wrote] if wrote else [*runs, *rest]
-        sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
+        sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
-    return Told(found, "\n".join([*lines, load.text(found, wrote)]), exit_code=load.exit_code(found))
+    return Told(document, "\n".join([*lines, found.text(wrote)]), exit_code=found.exit_code)
 
 
 def words(given: Mapping[str, str]) -> list[str]:

@@ -93,44 +93,41 @@ def ranges(lines: Iterable[tuple[int, int]]) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
 
 
-def points_text(found: Mapping[str, Any]) -> list[str]:
+def points_text(reduced: Dataset | str) -> list[str]:
     """Steady points, what was dropped and the notes, as lines of text."""
-    if found["error"] is not None:
-        return [f"  not reduced: {found['error']}"]
-    points = found["points"]
-    names = [k for k in SHOWN if any(_number(p.get(k)) is not None for p in points)]
+    if isinstance(reduced, str):
+        return [f"  not reduced: {reduced}"]
+    how, n = reduction(reduced), len(reduced)
+    values, none = reduced.values, np.full(n, np.nan)
+    names = [k for k in SHOWN if k in values and np.isfinite(values[k]).any()]
     names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
-    head = ["from"]
+    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
     for name in names:
-        head += [name] + ([f"u({name})"] if any(_number(p["u"].get(name)) is not None for p in points) else [])
-    rows = []
-    for p in points[:MOST]:
-        row = [str(p.get("label", "")).rsplit(":", 1)[-1]]
-        for name in names:
-            row.append(tables.number_text(_number(p.get(name)), 5))
-            if f"u({name})" in head:
-                row.append(tables.number_text(_number(p["u"].get(name)), 2))
-        rows.append([*row, ", ".join(p["flags"]) or "-"])
-    many = "" if len(points) <= MOST else f", the first {MOST} of them"
-    what = "one per row" if found["mode"] == "points" else "means of plateaus"
-    out = [f"  {len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
-    out.append(tables.text_table([*head, "flags"], rows, (len(head),), "    "))
+        columns[name] = [tables.number_text(_finite(x), 5) for x in values[name][:MOST]]
+        if np.isfinite(u := reduced.u.get(name, none)).any():
+            columns[f"u({name})"] = [tables.number_text(_finite(x), 2) for x in u[:MOST]]
+    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
+    many = "" if n <= MOST else f", the first {MOST} of them"
+    what = "one per row" if how.mode == "points" else "means of plateaus"
+    out = [f"  {tables.number_of(n, 'steady point')}, {what}{many}:"]
+    rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
+    out.append(tables.text_table(list(columns), rows, (len(columns) - 1,), "    "))
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
-    for lost in found["dropped"]:
-        what = "rows" if not lost["channel"] else f"values of {lost['channel']}"
-        reasons.setdefault((what, lost["reason"]), []).append((lost["line"], lost["last"]))
+    for lost in how.dropped:
+        what = "rows" if not lost.channel else f"values of {lost.channel}"
+        reasons.setdefault((what, lost.reason), []).append((lost.line, lost.last))
     for (what, reason), lines in reasons.items():
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
         out.append(f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
-    for channel, parts in found["correlated"].items():
+    for channel, parts in how.correlated.items():
         words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
         out.append(f"  shared by all points, {channel}: {words}")
-    return out + [f"  . {note}" for note in found["notes"]]
+    return out + [f"  . {note}" for note in reduced.notes]
 
 
-def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
