@@ -20,7 +20,7 @@ from bemt.results.report import gather
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.rotors.case import Case, load_case
-from bemt.rotors.case.estimate import document as estimate
+from bemt.rotors.case.estimate import of_label as estimate
 from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.case.propagate import propagate
 from bemt.tools.cfd.openfoam.write import Run, settings_of
@@ -123,7 +123,9 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
 
 
 def _estimate(case: Case, rpm: Any, V: Any) -> Answer:
-    rows = [estimate(LABEL, [n], [v], angles=[case.angle_deg])["rows"][0] for n, v in zip(rpm, V, strict=True)]
+    rows = [
+        estimate(LABEL, [n], [v], angle_deg=[case.angle_deg]).to_dict()["rows"][0] for n, v in zip(rpm, V, strict=True)
+    ]
     return [(r["thrust_N"], r["u_thrust_N"], np.nan, np.nan, tuple(r["flags"])) for r in rows]
 
 
@@ -339,7 +341,7 @@ def _words(label: str, rpm: float, V: float, folder: Path) -> dict[str, tuple[st
     return {
         "solve": p.solve(rpm, V, bands=False).flags[0],
         "sweep": _sweep(case, [rpm], [V])[0][4],
-        "estimate": tuple(estimate(label, [rpm], [V])["rows"][0]["flags"]),
+        "estimate": tuple(estimate(label, [rpm], [V]).to_dict()["rows"][0]["flags"]),
         "diagnose": tuple(words.removeprefix("3 of 3 points of the recording: ") for words in diagnosed),
     }
 
