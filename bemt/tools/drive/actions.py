@@ -139,7 +139,8 @@ def map(  # noqa: A001
 
     where = None if out is None else os.fspath(out)
     found = map_result.fit(paths_text("files", files, 1), int(sign), nodes, name, thrust_N, voltage_V, where)
-    return Told(found.document, map_result.text(found), exit_code=EXIT_OK if found.reached else EXIT_UNCONVERGED)
+    code = EXIT_OK if found.reached else EXIT_UNCONVERGED
+    return Told(found.document(), map_result.text(found), exit_code=code)
 
 
 @action("Drive", "motor motor.toml", words=("file",))

@@ -238,7 +238,7 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
     """Write the case with the rotor as the flights show it; gives what to print, and whether it could be solved."""
     import shlex
 
-    from bemt.judge.diagnose.rotor_calibration import document, text, write
+    from bemt.judge.diagnose.rotor_calibration import lines_of, write
     from bemt.rotors.case.load import with_changes
     from bemt.tools.flight.identify import learn_from_flights
 
@@ -252,9 +252,8 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
     found = learn_from_flights(case, files, [a.found for a in answers])
     written = write(case, found, files, folder, "fly", "--out-case")
     place = shlex.quote(Path(folder).as_posix())
-    said = document(case, found, files) | {"recommended_airspeed_m_s": None}  # a stand's advice
     lines = [
-        text(said),
+        *lines_of(case, found, files, advice=False),  # that is for a stand
         "These flights show the rotor at hover alone; for torque and fast flight add a stand or tunnel run.",
         f"{place}: {', '.join(written)}",
         f"next: bemt sweep {place}",
