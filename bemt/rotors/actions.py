@@ -326,11 +326,11 @@ def validate(
         raise InputError(Fault("", "--reynolds", f"{reynolds:g}", "a Reynolds number from 1e3 to 1e9"))
     effects = propellers.effects_without(off)
     found = [propellers.where(name) for name in paths_text("folders", folders, 1)]
-    document = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
+    made = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
     if out is not None:
-        propellers.write(document, os.fspath(out))
-    code = EXIT_UNCONVERGED if document["unconverged"] else EXIT_OK
-    return Told(document, propellers.text(document), exit_code=code)
+        propellers.write(made, os.fspath(out))
+    code = EXIT_UNCONVERGED if made.unconverged else EXIT_OK
+    return Told(made.document(), propellers.text(made), exit_code=code)
 
 
 @action("Models and checks", "calibrate uiuc --out calibration", words=("files",))
