@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
 
 __all__ = [
     "Declaration", "Count", "Told", "about", "action", "did_you_mean", "in_words_of_the_library", "options_of",
@@ -118,8 +118,7 @@ def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:
             whole = one is None or isinstance(one, bool) is False and hasattr(one, "__index__") and one >= 1
             if not whole:
                 faults.append(Fault("", name, repr(one), "a whole number of 1 or more"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def did_you_mean(got: str, known: Iterable[str]) -> str:

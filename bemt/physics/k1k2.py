@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
@@ -80,8 +80,7 @@ def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array)
     ]
     if not faults and np.any(hub >= D):
         faults.append(Fault("", "hub_diameter_m", f"{float(np.max(hub)):g}", "less than the diameter"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:

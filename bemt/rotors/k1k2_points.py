@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import find_data
 from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
@@ -310,8 +310,7 @@ def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = fro
         rows += made
         refused += why
         notes += note
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return join(rows, refused, notes)
 
 
@@ -356,12 +355,9 @@ def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, Fit
         names = []
     read: list[FitPoints] = []
     for which, without in ((names, held), (test, frozenset[Path]())):
-        try:
+        with gathered(faults):
             read += [load(map(_found, which), without)] if which else []
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     points = read[0]
     if held:
         note = f"{len(held)} files of --test are left out of uiuc before the fit, with all runs of their propellers"

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemt.base import tables
 from bemt.base.averaging import Average, Mean, keep_last, revolution_average
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import packed, unpacked
 from bemt.base.tables import number_of
 from bemt.data.readers import load_bytes, polars, uiuc
@@ -373,6 +373,5 @@ def asked(rpm: float | None = None, period: float | None = None, revolutions: in
         faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
     if revolutions is not None and rpm is None and period is None:
         faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period-s as well"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return Choice(60.0 / rpm if rpm is not None else period, revolutions)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import write_atomic
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector
@@ -281,8 +281,7 @@ def write_recording(
             else:
                 expected = " or ".join(units.suffixes(CHANNELS[quantity]))
                 faults.append(Fault("", "--unit", f"no unit for {quantity}", f"--unit {quantity}= {expected}"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
     validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)

@@ -30,7 +30,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.document import Documented
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text
 from bemt.data.recordings.cfd_loads import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
@@ -185,8 +185,7 @@ def grid_study(
         faults.append(Fault("", "formal_order", f"{formal_order:g}", "a number from 0 to 10"))
     if safety is not None and not (math.isfinite(safety) and safety >= 1.0):
         faults.append(Fault("", "safety", f"{safety:g}", "a factor of 1 or more"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     flags = [f"ratio {v:.3g} below {MIN_RATIO}: the index is uncertain" for v in r if v < MIN_RATIO - 1e-9]
     fs = (FS_THREE if len(f) == 3 else FS_TWO) if safety is None else float(safety)
     e21 = f[1] - f[0]

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 
 OUTLIER = 6.0
@@ -158,8 +158,7 @@ def find(
     """
     data = {name: np.asarray(v, dtype=float) for name, v in channels.items()}
     t, faults = _checked(time_s, data, signal, command)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     n = len(t)
     notes: list[str] = []
     if back := _backwards(t):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.action import Told, as_html
-from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import path_text
 from bemt.data.recordings.grid_study import together
 from bemt.data.recordings.load import as_stated, import_file
@@ -212,8 +212,7 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
     if percent is not None and not 0.0 < percent <= REPEATABILITY_MAX:
         expected = f"a percentage above 0 and up to {REPEATABILITY_MAX:g}"
         faults.append(Fault("--repeatability-pct", "", f"{percent:g}", expected))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _asked(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from bemt.base.action import Told, as_html
 from bemt.base.document import rows_of
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, Invocation, RankedCause, document, next_step
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
 from bemt.judge.compare.selection import conditions_of, selected, with_air
@@ -149,23 +149,17 @@ def compare(
     read: list[Dataset] = []
     faults: list[Fault] = []
     for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):
-        try:
+        with gathered(faults):
             read.append(with_air(selected(import_file(name), rows, name), air, option))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
     findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
-        try:
+        with gathered(faults):
             runs.append(stand_run(imported, f"{name} ({', '.join(rows)})" if rows else name, D))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
     said = document(found)
     if case is not None and not found.wind:

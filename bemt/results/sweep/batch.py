@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bemt
-from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, refuse, system_fault
 from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
@@ -237,8 +237,7 @@ def _check_options(engine: str, scheduler: str | None, jobs: int | None) -> None
     if scheduler is not None and jobs is not None:
         expected = "nothing with --scheduler, whose cluster has its workers"
         faults.append(Fault("", "--jobs", str(jobs), expected, "Leave it out"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if engine == "dask":
         require_extra("--engine dask", "dask", "distributed")
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered
 from bemt.base.given import numbers
 from bemt.base.tables import number_text, or_null, text_table
 from bemt.base.units import INCH
@@ -133,15 +133,11 @@ def _of_label(
         if not low <= value <= high
     ]
     if series is not None:
-        try:
+        with gathered(faults):
             find_family(series)
-        except InputError as error:
-            faults += error.faults
     if reading is not None:
-        try:
+        with gathered(faults):
             parse_reading(reading)
-        except InputError as error:
-            faults += error.faults
     if faults or told is None:
         raise InputError(faults)
     case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density, reading)

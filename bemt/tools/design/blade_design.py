@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base import cache
 from bemt.base.arrays import Array
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, gathered, refuse
 from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, new_folder
@@ -180,11 +180,9 @@ def design_blade(
     """Design a blade; parameters as `bemt.design`."""
     faults: list[Fault] = []
     base: Case | None = None
-    try:
+    with gathered(faults):
         base = _open_case(diameter_m, blades, section, hub_ratio, density_kg_m3) if duct is None else _in_duct(
             duct, diameter_m, blades, section, hub_ratio, density_kg_m3)  # fmt: skip
-    except InputError as error:
-        faults += error.faults
     if base is None:  # the rest of the request is judged on a size that can be
         try:
             required(points, 10.0 * INCH, HUB_RATIO, 2, Air.from_density(), **limits)
@@ -307,8 +305,7 @@ def _check_chords(problem: BladeProblem) -> None:
             room = 1e3 * value * float((most / least).min())
             widest = f"The largest chord is {1e3 * most.max():.3g} mm"
             faults.append(Fault(name, "", f"{1e3 * value:g}", f"up to {room:.3g} mm", widest))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
@@ -442,8 +439,7 @@ def _in_duct(
     ]  # fmt: skip
     if not case.ducted:
         faults.append(Fault(case.path.as_posix(), "duct", "nothing", "a case with a duct", "Leave --duct out"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     changes: dict[str, Any] = {}
     if blades is not None:
         changes["rotor.blades"] = blades

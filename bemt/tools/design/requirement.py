@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
@@ -218,8 +218,7 @@ def point_of(text: str) -> DesignPoint:
             )
     if "thrust_N" not in found and not faults:
         faults.append(Fault("--points", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return DesignPoint(**found)
 
 

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
@@ -201,8 +201,7 @@ def _target(
         faults.append(
             Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
         )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
                if v is not None and v % 1 != 0]  # fmt: skip
     mAh = "In mAh? Divide by 1000" if capacity_Ah is not None and capacity_Ah > 200.0 else ""
@@ -219,8 +218,7 @@ def _target(
     ):  # fmt: skip
         if value is not None and not low <= value <= high:
             faults.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     hover = None if mass_kg is None else mass_kg * G0 / rotors
     most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
     if hover is not None and most < hover:
@@ -243,8 +241,7 @@ def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blad
         hint = "In percent? Divide by 100" if 1.0 < sure < 100.0 else ""
         faults.append(Fault("", "--sure", f"{sure:g}", "a probability between 0 and 1", hint))
     faults += [Fault("", "--blades", f"{b}", "2 to 8") for b in blades if b not in range(2, 9)]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
@@ -216,7 +216,7 @@ def fit(
     name = name or Path(files[0]).stem
     read: dict[Path, str] = {}
     for i, file in enumerate(files):
-        try:
+        with gathered(faults):
             got = importers.read(file)
             own = _sources(Path(file), got)
             if twice := next((read[path] for path in own if path in read), None):
@@ -226,12 +226,9 @@ def fit(
             if not isinstance(got, Dataset):
                 raise InputError(Fault(file, "", "no recording", "a log or a table of a thrust stand"))
             parts.append(bench_map.points(got, file, sign, i))
-        except InputError as error:
-            faults += error.faults
     if out:
         faults += outputs.faults("--out", Path(out), [form.format(name) for form in RESULTS], read)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     points = bench_map.join(parts)
     chart = bench_map.fit(points)
     off = bench_map.misfit(points, chart)

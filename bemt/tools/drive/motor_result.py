@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.document import Documented
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import inside
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import FieldLimits, Table, entry, read_model
@@ -153,17 +153,12 @@ def read(path: str | Path) -> MotorTrials:
         raise InputError([Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items()])
     faults: list[Fault] = []
     emf = torque = loop = None
-    try:
+    with gathered(faults):
         emf = None if emf_table is None else _back_emf(file, emf_table, winding, motor.pole_pairs)
-    except InputError as error:
-        faults += error.faults
-    try:
+    with gathered(faults):
         if torque_table is not None:
             torque, loop = _torque(file, torque_table, winding)
-    except InputError as error:
-        faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     gains = {name: table.u_gain_pct for name, table in (("back_emf", emf_table), ("torque", torque_table)) if table}
     notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
     measured = Measured(
@@ -194,8 +189,7 @@ def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
             found.append(got[of_unit[0]])
     if "trial" not in got:
         faults.append(Fault(name, "trial", "no column trial", "the number of the trial of each row"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     columns = (got["trial"], *found)
     bad = ~np.all(np.isfinite(columns), axis=0)
     if np.any(bad):

@@ -10,7 +10,7 @@ from typing import Any
 
 from bemt.base.action import as_html
 from bemt.base.document import Documented, rows_of
-from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
+from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError, gathered, refuse
 from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import check_field, shown
@@ -92,10 +92,8 @@ def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     manifest: dict[str, Any] = {}
     faults: list[Fault] = []
     for target in sorted((exports()[word] for word in dict.fromkeys(formats)), key=lambda target: target.turn):
-        try:
+        with gathered(faults):
             manifest = joined(manifest, target.put(job, out))
-        except InputError as error:
-            faults += error.faults
     if manifest:
         content = case.content_hash()
         kept = _kept(before, manifest, out)
@@ -221,8 +219,7 @@ def export_cases(
     known = exports()
     unknown = [word for word in formats if word not in known]
     faults = [Fault("", "--format", word, f"one of {', '.join(known)}", absent_target(word)) for word in unknown]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     asked = {key: value for key, value in (given or {}).items() if value is not None}
     faults += option_faults(asked) + _unused(asked, formats, hold)
     faults += faults_of(printed, formats) if printed is not None else []
@@ -230,8 +227,7 @@ def export_cases(
         solid = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
         faults += [Fault("", f"{_option(name)}-mm", *rest) for name, *rest in error.faults]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     paths = [] if isinstance(path, Case) else find_cases([path])
     cases = [path] if isinstance(path, Case) else []
     refused, made = [], []

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import Told, action
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, gathered, refuse
 
 if TYPE_CHECKING:
     from bemt.base.errors import Fault
@@ -159,8 +159,7 @@ def fly(
         faults.append(Fault("", "healthy_day", repr(healthy_day), "same, other, or nothing"))
     if out_case is not None and case is None:
         faults.append(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     folder = any(Path(p).is_dir() for p in given)
     mine = [f for p in given for f in _files(p)]
     calm = _grouped(healthy)
@@ -221,16 +220,13 @@ def _grouped(healthy: Sequence[StrPath | Sequence[StrPath]]) -> list[tuple[str, 
 
 def _read(paths: Sequence[str] | dict[str, None]) -> tuple[dict[str, FlightLog], list[Fault]]:
     """Logs by their path, and what is wrong with the others."""
-    from bemt.base.errors import InputError
     from bemt.tools.flight.read import read_log
 
     found: dict[str, FlightLog] = {}
     faults: list[Fault] = []
     for path in paths:
-        try:
+        with gathered(faults):
             found[path] = read_log(path)
-        except InputError as error:
-            faults += error.faults
     return found, faults
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
@@ -155,8 +155,7 @@ def answer_on(
     faults = mass_faults(log, mass_kg, "--mass-kg")
     for h in healthy:
         faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if layout:
         log = replace(log, layout=layout)
     log, healthy = checked(log), [checked(replace(h, layout=layout or h.layout)) for h in healthy]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.base.units import G0
 from bemt.judge.diagnose.rotor_calibration import learn
 from bemt.rotors.model import air_fields, air_of_points
@@ -218,8 +218,7 @@ def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Ident
         k.append(c.value)
         own.append(c.half / c.value / 2.0)
         rpm.append(float(np.mean(flight.rotors["mean rpm"])))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     air = {name: np.broadcast_to(v, len(k)) for name, v in air_fields(case.air()).items()}
     CT = 3600.0 * np.array(k) / (air["rho"] * case.diameter_m**4)
     sd, _ = flight_scatter(k)
