@@ -76,7 +76,6 @@ DRAWS = 256
 LATTICE = 235
 """Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4.
 The seventh coordinate, of the masses, hardly moves any result."""
-SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 
 @dataclass(frozen=True)
@@ -155,8 +154,8 @@ def choose(
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
         raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
-    spreads = _scatters(loads, target)
-    rows = [row for one in loads for row in _rows(one, _nearest(one, spreads), machines, target)]
+    spreads = rotor_loads.scatters(loads, target.thrust_N, target.airspeed_m_s, target.fluid, target.coaxial)
+    rows = [row for one in loads for row in _rows(one, rotor_loads.nearest(one, spreads), machines, target)]
     table = _ranked(pd.DataFrame(rows), sure)
     table["why"] = _reasons(table, target, sure)
     table.attrs |= {"target": target, "sure": sure}
@@ -285,28 +284,6 @@ def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorL
     fastest = 1.05 * max(m.kv for m in machines) * target.voc
     return rotor_loads.rotor_loads(label, min(60.0 * tip / (math.pi * D), fastest), target.airspeed_m_s,
                                    fluid=target.fluid, coaxial=target.coaxial)  # fmt: skip
-
-
-def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
-    """Bands of a few labels spread over the sizes that reach the target."""
-    good = [one for one in loads if np.isfinite(one.speed_for(np.array([target.thrust_N]))[0])] or list(loads)
-    order = sorted(good, key=lambda one: (one.diameter_m, one.pitch_m))
-    picked = {round(i) for i in np.linspace(0, len(order) - 1, min(SCATTERS, len(order)))}
-    out = []
-    for i in sorted(picked):
-        rpm = float(order[i].speed_for(np.array([target.thrust_N]))[0])
-        found = rotor_loads.scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]),
-                                    target.airspeed_m_s, target.fluid, target.coaxial)  # fmt: skip
-        if np.isfinite([found.u_thrust, found.u_torque]).all():
-            out.append(found)
-    if not out:
-        raise InputError(Fault("", "--labels", "no band converges", "sizes that the solver can judge at this thrust"))
-    return out
-
-
-def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
-    x, p = math.log(one.diameter_m / INCH), one.pitch_m / one.diameter_m
-    return min(spreads, key=lambda s: math.hypot(s.log_diameter - x, s.pitch_ratio - p))
 
 
 @cache
