@@ -38,7 +38,7 @@ def test_compressibility_left_out_is_named_located_and_mended() -> None:
         assert score["holdout_after"] < 0.5 * score["holdout_before"]
         assert score["holdout_after"] < 1.3 * score["noise"]
     value = answer.parameters["compressibility"]["amplitude"]
-    assert value["low"] - 0.05 <= 1.0 <= value["high"] + 0.05
+    assert value.low - 0.05 <= 1.0 <= value.high + 0.05
 
 
 def test_an_inviscid_law_errs_over_advance_ratio_only() -> None:

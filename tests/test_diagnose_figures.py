@@ -177,7 +177,9 @@ def test_the_posterior_that_is_drawn_is_the_one_of_the_intervals(named: chain.Di
         x = np.array([s[key] for s in named.found.of(i).settings])
         middle = np.cumsum(p) - 0.5 * p
         for end, share in (("low", 0.05), ("value", 0.5), ("high", 0.95)):
-            assert np.interp(interval[end], x, middle) == pytest.approx(np.clip(share, middle[0], middle[-1]), abs=1e-6)
+            assert np.interp(getattr(interval, end), x, middle) == pytest.approx(
+                np.clip(share, middle[0], middle[-1]), abs=1e-6
+            )
 
 
 @pytest.mark.parametrize("columns", [1, 2, 3, 4])

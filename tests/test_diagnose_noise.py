@@ -88,7 +88,7 @@ def test_a_gain_of_seven_percent_is_seen_beside_a_reference() -> None:
     answer = chain.diagnose(records, [base])
     assert answer.decision.effects == ("thrust_gain",)
     found = answer.parameters["thrust_gain"]["gain"]
-    assert found["low"] <= 0.07 <= found["high"]
+    assert found.low <= 0.07 <= found.high
 
 
 @pytest.mark.parametrize("off", [-3.0, 2.0])

@@ -57,7 +57,7 @@ def test_a_speed_in_another_unit_is_solved_at_the_speed_that_it_was() -> None:
     slow = Dataset("bench", "log", {**series.values, "rpm": series.values["rpm"] * np.pi / 30.0}, dict(series.u))
     answer = chain.diagnose([from_series(slow, base), replace(from_series(plain, base), reference=True)], [base])
     assert answer.decision.effects == ("unit_slip",)
-    assert answer.parameters["unit_slip"]["unit"]["value"] == "rad/s"
+    assert answer.parameters["unit_slip"]["unit"].value == "rad/s"
 
 
 @pytest.mark.parametrize(("thrust", "torque", "said"), [(0.78, 0.78, ("air_density",)), (0.815, 0.676, ())])

@@ -21,7 +21,7 @@ from bemt.judge.diagnose import (
 )
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.judge.proof.intervals import Off, calibrate
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
@@ -124,15 +124,14 @@ def pair(**changed: Any) -> Any:
 
 
 def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
-    told = {"untwist": {"tip_deg": {"value": 1.0, "low": 0.8, "high": 1.3, "unit": "deg"}},
-            "rpm_scale": {"factor": {"value": 2.0, "low": 2.0, "high": 2.0, "unit": "1"}}}  # fmt: skip
+    told = {"untwist": {"tip_deg": Size(1.0, 0.8, 1.3, "deg")}, "rpm_scale": {"factor": Size(2.0, 2.0, 2.0, "1")}}
     s = interval_scales.scale_of("untwist", "tip_deg")
     wide = interval_scales.widened(told)
-    assert wide["untwist"]["tip_deg"]["low"] == pytest.approx(1.0 - 0.2 * s)
-    assert wide["untwist"]["tip_deg"]["high"] == pytest.approx(1.0 + 0.3 * s)
+    assert wide["untwist"]["tip_deg"].low == pytest.approx(1.0 - 0.2 * s)
+    assert wide["untwist"]["tip_deg"].high == pytest.approx(1.0 + 0.3 * s)
     assert wide["rpm_scale"] == told["rpm_scale"]  # a ratio has odds, no half-width
-    far = {"untwist": {"tip_deg": {"value": 4.9, "low": 4.0, "high": 5.0, "unit": "deg"}}}
-    assert interval_scales.widened(far)["untwist"]["tip_deg"]["high"] == 5.0
+    far = {"untwist": {"tip_deg": Size(4.9, 4.0, 5.0, "deg")}}
+    assert interval_scales.widened(far)["untwist"]["tip_deg"].high == 5.0
 
 
 def test_factors_hold_as_often_as_they_say() -> None:

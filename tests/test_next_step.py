@@ -109,7 +109,7 @@ def test_a_slip_of_unit_or_sign_is_put_right_without_a_run(factor: float, found:
     series = recording(case(), points("static"))
     said = told(of(replace(series, values={**series.values, "thrust_N": factor * series["thrust_N"]})))
     assert (said.decision.verdict, said.decision.effects) == ("sensor", ("unit_slip",))
-    assert said.parameters["unit_slip"]["unit"]["value"] == found
+    assert said.parameters["unit_slip"]["unit"].value == found
     assert (said.next.kind, said.next.points) == ("look", ()) and words in step(said)[0]
     assert "tells" not in text(said) and "new_run" not in step(said)[1]
 

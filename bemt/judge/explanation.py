@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
+from bemt.base.document import Documented
 from bemt.physics import effects
 
-__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation"]
+__all__ = ["DOUBT", "NONE", "UNKNOWN", "Explanation", "Size", "Sizes"]
 
 
 @dataclass(frozen=True)
@@ -66,3 +68,17 @@ class Explanation:
 
 
 NONE, UNKNOWN, DOUBT = Explanation(), Explanation(smooth=True), Explanation(doubt=True)
+
+
+class Size(Documented):
+    """Value of a parameter of an explanation, and the ends of its 90 % interval; None or words if it is no number."""
+
+    value: Any
+    low: Any
+    high: Any
+    unit: str
+    odds: tuple[tuple[Any, float], ...] | None = None  # Of the values that a discrete one may have [1]
+
+
+Sizes = Mapping[str, Mapping[str, Size]]
+"""By effect and parameter."""

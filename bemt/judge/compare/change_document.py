@@ -17,6 +17,7 @@ from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
 from bemt.judge.compare.matched import LOADS
 from bemt.judge.compare.recordings import IN_WIND, RunChange
 from bemt.judge.compare.smooth_change import Ratio
+from bemt.judge.explanation import Size
 from bemt.physics.effects import catalogue
 
 PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
@@ -173,7 +174,7 @@ class RankedCause(Documented):
 
     effect: str
     probability: float
-    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # Value, low, high and unit by name
+    parameters: Mapping[str, Size] = field(default_factory=dict)
 
 
 class SubVerdict(Documented):

@@ -205,16 +205,9 @@ def _tables(doc: ComparedRuns) -> list[str]:
     out = []
     parts = {"": doc.ranking} if doc.diagnosis else {name: one.ranking for name, one in doc.subsystems.items()}
     for name, ranking in parts.items():
-        rows = [
-            [
-                r.effect,
-                f"{r.probability:.3f}",
-                ", ".join(
-                    f"{k} {v['value']:.4g}" for k, v in r.parameters.items() if isinstance(v.get("value"), (int, float))
-                ),
-            ]
-            for r in ranking[:_ROWS]
-        ]
+        sizes = [", ".join(f"{k} {v.value:.4g}" for k, v in r.parameters.items() if isinstance(v.value, (int, float)))
+                 for r in ranking[:_ROWS]]  # fmt: skip
+        rows = [[r.effect, f"{r.probability:.3f}", size] for r, size in zip(ranking, sizes, strict=False)]
         if rows:
             out += ["", text_table([name or "explanation", "probability", "size"], rows, left=(0, 2), indent="  ")]
     return out

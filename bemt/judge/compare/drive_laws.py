@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
@@ -63,7 +62,7 @@ class Judgement:
     effects: tuple[str, ...]  # Of the verdict
     probability: Mapping[str, float]  # Of every explanation, the likeliest first
     # Effect to parameter to value, low and high (90 %) and unit, as far as it was worked out
-    parameters: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
+    parameters: Sizes = field(default_factory=dict)
     why: str = ""  # Reason, in words
     mass: float | None = None  # Probability of the verdict
     sets: tuple[tuple[str, ...], ...] = ()  # Of a class, one set of effects per cause; () or one: one cause
@@ -71,7 +70,7 @@ class Judgement:
 
     @classmethod
     def of(
-        cls, said: Decision, P: Mapping[Explanation, float], parameters: Mapping[str, Any] | None = None
+        cls, said: Decision, P: Mapping[Explanation, float], parameters: Sizes | None = None
     ) -> Judgement:  # fmt: skip
         """What a decision says, with the posterior that it was made on."""
         ranked = dict(sorted(P.items(), key=lambda kv: -kv[1]))

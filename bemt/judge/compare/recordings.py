@@ -18,7 +18,7 @@ from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
 from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
 from bemt.judge.compare.stand_run import StandRun
-from bemt.judge.explanation import NONE
+from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
@@ -82,8 +82,7 @@ class RunChange:
         if said.effects != tuple(SUPPLY):
             return said
         why = f"voltage as recorded, {ratio - 1.0:+.1%} at equal command; the speed goes with it"
-        size = {"value": ratio, "low": ratio, "high": ratio, "unit": "1"}
-        return replace(said, parameters={"battery_sag": {"ratio": size}}, why=why)
+        return replace(said, parameters={"battery_sag": {"ratio": Size(ratio, ratio, ratio, "1")}}, why=why)
 
     @property
     def _by_volts(self) -> float:

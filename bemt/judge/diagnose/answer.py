@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.judge.diagnose import prior
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.explanation import UNKNOWN, Explanation
+from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
 from bemt.judge.loss import Decision
 from bemt.physics import effects
 
@@ -59,7 +59,7 @@ class Posterior:
     probability: dict[Explanation, float]  # Adds up to 1 [1]
     log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
     inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
-    parameters: dict[str, dict[str, dict[str, Any]]]  # Of the leading explanation: value, low, high (90 %), unit
+    parameters: Sizes  # Of the leading explanation
     p_value: float  # Of as large a misfit without a cause [1]
 
 
@@ -71,8 +71,7 @@ class Diagnosis:
     decision: Decision  # Verdict of the evidence in the case
     said: Decision  # What is said in the end: with what the drive says
     best: fitting.Fit  # Leading explanation at its best setting
-    # Effect to parameter to value and 90 % interval, of the leading explanation
-    parameters: dict[str, dict[str, dict[str, Any]]]
+    parameters: Sizes  # Of the leading explanation
     p_value: float  # Of the gate [1]
     where: location.Location  # Of the mismatch; of the largest scatter when the verdict is none
     # Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest

@@ -171,7 +171,9 @@ def _with_drive(rotor: Diagnosis, motor: Diagnosis) -> Diagnosis:
     if said.by == "drive":
         return replace(motor, said=said, drive=motor, loads=rotor, absent=rotor.absent)
     if said.by == "both":
-        return replace(rotor, decision=said, said=said, parameters=rotor.parameters | motor.parameters, drive=motor)
+        return replace(
+            rotor, decision=said, said=said, parameters={**rotor.parameters, **motor.parameters}, drive=motor
+        )
     return replace(rotor, said=said, drive=motor)
 
 

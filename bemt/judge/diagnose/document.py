@@ -19,7 +19,7 @@ from bemt.judge.diagnose.locate import bare
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.explanation import UNKNOWN, Explanation
+from bemt.judge.explanation import UNKNOWN, Explanation, Size
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -61,10 +61,9 @@ def document(d: Diagnosis) -> dict[str, Any]:
     ranking = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:12]:
         solved = name.ids and all(i in found.spans for i in name)
-        parameters = fitting.intervals(found, name) if solved and p > 1e-3 else {}
-        if name == d.decision.leading:
-            parameters = d.parameters
-        flat = {(f"{i}.{k}" if name.pair else k): v for i, q in parameters.items() for k, v in q.items()}
+        own = fitting.intervals(found, name) if solved and p > 1e-3 else {}
+        sizes = d.parameters if name == d.decision.leading else own
+        flat = {(f"{i}.{k}" if name.pair else k): v.document() for i, q in sizes.items() for k, v in q.items()}
         ranking.append({"effect": str(name), "probability": p, "parameters": flat})
     state = found.states[0]
     said = d.said
@@ -146,13 +145,13 @@ def _parameters(d: Diagnosis) -> str:
         of = {p.name: p for p in effects.catalogue()[i].parameters}
         words, left = [], []
         for k, v in found.items():
-            if isinstance(v["value"], float) and v["high"] - v["low"] > _OPEN * (of[k].high - of[k].low):
+            if isinstance(v.value, float) and v.high - v.low > _OPEN * (of[k].high - of[k].low):
                 left.append(k)
-            elif isinstance(v["value"], float):
-                low, value, high = (_sized(of[k], v[part]) for part in ("low", "value", "high"))
-                words.append(f"{k} {value} ({low} to {high}){_in_units(d, i, k, v['value'])}{_odds(v)}")
-            elif v["value"] is not None:
-                words.append(f"{k} {v['value']}{_odds(v)}")
+            elif isinstance(v.value, float):
+                low, value, high = (_sized(of[k], end) for end in (v.low, v.value, v.high))
+                words.append(f"{k} {value} ({low} to {high}){_in_units(d, i, k, v.value)}{_odds(v)}")
+            elif v.value is not None:
+                words.append(f"{k} {v.value}{_odds(v)}")
         words += [f"{' and '.join(left)} not determined"] if left else []
         if words:
             each.append((f"{i} " if len(d.parameters) > 1 else "") + ", ".join(words))
@@ -177,9 +176,9 @@ def _with_size(d: Diagnosis, name: str) -> str:
     if cls is None:
         return _title(name)
     if cls.fault == "unit" and "unit" in found:
-        return f"{cls.title} ({found['channel']['value']}: {found['unit']['value']})"
+        return f"{cls.title} ({found['channel'].value}: {found['unit'].value})"
     sizes = [p for p in cls.parameters if p.off is not None and p.steps and p.name in found]
-    value = found[sizes[0].name]["value"] if len(sizes) == 1 else None
+    value = found[sizes[0].name].value if len(sizes) == 1 else None
     if not isinstance(value, float) or (sizes[0].unit == "1" and not _is_share(sizes[0])):
         return cls.title
     return f"{cls.title} ({_sized(sizes[0], value, '+.3g')})"
@@ -195,9 +194,9 @@ def _in_units(d: Diagnosis, name: str, parameter: str, value: float) -> str:
     return f" of the largest reading, {value * max(s[channel] for s in scales):.3g} {unit}"
 
 
-def _odds(told: dict[str, Any]) -> str:
+def _odds(told: Size) -> str:
     """Probabilities of the values of a discrete parameter, where more than one is left."""
-    odds = [(v, p) for v, p in told.get("odds", ()) if p >= 0.05]
+    odds = [(v, p) for v, p in told.odds or () if p >= 0.05]
     if len(odds) < 2:
         return ""
     return " [" + ", ".join(f"{v if isinstance(v, str) else f'{v:.3g}'} {p:.2f}" for v, p in odds) + "]"

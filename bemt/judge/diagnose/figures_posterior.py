@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, SKY, blank
 from bemt.judge.diagnose import fit
 from bemt.judge.diagnose.signatures import effect_of
-from bemt.judge.explanation import Explanation
+from bemt.judge.explanation import Explanation, Size
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +32,7 @@ class _Panel:
     candidate: Candidate
     p: Array
     keys: tuple[str, ...]
-    intervals: dict[str, dict[str, Any]]
+    intervals: Mapping[str, Size]
 
     def values(self, key: str) -> Array:
         return np.array([float(s[key]) for s in self.candidate.settings])
@@ -85,7 +86,7 @@ def posterior(answer: Diagnosis) -> Figure | None:
     return figure
 
 
-def _panels(candidate: Candidate, p: Array, intervals: dict[str, dict[str, Any]]) -> list[_Panel]:
+def _panels(candidate: Candidate, p: Array, intervals: Mapping[str, Size]) -> list[_Panel]:
     if len(candidate.settings) < 2:
         return []
     numbers = [k for k in _keys(candidate) if _numeric(candidate, k)]
@@ -122,13 +123,13 @@ def _interval(axis: Axes, panel: _Panel) -> None:
     before = np.interp([0.05, 0.95], np.cumsum(weight) - 0.5 * weight, x[order])
     axis.plot(before, [0.0, 0.0], color=GREY, alpha=0.5, linewidth=9.0, solid_capstyle="butt", label="before, 90 %")
     told = panel.intervals.get(key)
-    if told and isinstance(told["value"], int | float):
-        axis.plot([told["low"], told["high"]], [1.0, 1.0], color=BLUE, linewidth=5.0, solid_capstyle="butt",
+    if told and isinstance(told.value, int | float):
+        axis.plot([told.low, told.high], [1.0, 1.0], color=BLUE, linewidth=5.0, solid_capstyle="butt",
                   label="with the readings, 90 %")  # fmt: skip
-        axis.plot(told["value"], 1.0, "o", color=BLACK, markersize=7, zorder=3, label="value")
+        axis.plot(told.value, 1.0, "o", color=BLACK, markersize=7, zorder=3, label="value")
         unit = panel.label(key).rpartition("[")[2].rstrip("]")
         unit = "" if unit in ("", "1") else f" {unit}"
-        words = f"{told['value']:.3g} ({told['low']:.3g} to {told['high']:.3g}){unit}"
+        words = f"{told.value:.3g} ({told.low:.3g} to {told.high:.3g}){unit}"
         axis.set_title(words)
     axis.set(ylim=(-0.7, 2.6), yticks=[], xlabel=panel.label(key))
     axis.spines["left"].set_visible(False)
@@ -156,7 +157,7 @@ def _map(axis: Axes, panel: _Panel) -> None:
         inside, (low, high) = panel.intervals.get(key), panel.range(key)
         mark = axis.axvline if k == 0 else axis.axhline
         if inside:  # a bar at the edge of the panel, so that the map keeps its colours
-            ends, edge = [inside["low"], inside["high"]], [0.99 if k == 0 else 0.005] * 2
+            ends, edge = [inside.low, inside.high], [0.99 if k == 0 else 0.005] * 2
             frame = axis.get_xaxis_transform() if k == 0 else axis.get_yaxis_transform()
             axis.plot(*((ends, edge) if k == 0 else (edge, ends)), color=ORANGE, linewidth=5.0, transform=frame,
                       solid_capstyle="butt", label="90 % interval of one" if k == 0 else None)  # fmt: skip

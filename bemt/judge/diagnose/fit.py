@@ -13,7 +13,7 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.form import form_modes
 from bemt.judge.diagnose.signatures import effect_of
-from bemt.judge.explanation import Explanation
+from bemt.judge.explanation import Explanation, Size
 from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def fit(found: Evidence, what: Explanation) -> Fit:
     return Fit(ids, settings, columns, signature)
 
 
-def intervals(found: Evidence, what: Explanation, share: float = 0.9) -> dict[str, dict[str, dict[str, Any]]]:
+def intervals(found: Evidence, what: Explanation, share: float = 0.9) -> dict[str, dict[str, Size]]:
     """Posterior medians and intervals of the parameters of an explanation."""
     return {i: _marginals(found, i, p, share) for i, p in weights(found, what).items()}
 
@@ -86,11 +86,11 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     return out
 
 
-def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, dict[str, Any]]:
+def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, Size]:
     candidate = found.of(id_)
     cls = type(effect_of(id_, candidate.settings[0]))
     units, discrete = {q.name: q.unit for q in cls.parameters}, cls.discrete
-    out: dict[str, dict[str, Any]] = {}
+    out: dict[str, Size] = {}
     for key in dict.fromkeys(k for s in candidate.settings for k in s):
         values = [s.get(key) for s in candidate.settings]
         if all(isinstance(v, (int, float)) for v in values if v is not None):
@@ -105,14 +105,15 @@ def _marginals(found: Evidence, id_: str, p: Array, share: float) -> dict[str, d
             cumulative = np.cumsum(q[order]) / q.sum()
             middle = cumulative - 0.5 * q[order] / q.sum()
             # a grid of settings stands for a density: interpolate its distribution
-            at = [float(np.interp(t, middle, x[order])) for t in (0.5, 0.5 - share / 2, 0.5 + share / 2)]
-            out[key] = {"value": at[0], "low": at[1], "high": at[2], "unit": units.get(key, "1")}
+            ends = (0.5, 0.5 - share / 2, 0.5 + share / 2)
+            value, low, high = (float(np.interp(t, middle, x[order])) for t in ends)
+            out[key] = Size(value, low, high, units.get(key, "1"))
         else:
             out[key] = _discrete(values, p, "", share)
     return out
 
 
-def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> dict[str, Any]:
+def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> Size:
     """Posterior of a parameter that takes a few values: the likeliest, the ends of those it may be, and their odds."""
     odds: dict[Any, float] = {}
     for v, q in zip(values, p, strict=True):
@@ -123,11 +124,10 @@ def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> dict[
     mass = np.cumsum([odds[v] / total for v in ranked])
     kept = ranked[: int(np.searchsorted(mass, share)) + 1]
     ends = sorted(kept) if all(isinstance(v, (int, float)) for v in kept) else [kept[0]]
-    return {"value": kept[0], "low": ends[0], "high": ends[-1], "unit": unit,
-            "odds": [[v, odds[v] / total] for v in kept[:_SHOWN]]}  # fmt: skip
+    return Size(kept[0], ends[0], ends[-1], unit, tuple((v, odds[v] / total) for v in kept[:_SHOWN]))
 
 
-def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, dict[str, Any]]]]:
+def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, Size]]]:
     """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges."""
     problem = found.problem
     where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
@@ -182,15 +182,13 @@ def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[s
         x = middle
     s = solve(x)
     told = intervals(found, Explanation.of(*best.ids), share) if best.ids else {}
-    out: dict[str, dict[str, dict[str, Any]]] = {}
+    out: dict[str, dict[str, Size]] = {}
     for k, i in enumerate(best.ids):
         units = {p.name: p.unit for p in type(effect_of(i, settings[k])).parameters}
         # what is not refined is as sure as the grid says it is
-        out[i] = {key: _told(told[i].get(key, {}), v, units.get(key, "")) for key, v in settings[k].items()}
+        out[i] = {key: _told(told[i].get(key), v, units.get(key, "")) for key, v in settings[k].items()}
     for (k, p), v, a, b in zip(where, x, *ends, strict=True):
-        out[best.ids[k]][p.name] = {
-            "value": float(v), "low": float(min(a, v)), "high": float(max(b, v)), "unit": p.unit
-        }  # fmt: skip
+        out[best.ids[k]][p.name] = Size(float(v), float(min(a, v)), float(max(b, v)), p.unit)
     final = tuple(dict(q) for q in settings)
     return (Fit(best.ids, final, best.columns, s) if np.isfinite(s).all() else best), out
 
@@ -252,13 +250,11 @@ def _quantile(q: float, a: Array, b: Array) -> Array:
     return np.asarray(np.clip(np.where(right, -x, x), a, b))
 
 
-def _told(grid: dict[str, Any], value: Any, unit: str) -> dict[str, Any]:
+def _told(grid: Size | None, value: Any, unit: str) -> Size:
     """What a fit says of a parameter that it took from the grid."""
-    ends = {"low": value, "high": value}
-    if isinstance(value, (int, float)) and grid:
-        ends = {"low": min(grid["low"], value), "high": max(grid["high"], value)}
-    odds = {"odds": grid["odds"]} if "odds" in grid else {}
-    return {"value": value, **ends, "unit": unit, **odds}
+    if grid is None or not isinstance(value, (int, float)):
+        return Size(value, value, value, unit, None if grid is None else grid.odds)
+    return Size(value, min(grid.low, value), max(grid.high, value), unit, grid.odds)
 
 
 def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:

@@ -9,11 +9,12 @@ which seeds and version.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any
 
+from bemt.judge.explanation import Size, Sizes
 from bemt.physics import effects
 
 FILE = "interval_scales.json"
@@ -33,16 +34,16 @@ def scale_of(effect: str, parameter: str) -> float:
     return float((own or table["kinds"].get(effects.catalogue()[effect].kind, {"scale": 1.0}))["scale"])
 
 
-def widened(told: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, dict[str, dict[str, Any]]]:
+def widened(told: Sizes) -> dict[str, dict[str, Size]]:
     """Parameters of effects with calibrated intervals, within their physical ranges."""
-    return {i: {k: _widened(i, k, dict(v)) for k, v in numbers.items()} for i, numbers in told.items()}
+    return {i: {k: _widened(i, k, v) for k, v in numbers.items()} for i, numbers in told.items()}
 
 
-def _widened(effect: str, name: str, v: dict[str, Any]) -> dict[str, Any]:
+def _widened(effect: str, name: str, v: Size) -> Size:
     cls = effects.catalogue()[effect]
     p = next((p for p in cls.parameters if p.name == name), None)
-    if p is None or name in cls.discrete or not isinstance(v["value"], float):
+    if p is None or name in cls.discrete or not isinstance(v.value, float):
         return v
-    value, s = v["value"], scale_of(effect, name)
-    low, high = value - s * (value - v["low"]), value + s * (v["high"] - value)
-    return v | {"low": max(low, min(p.low, value)), "high": min(high, max(p.high, value))}
+    s = scale_of(effect, name)
+    low, high = v.value - s * (v.value - v.low), v.value + s * (v.high - v.value)
+    return replace(v, low=max(low, min(p.low, v.value)), high=min(high, max(p.high, v.value)))
