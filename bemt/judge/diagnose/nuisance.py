@@ -151,6 +151,9 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             value = value + step if value + step <= parameter.high else value - step
             changed = everywhere(replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
+        for form in _other_forms(e):
+            changed = everywhere(replace(e, form=form), where_on=True) - f0  # type: ignore[call-arg]
+            add(f"{e.id} as {form}", changed, own=True)
     for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
         share = f0 - np.concatenate(without)[problem.kept]
@@ -163,6 +166,12 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
     matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
     return matrix, tuple(names), np.array(solver, dtype=bool), offset
+
+
+def _other_forms(e: Effect) -> list[str]:
+    """Published laws of an effect beside its own: nobody knows which of them holds for this rotor."""
+    mine = getattr(e, "form", None)
+    return sorted({str(s["form"]) for s in e.variants() or () if "form" in s} - {mine}) if mine and e.diagnosed else []
 
 
 def _by_volts(part: Part) -> Array:
