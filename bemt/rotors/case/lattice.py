@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import numbers
 from bemt.base.tables import number_of
 from bemt.rotors.case.load import Case
@@ -39,10 +39,8 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     for name, value in given.items():
         if value is None:
             continue
-        try:
+        with gathered(faults):
             found[name] = numbers(name, value)
-        except InputError as error:
-            faults += error.faults
     if "rpm" in found and np.any(found["rpm"] <= 0.0):
         faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
     elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
@@ -57,8 +55,7 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     except ValueError:
         got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
         faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     n = found.get("rpm", np.asarray(case.rpm, dtype=float))
     if J is not None:
         V = found["J"] * n / 60.0 * case.diameter_m
