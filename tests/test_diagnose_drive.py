@@ -23,6 +23,23 @@ def run(seed: int, factor: float = 1.0, bow: float = 0.0) -> Record:
     return from_series(replace(series, values={**series.values, "pulse_width_s": pulse, "pwm_s": pulse}), case())
 
 
+@pytest.mark.parametrize("seed", [4, 5])
+def test_the_scatter_of_a_speed_follows_nothing(seed: int) -> None:
+    """Five pulse widths, again and again: readings of 0.1 % are no law over the speed that was read."""
+    pulse = np.tile(np.linspace(0.0014, 0.0019, 5), 12)
+    share = (pulse - 0.001) / 0.001
+    rpm = 24000.0 * share / (1.0 + 0.25 * share) * (1.0 + 0.001 * np.random.default_rng(seed).standard_normal(60))
+    given = {
+        "rpm": rpm,
+        "airspeed_m_s": np.zeros(60),
+        "density_kg_m3": np.full(60, 1.225),
+        "time_s": 40.0 * np.arange(60),
+    }
+    series = recording(case(), given, seed=seed)
+    said = chain.diagnose([from_series(replace(series, values={**series.values, "pwm_s": pulse}), case())], [case()])
+    assert said.systems["drive"]["verdict"] == "none"
+
+
 @pytest.fixture(scope="module")
 def reference() -> Record:
     return replace(run(1), reference=True)

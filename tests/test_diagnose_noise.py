@@ -200,3 +200,20 @@ def test_a_stated_repeatability_is_the_one_that_is_weighed() -> None:
     stated = noise.hypers(build([replace(r, repeatability=0.004) for r in records], [case()]))
     assert len(open_) > 1 and {h.session for h in stated} == {0.004}
     assert sum(h.weight for h in stated) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "form"), [("reynolds", "power"), ("compressibility", "karman_tsien"), ("ground_effect", "hayden")]
+)
+def test_which_published_law_holds_is_not_known(name: str, form: str) -> None:
+    """What another law of an effect that is on gives is one standard deviation away, not a cause."""
+    base = case().replaced({"model.effects_on": ["ground_effect"]})
+    rpm, z = (v.ravel() for v in np.meshgrid(np.linspace(7000.0, 22000.0, 6), 0.1016 * np.geomspace(0.5, 8.0, 7)))
+    given = {"rpm": rpm, "airspeed_m_s": np.zeros(rpm.size), "density_kg_m3": np.full(rpm.size, 1.225),
+             "wall_distance_m": z, "time_s": 20.0 * np.arange(rpm.size)}  # fmt: skip
+    problem = build([from_series(recording(base, given), base)], [base])
+    (mine,) = [e for e in problem.baseline if e.id == name]
+    change = problem.predict((replace(mine, form=form),)) - problem.f0  # type: ignore[call-arg]
+    C = problem.tangents @ problem.tangents.T + np.diag((1e-5 * problem.scale) ** 2)
+    assert np.max(np.abs(change) / problem.scale) > 0.004
+    assert change @ np.linalg.solve(C, change) < 1.0

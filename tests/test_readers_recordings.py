@@ -199,6 +199,14 @@ def test_a_pressure_reduced_to_sea_level_is_not_that_of_the_air(write: Write) ->
     assert "pressure_Pa" not in named(got) and said(got, "sea level")
 
 
+def test_what_warms_within_a_run_is_a_part_and_not_the_air_of_a_cold_day(write: Write) -> None:
+    rows = [(run, 5000 + k, 20.0 - 25.0 * run + 0.1 * k) for run in (0, 1) for k in range(8)]
+    air = write("run,rpm,temperature_C,x_A\n" + "".join(f"{a},{b},{c},1\n" for a, b, c in rows))
+    assert np.ptp(named(importers.read(air))["temperature_K"]) == pytest.approx(25.7)
+    part = write("run,rpm,temperature_C,x_A\n" + "".join(f"0,{b},{20 + 30 * a},1\n" for a, b, _ in rows))
+    assert "temperature_K" not in named(importers.read(part))
+
+
 def _packed(folder: Path, form: str, rows: list[list[object]], more: int = 0) -> Path:
     """A table as gzip or as a workbook."""
     text = "\n".join(",".join(map(str, row)) for row in rows) + "\n"

@@ -283,9 +283,13 @@ def _covariates(parts: Sequence[Part]) -> dict[str, Array]:
     def join(f: Callable[[Part], Array]) -> Array:
         return np.concatenate([f(p) for p in parts])
 
+    def turns(p: Part) -> Array:
+        """Speed as a variable: where it is what was measured, that of the drive, or its own noise would follow it."""
+        return p.steady_rpm if p.channels == CHANNELS[2:] else p.flow.rpm
+
     found = {
-        "rpm": join(lambda p: p.flow.rpm),
-        "J": join(lambda p: p.flow.J),
+        "rpm": join(turns),
+        "J": join(lambda p: p.flow.J * p.flow.rpm / turns(p)),
         "M_tip": join(lambda p: p.flow.M_tip),
         "Re": join(
             lambda p: p.flow.rho * p.flow.chord * np.hypot(0.75 * p.flow.omega * p.flow.R, p.flow.V) / p.flow.mu

@@ -133,7 +133,7 @@ class State:
     half: Array  # (G,) Half of their squared lengths [1]
     forms: dict[str, Form] = field(default_factory=dict)  # Error of the form of each candidate, at its best setting
     log_z: dict[Explanation, float] = field(default_factory=dict)  # Logarithm of the evidence per explanation
-    small: dict[str, float] = field(default_factory=dict)  # The same of settings that are too small to count
+    small: dict[Explanation, float] = field(default_factory=dict)  # The same of what is too small to count
     best: dict[str, int] = field(default_factory=dict)  # Best setting of each candidate
     best_rival: str = ""  # Unknown smooth effect of largest evidence
 

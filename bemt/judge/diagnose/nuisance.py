@@ -184,6 +184,9 @@ def _of_model(problem: Problem, add: Add) -> None:
             value = value + step if value + step <= parameter.high else value - step
             changed = _everywhere(problem, replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
+        for form in _other_forms(e):
+            changed = _everywhere(problem, replace(e, form=form), where_on=True) - f0  # type: ignore[call-arg, type-var]
+            add(f"{e.id} as {form}", changed, own=True)
     for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
         share = f0 - np.concatenate(without)[problem.kept]
@@ -194,6 +197,12 @@ def _of_model(problem: Problem, add: Add) -> None:
             modes = spread * smooth_modes(problem, e.along, law_of(e))
             for k in range(modes.shape[1]):
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
+
+
+def _other_forms(e: Effect) -> list[str]:
+    """Published laws of an effect beside its own: nobody knows which of them holds for this rotor."""
+    mine = getattr(e, "form", None)
+    return sorted({str(s["form"]) for s in e.variants() or () if "form" in s} - {mine}) if mine and e.diagnosed else []
 
 
 def _by_volts(part: Part) -> Array:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.signatures import Candidate
 
 LEAST = 0.01
-"""A setting that changes every channel by less than this share of its size counts as no cause [1]."""
+"""What changes every channel by less than this share of its size counts as no cause, known or unknown [1]."""
 EARNED = 3.0
 """Log odds that a second effect must add to the better one of a pair; below, the pair counts as that one [1]."""
 # Settings of the covariance that are kept, settings of an effect that choose them, and settings of each effect in a
@@ -137,11 +137,15 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
     for h in _leading(bank):
         C = noise.covariance(problem, h)
         state = _single(bank, h, conditional(C, problem.u, problem.changed))
-        gains = unknown(noise.unlike(C, problem.u, rivals), problem.residual)
+        beside = noise.unlike(C, problem.u, rivals)
+        gains = unknown(beside, problem.residual)
         state.log_z[UNKNOWN] = state.log_z[NONE]
         if gains.size:
             state.best_rival = rivals[int(np.argmax(gains))].name
-            state.log_z[UNKNOWN] += float(log_sum(gains)) - float(np.log(gains.size))
+            counts = _noticed(problem, rivals, beside)
+            for where, some in ((state.log_z, counts), (state.small, ~counts)):
+                share = float(log_sum(gains[some])) - float(np.log(gains.size)) if some.any() else _SHUT
+                where[UNKNOWN] = state.log_z[NONE] + share
         if pairs:
             _pairs(bank, state)
         states.append(state)
@@ -185,6 +189,18 @@ def unknown(rivals: Sequence[tuple[Conditional, Whitener]], residual: Array) -> 
         w = white(e)
         rows.append(base - 0.5 * np.sum(w * w, axis=0) - (white.log_det - given.white.log_det))
     return np.array(rows)
+
+
+def _noticed(
+    problem: Problem, rivals: Sequence[SmoothAlternative], beside: Sequence[tuple[Conditional, Whitener]]
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Which rivals, as the readings show them, change any channel by as much as counts, (K,)."""
+    out = []
+    for k, (given, white) in zip(rivals, beside, strict=True):
+        change = k.size**2 * k.kernel @ white.solve(given.rest(problem.residual)) / problem.scale[k.mine]
+        channel = problem.channel[k.mine]
+        out.append(max(float(np.sqrt(np.mean(change[channel == c] ** 2))) for c in np.unique(channel)) > LEAST)
+    return np.array(out)
 
 
 def _told(candidates: Sequence[Candidate]) -> list[str]:
@@ -256,7 +272,7 @@ def _single(bank: _Bank, h: Hyper, white: Conditional) -> State:
         counts = bank.seen[span]
         state.log_z[Explanation.of(name)] = none + (float(log_sum(total[counts])) if counts.any() else _SHUT)
         # the error of a law is a share of what it changes
-        state.small[name] = none + (float(log_sum(gain[span][~counts])) if not counts.all() else _SHUT)
+        state.small[Explanation.of(name)] = none + (float(log_sum(gain[span][~counts])) if not counts.all() else _SHUT)
         state.best[name] = best
     return state
 
@@ -317,7 +333,7 @@ def _posterior(
         power = EARNED / max(EARNED, min(effect_base.FORM) * (top - log_z[NONE]))
         log_z |= {k: top - power * (top - v) for k, v in near.items() if len(k) == 1}
     small = {k: together([s.small[k] for s in states]) for k in states[0].small}
-    log_p = [log_z[k] + before[k] for k in log_z] + [v + before[Explanation.of(k)] for k, v in small.items()]
+    log_p = [log_z[k] + before[k] for k in log_z] + [v + before[k] for k, v in small.items()]
     p = shares(log_p)
     out = dict(zip(log_z, p.tolist(), strict=False))
     out[NONE] += float(np.sum(p[len(log_z) :]))
