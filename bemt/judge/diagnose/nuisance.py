@@ -185,7 +185,7 @@ def _of_model(problem: Problem, add: Add) -> None:
             changed = _everywhere(problem, replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
         for form in _other_forms(e):
-            changed = _everywhere(problem, replace(e, form=form), where_on=True) - f0  # type: ignore[call-arg, type-var]
+            changed = _everywhere(problem, replace(e, form=form), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} as {form}", changed, own=True)
     for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
