@@ -103,6 +103,12 @@ def test_both_doors_have_the_same_words(command: str) -> None:
     assert name == command and set(given) <= own, "the example parses"
 
 
+def test_points_of_a_design_are_words() -> None:
+    """A parameter that takes text is never read as a number."""
+    words = ["thrust=6,airspeed=15", "thrust=4,airspeed=20,rpm=7000,weight=2"]
+    assert cli.parsed(["design", "--points", *words])[1] == {"points": words}
+
+
 def test_the_commands_that_are_shown_are_few(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([]) == 0
     shown = capsys.readouterr().out

@@ -88,7 +88,8 @@ def parameters(function: Callable[..., Any]) -> tuple[Option, ...]:
         choices = re.search(r"Literal\[(.*?)\]", kind)
         what = (
             "flag" if kind == "bool" else "choice" if choices else "mapping" if "Mapping[str, str]" in kind
-            else "pair" if "tuple[float, float]" in kind else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
+            else "pair" if "tuple[float, float]" in kind else "text" if re.search(r"\bstr\b(?!, Array)", kind)
+            else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
             else "count" if re.search(r"\bint\b|Count", kind) else "text"
         )  # fmt: skip
         words = tuple(re.findall(r"[\"']([^\"']+)[\"']", choices[1])) if choices else ()

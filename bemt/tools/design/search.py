@@ -124,7 +124,7 @@ def choose(
     cells: int | None = None,
     *,
     kv: float | Sequence[float] = (80.0, 8000.0),
-    motors: Sequence[KnownMotor] | str | os.PathLike[str] = (),
+    motors: Sequence[str | os.PathLike[str] | KnownMotor] | str | os.PathLike[str] = (),
     labels: str | Sequence[str] = (),
     blades: int | Sequence[int] = (2,),
     mass_kg: float | None = None,
@@ -162,7 +162,8 @@ def choose(
     most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
-    known = read_motors(motors) if isinstance(motors, (str, os.PathLike)) else tuple(motors)
+    given = [motors] if isinstance(motors, (str, os.PathLike)) else motors
+    known = tuple(m for one in given for m in ((one,) if isinstance(one, KnownMotor) else read_motors(one)))
     target = dataclasses.replace(target, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)
