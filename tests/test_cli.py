@@ -18,9 +18,10 @@ import pytest
 import bemt as package
 from bemt import __version__
 from bemt.app import cli, registry
-from bemt.app.face import PROGRESS, parameters, parser_of
+from bemt.app.face import PROGRESS, nothing_empty, parameters, parser_of
 from bemt.base.action import Told, about
 from bemt.base.errors import Fault, InputError
+from geometry.common import needs as geometry_needs
 
 ROOT = Path(__file__).resolve().parents[1]
 MALFORMED = ROOT / "tests" / "malformed"
@@ -429,3 +430,19 @@ def test_colour_is_for_terminals_and_verdicts(
     for text in (out.getvalue(), err.getvalue()):
         assert ("\x1b[3" in text) is coloured
     assert "\x1b[31m  ! error:\x1b[0m" in out.getvalue() or not coloured
+
+
+def test_an_interrupted_command_leaves_no_empty_folder(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), nothing_empty(tmp_path / "new" / "out"):
+        (tmp_path / "new" / "out" / "case").mkdir(parents=True)
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_waits_for_a_library_that_is_loading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled libraries turn an interrupt into an ImportError, or crash."""
+    (tmp_path / "slow_library.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = True")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        geometry_needs("slow_library", "cad")
+    assert sys.modules["slow_library"].whole

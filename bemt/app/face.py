@@ -10,7 +10,8 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -264,7 +265,7 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
     check_folders(told.command, given)
     inner = inspect.unwrap(function)  # the faults of the command line name options
     check_counts([p.name for p in parameters(function) if "Count" in str(inner.__annotations__[p.name])], given)
-    with progress(args.quiet or args.json) as say:
+    with progress(args.quiet or args.json) as say, nothing_empty(given.get("out")):
         if PROGRESS in inspect.signature(function).parameters:
             given[PROGRESS] = say
         answer = inner(**given)
@@ -286,6 +287,22 @@ def show(answer: Any, as_json: bool, quiet: bool, details: bool) -> int:
     if text:
         sys.stdout.write(text if text.endswith("\n") else f"{text}\n")
     return int(getattr(answer, "exit_code", EXIT_OK))
+
+
+@contextmanager
+def nothing_empty(out: Any) -> Iterator[None]:
+    """Take back the empty folders of a command that has failed or was interrupted."""
+    from pathlib import Path
+
+    folder = Path(str(out or "."))
+    new = [] if folder.exists() else [folder, *(parent for parent in folder.parents if not parent.exists())]
+    try:
+        yield
+    except BaseException:
+        for one in [*sorted(new[0].rglob("*/"), reverse=True), *new] if new else ():
+            with suppress(OSError):  # not empty
+                one.rmdir()
+        raise
 
 
 FILE_ENDINGS = tuple(".csv .json .txt .md .html .png .pdf .stl .step .stp .obj .3mf".split())

@@ -124,7 +124,7 @@ def choose(
     cells: int | None = None,
     *,
     kv: float | Sequence[float] = (80.0, 8000.0),
-    motors: Sequence[str | os.PathLike[str] | KnownMotor] | str | os.PathLike[str] = (),
+    motors: str | os.PathLike[str] | Sequence[str | os.PathLike[str] | KnownMotor] = (),
     labels: str | Sequence[str] = (),
     blades: int | Sequence[int] = (2,),
     mass_kg: float | None = None,

@@ -123,7 +123,7 @@ def stand(
             seed=seed, lapse=lapse if on == "simulated" else 1.0, yes=yes, out=folder,
             say=progress or (lambda text: None),
         )  # fmt: skip
-    except InputError:
+    except BaseException:
         if not list(folder.glob("1_*.csv")):  # nothing was measured: nothing stays
             shutil.rmtree(folder, ignore_errors=True)
         raise
