@@ -168,7 +168,8 @@ def diagnosed(
     only = [only] if isinstance(only, str) else list(only)
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
-    _both_there(given, files, known, reference_case, repeatability_pct)
+    channels = [channels] if isinstance(channels, str) else list(channels)
+    _check(given, files, known, reference_case, repeatability_pct, channels)
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
@@ -184,6 +185,8 @@ def diagnosed(
     asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
                    reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
     heard = [CHANNELS[c] for c in channels] or None
+    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+    beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
     except InputError as error:
@@ -191,21 +194,22 @@ def diagnosed(
             raise
         # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
-        found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []}
-        return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
-    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+        found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []} | beside
+        words = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
+        return OnePoint(found, "\n\n".join([words, *(c.text() for c in blade.values())]))
     names = [one if isinstance(one, str) else "recording" for one in files]
-    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]}
-    if blade:
-        told["along_blade"] = {run: c.document() for run, c in blade.items()}
+    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
         folder.write(target, answer, told, cases, figures=figures)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
 
 
-def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:
-    """Refuse a diagnosis without a recording or without a case."""
+def _check(
+    cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None, heard: Sequence[str]
+) -> None:
+    """Refuse a diagnosis without a recording or without a case, and unknown channels."""
     faults = [] if files else [Fault("", "recordings", "none", "one or more tables or logs")]
+    faults += [Fault("", "channels", repr(c), f"some of {', '.join(CHANNELS)}") for c in heard if c not in CHANNELS]
     if theirs is not None and not known:
         faults.append(Fault("--reference-case", "", "no reference", "--reference RECORDING beside it"))
     faults += [] if cases else [Fault("--case", "", "no case", "the case of the rotor, as in cases/prop_8x5")]
