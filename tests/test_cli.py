@@ -180,7 +180,7 @@ def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: py
         (["plan", "c", "--case", "a", "--case", "b"], "argument --case: got it twice; expected it once"),
         (["estimate", "8x5", "--rpm", "5000", "--chord", "3"], "unrecognized arguments: --chord 3"),
         (["sweep", "cases", "--tolerance-pct", "nan"], "got nan; expected a finite number of 0 or more"),
-        (["sweep", "cases", "--tolerance-pct", "3"], "--tolerance-pct: got 3; expected --strict with it"),
+        (["sweep", "cases", "--tolerance-pct", "3"], "--tolerance-pct: got 3; expected --strict"),
         (["sweep", "cases", "--tolerance-pct", "few"], "--tolerance-pct: got few; expected a number, without its unit"),
         (["sweep", "cases", "--jobs", "two"], "--jobs: got two; expected a whole number"),
         (["sweep", "cases", "--jobs", "0"], "--jobs: got 0; expected a whole number of 1 or more"),

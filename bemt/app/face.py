@@ -17,7 +17,7 @@ from typing import Any
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
-from bemt.base.action import Declaration, about, check_counts, did_you_mean
+from bemt.base.action import Declaration, about, check_counts, choices_of, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -86,14 +86,13 @@ def parameters(function: Callable[..., Any]) -> tuple[Option, ...]:
         if name == PROGRESS:
             continue
         kind = str(given.annotation)
-        choices = re.search(r"Literal\[(.*?)\]", kind)
+        words = tuple(filter(None, choices_of(kind)))
         what = (
-            "flag" if kind == "bool" else "choice" if choices else "mapping" if "Mapping[str, str]" in kind
+            "flag" if kind == "bool" else "choice" if words else "mapping" if "Mapping[str, str]" in kind
             else "pair" if "tuple[float, float]" in kind else "text" if re.search(r"\bstr\b(?!, Array)", kind)
             else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
             else "count" if re.search(r"\bint\b|Count", kind) else "text"
         )  # fmt: skip
-        words = tuple(re.findall(r"[\"']([^\"']+)[\"']", choices[1])) if choices else ()
         many = re.search(r"Sequence|(?<!str, )ArrayLike", kind) is not None
         found.append(Option(name, what, many, given.default, words, told.get(name, "")))
     return tuple(found)

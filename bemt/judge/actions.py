@@ -121,7 +121,7 @@ def diagnose(
     common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "out"),
 )  # fmt: skip
 def compare(
-    a: Path, b: Path | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
+    a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
     diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
     air_b: str | None = None, rpm: float | None = None, unit: Mapping[str, str] = {},  # noqa: B006
     column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, zones: Sequence[str] = (),  # noqa: B006
@@ -131,9 +131,9 @@ def compare(
 
     Parameters
     ----------
-    a : path
+    a : path, Dataset or DataFrame
         First recording, before or without the change.
-    b : path, optional
+    b : path, Dataset or DataFrame, optional
         Second recording, after or with the change; without it `a` is one CFD run, compared with BEMT of the case.
     case : Propeller, str or path, optional
         Case or label of the rotor: `b` is diagnosed with `a` as its reference. Without it, causes that scale like the
@@ -185,13 +185,15 @@ def compare(
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import number, path_text
     from bemt.judge.diagnose import contrast
+    from bemt.judge.diagnose.load import is_table
     from bemt.judge.import_files import words
 
     if diameter_m is not None and not 0.01 <= number("diameter_m", diameter_m) <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    names = path_text("a", a), None if b is None else path_text("b", b)
+    one = a if b is not None and is_table(a) else path_text("a", a)
+    two = b if b is None or is_table(b) else path_text("b", b)
     return contrast.compared(
-        *names, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
+        one, two, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
         out=None if out is None else path_text("out", out), figures=figures, progress=progress,
         run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip

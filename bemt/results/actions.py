@@ -75,7 +75,7 @@ def sweep(
     if not 0.0 <= tolerance < float("inf"):
         raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "a finite number of 0 or more"))
     if tolerance_pct is not None and not strict:
-        raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "--strict with it, which ends with 1 beyond it"))
+        raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "--strict, which ends with 1 beyond it"))
     return run(
         paths_text("cases", cases), None if out is None else path_text("out", out), jobs=jobs, resume=resume,
         progress=progress or (lambda line: None), engine=engine, scheduler=scheduler,

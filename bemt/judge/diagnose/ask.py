@@ -169,7 +169,7 @@ def diagnosed(
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
     channels = [channels] if isinstance(channels, str) else list(channels)
-    _check(given, files, known, reference_case, repeatability_pct, channels)
+    _both_there(given, files, known, reference_case, repeatability_pct)
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
@@ -204,12 +204,9 @@ def diagnosed(
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
 
 
-def _check(
-    cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None, heard: Sequence[str]
-) -> None:
-    """Refuse a diagnosis without a recording or without a case, and unknown channels."""
+def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:
+    """Refuse a diagnosis without a recording or without a case."""
     faults = [] if files else [Fault("", "recordings", "none", "one or more tables or logs")]
-    faults += [Fault("", "channels", repr(c), f"some of {', '.join(CHANNELS)}") for c in heard if c not in CHANNELS]
     if theirs is not None and not known:
         faults.append(Fault("--reference-case", "", "no reference", "--reference RECORDING beside it"))
     faults += [] if cases else [Fault("--case", "", "no case", "the case of the rotor, as in cases/prop_8x5")]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bemt.base.action import in_words
 from bemt.base.errors import Fault, InputError
 from bemt.base.given import numbers
 from bemt.base.tables import number_text, text_table
@@ -20,7 +21,7 @@ from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.case.propagate import propagate
-from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.reading import parse_reading, reading_text
 from bemt.rotors.case.schema import AIRSPEED, ANGLE, RPM
 from bemt.rotors.measured import records
 from bemt.rotors.validity import counted
@@ -205,7 +206,7 @@ def text(doc: dict[str, Any]) -> str:
     return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RotorEstimate(Dataset):
     """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
 
@@ -223,6 +224,9 @@ class RotorEstimate(Dataset):
         """The rows as a table, with what not to trust below."""
         return text(self.found)
 
+    def __str__(self) -> str:
+        return in_words(self.text)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.estimate/2``."""
         return self.found
@@ -238,15 +242,16 @@ def of_label(
     series: str | None = None,
     density: float | None = None,
     angle_deg: Any = 0.0,
-    reading: str | None = None,
+    reading: str | Mapping[str, float] | None = None,
 ) -> RotorEstimate:
     """`document` as a Dataset, standard uncertainties in ``u``."""
+    told = None if reading is None else reading_text(reading)
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
     try:
-        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle, reading)
+        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle, told)
     except InputError as error:
-        if not Path(label).exists():
+        if not isinstance(label, str) or not Path(label).exists():
             raise
         hint = f"A case? bemt sweep {label} solves it"
         raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -131,7 +132,9 @@ def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, floa
     if isinstance(reading, str):
         return reading
     rows = [reading] if isinstance(reading, Mapping) else reading
-    return "; ".join(", ".join(f"{k}={v:.10g}" for k, v in row.items()) for row in rows)
+    return "; ".join(
+        ", ".join(f"{k}={v:.10g}" if isinstance(v, Real) else f"{k}={v}" for k, v in row.items()) for row in rows
+    )
 
 
 def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> Case:
