@@ -300,6 +300,10 @@ def test_the_sources_of_an_answer_are_bibtex(project: Path) -> None:
         bare = re.sub(r"\\[{}]|\\text\w+\{\}", "", line)
         assert bare.count("{") == bare.count("}") and not re.search(r"(?<!\\)[&%$#_]", bare.replace("doi = {", ""))
     assert "doi = {10.1002/we.1636}" in text
+    assert {"mccormick1967", "pereira2008", "kuechemann1953", "idelchik2007"} <= set(keys)
+    assert all("author = {" in line and "year = {" in line for line in entries)
+    notes = [re.search(r"note = \{(.*?); in ", line)[1] for line in entries if "; in " in line]  # type: ignore[index]
+    assert all(re.match(r"[A-Za-z]", note) and not re.search("`|=$", note) for note in notes), notes
 
 
 def test_numbers_of_numpy_are_numbers_and_answers_are_plain_values() -> None:

@@ -319,7 +319,7 @@ def prove(
     Parameters
     ----------
     size : {"small", "full", "stand", "ccblade", "real"}
-        41, 605 or, for a stand, 60 generated items, 68 by CCBlade (extra wisdem), or published recordings.
+        Items: small makes 41, full 605, stand 60 for a stand, ccblade 68 (extra wisdem); real is published recordings.
     seed : int, optional
         Random seed; from the operating system by default.
     jobs : int, optional
