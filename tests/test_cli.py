@@ -447,3 +447,12 @@ def test_ctrl_c_waits_for_a_library_that_is_loading(tmp_path: Path, monkeypatch:
     with pytest.raises(KeyboardInterrupt):
         geometry_needs("slow_library", "cad")
     assert sys.modules["slow_library"].whole
+
+
+@pytest.mark.parametrize("command", ["import", "fly", "sweep"])
+def test_a_pipe_is_refused_for_what_it_is(command: str, tmp_path: Path) -> None:
+    """Looking at its start takes it away: it is no empty and no damaged file."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    done = bemt(command, str(pipe))
+    assert done.returncode == 2 and "got a pipe, which can be read once; expected a file" in done.stderr

@@ -10,7 +10,7 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -262,6 +262,7 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     given = values(function, args)
     check_folders(told.command, given)
+    check_files({p.name for p in parameters(function) if p.kind == "text"}, given)
     inner = inspect.unwrap(function)  # the faults of the command line name options
     check_counts([p.name for p in parameters(function) if "Count" in str(inner.__annotations__[p.name])], given)
     with progress(args.quiet or args.json) as say, nothing_empty(given.get("out")):
@@ -286,6 +287,26 @@ def show(answer: Any, as_json: bool, quiet: bool, details: bool) -> int:
     if text:
         sys.stdout.write(text if text.endswith("\n") else f"{text}\n")
     return int(getattr(answer, "exit_code", EXIT_OK))
+
+
+def check_files(names: Set[str], given: Mapping[str, Any]) -> None:
+    """Refuse a pipe in place of a file: its format is found, then it is read, and it can be read once."""
+    from pathlib import Path
+    from stat import S_ISFIFO, S_ISSOCK
+
+    from bemt.base.errors import Fault, InputError
+
+    faults = []
+    for name in names - {"out_csv", "picture"}:
+        value = given.get(name)
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            with suppress(OSError, TypeError, ValueError):  # no name of a file
+                mode = Path(one).stat().st_mode
+                if S_ISFIFO(mode) or S_ISSOCK(mode):
+                    hint = "Write it to a file first, cat > FILE"
+                    faults.append(Fault(one, "", "a pipe, which can be read once", "a file", hint))
+    if faults:
+        raise InputError(faults)
 
 
 @contextmanager
