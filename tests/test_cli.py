@@ -7,6 +7,8 @@ import io
 import json
 import os
 import shutil
+import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -444,8 +446,12 @@ def test_ctrl_c_waits_for_a_library_that_is_loading(tmp_path: Path, monkeypatch:
     """Compiled libraries turn an interrupt into an ImportError, or crash."""
     (tmp_path / "slow_library.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = True")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(KeyboardInterrupt):
-        geometry_needs("slow_library", "cad")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            geometry_needs("slow_library", "cad")
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert sys.modules["slow_library"].whole
 
 
@@ -456,3 +462,10 @@ def test_a_pipe_is_refused_for_what_it_is(command: str, tmp_path: Path) -> None:
     os.mkfifo(pipe)
     done = bemt(command, str(pipe))
     assert done.returncode == 2 and "got a pipe, which can be read once; expected a file" in done.stderr
+
+
+def test_a_port_in_use_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("localhost", 0)) as server:
+        port = server.getsockname()[1]
+        assert cli.main(["ui", "--no-browser", "--port", str(port)]) == 2
+    assert f"--port: got {port}, which is in use; expected a free port." in capsys.readouterr().err
