@@ -37,6 +37,7 @@ def diagnose(
     only: Sequence[str] = (), ruled_out: Sequence[str] = (), changed: Sequence[str] = (), off: Sequence[str] = (),
     baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
     rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
+    top_rpm: float | None = None,
     unit: Mapping[str, str] = {}, column: Mapping[str, str] = {}, sign: Mapping[str, str] = {},  # noqa: B006
     zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None, figures: bool = True,
     progress: Callable[[str], None] | None = None,
@@ -71,6 +72,8 @@ def diagnose(
         Airspeed for files without one: one for all, or one per file; from the case by default. [m/s]
     repeatability_pct : float, optional
         What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
+    top_rpm : float, optional
+        Fastest that the stand may run: no run beyond it is asked for. [rev/min]
     unit, column, sign : mapping
         Runs of CFD: what their exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
     zones : sequence of str
@@ -111,7 +114,7 @@ def diagnose(
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
         baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
-        repeatability_pct=repeatability_pct, along=along, out=out, figures=figures, progress=progress,
+        repeatability_pct=repeatability_pct, top_rpm=top_rpm, along=along, out=out, figures=figures, progress=progress,
         run={"unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
 

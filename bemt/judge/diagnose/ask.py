@@ -14,7 +14,7 @@ import numpy as np
 from bemt.base.action import Told
 from bemt.base.errors import Fault, InputError, system_fault
 from bemt.base.face import as_html
-from bemt.base.given import path_text
+from bemt.base.given import number, path_text
 from bemt.data.recordings.cfd_study import together
 from bemt.data.recordings.load import as_stated, import_file
 from bemt.judge.compare import one_run
@@ -161,7 +161,8 @@ def several(given: Any) -> list[Any]:
 def diagnosed(
     recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
-    repeatability_pct: float | None, along: Any, out: Any, figures: bool, progress: Callable[[str], None] | None,
+    repeatability_pct: float | None, top_rpm: float | None, along: Any, out: Any, figures: bool,
+    progress: Callable[[str], None] | None,
     run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
@@ -170,6 +171,8 @@ def diagnosed(
     known = several(reference)
     channels = [channels] if isinstance(channels, str) else list(channels)
     _both_there(given, files, known, reference_case, repeatability_pct)
+    if top_rpm is not None and not number("top_rpm", top_rpm) > 0.0:
+        raise InputError(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
@@ -180,10 +183,12 @@ def diagnosed(
                               reference_case=theirs)  # fmt: skip
     if repeatability_pct is not None:
         records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
+    if top_rpm is not None:
+        records = [replace(r, top_rpm=top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
     asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
-                   reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
+                   reference_case=reference_case, repeatability_pct=repeatability_pct, top_rpm=top_rpm)  # fmt: skip
     heard = [CHANNELS[c] for c in channels] or None
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
     beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
@@ -220,6 +225,7 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
 def _asked(
     files: list[Any], cases: list[Any], known: list[Any], *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
+    top_rpm: float | None,
 ) -> Given:  # fmt: skip
     """What was asked, for the command of the next step; objects of the library have a word in place of their file."""
 
@@ -233,6 +239,8 @@ def _asked(
         words += ["--reference-case", *quoted(several(reference_case), "CASE")]
     if repeatability_pct is not None:
         words += ["--repeatability-pct", f"{repeatability_pct:g}"]
+    if top_rpm is not None:
+        words += ["--top-rpm", f"{top_rpm:g}"]
     if baseline != "bemt":
         words += ["--baseline", baseline]
     return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out),
