@@ -298,7 +298,7 @@ def check_files(names: Set[str], given: Mapping[str, Any]) -> None:
 
     faults = []
     for name in names - {"out_csv", "picture"}:
-        value = given.get(name)
+        value: Any = given.get(name)
         for one in value if isinstance(value, (list, tuple)) else [value]:
             with suppress(OSError, TypeError, ValueError):  # no name of a file
                 mode = Path(one).stat().st_mode

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,7 +122,7 @@ def _value(name: str, value: str) -> tuple[str, float]:
     return _SHORT.get(base, base), si * 30.0 / math.pi if dimension == "angular_speed" else si
 
 
-def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> str:
+def reading_text(reading: str | Mapping[str, float | str] | Sequence[Mapping[str, float | str]]) -> str:
     """Readings as one text, of a text or of names and numbers.
 
     >>> reading_text({"rpm": 5400, "thrust_g": 410})
@@ -133,7 +132,7 @@ def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, floa
         return reading
     rows = [reading] if isinstance(reading, Mapping) else reading
     return "; ".join(
-        ", ".join(f"{k}={v:.10g}" if isinstance(v, Real) else f"{k}={v}" for k, v in row.items()) for row in rows
+        ", ".join(f"{k}={v}" if isinstance(v, str) else f"{k}={v:.10g}" for k, v in row.items()) for row in rows
     )
 
 
