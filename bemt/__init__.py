@@ -68,6 +68,8 @@ def _homes() -> dict[str, str]:
 
 def __getattr__(name: str) -> Any:
     """Load a name of the public API on first use."""
+    if name == "__all__":
+        return sorted(_homes())
     if name.startswith("__"):
         raise AttributeError(name)
     found = _homes()

@@ -108,7 +108,11 @@ FILES: dict[str, tuple[type[Table], str]] = {
     "case": (CaseFile, "A propeller or fan: all inputs of the solver. Six lines are enough:"),
     "recording": (RecordingToml, "Next to a table of measurements, if its headings do not say enough:"),
     "run": (RunToml, "One CFD run; `bemt import FILES --out run.toml` writes it, every command takes it:"),
-    "motor": (MotorToml, "Measurements of a motor constant, for `bemt lab motor` ([example](files/motor.toml))."),
+    "motor": (
+        MotorToml,
+        "Measurements of a motor constant, for `bemt lab motor` "
+        "([one with its recordings](../reports/drive/motor_mn4006/motor.toml)).",
+    ),
     "thrusters": (ThrustersFile, "For `bemt lab thrusters` ([example](files/thrusters.toml))."),
     "campaign": (CampaignFile, "OpenFOAM runs of one case, for `bemt cfd` ([example](files/campaign.toml))."),
 }

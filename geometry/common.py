@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Sequence
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -43,12 +46,29 @@ class GeometryError(ValueError):
 def needs(module: str, extra: str) -> Any:
     """Import a library that an extra brings, or say which extra is missing."""
     try:
-        return importlib.import_module(module)
+        with _whole():
+            return importlib.import_module(module)
     except ModuleNotFoundError as error:
         if error.name is None or not module.startswith(error.name):
             raise
         hint = f'Install it with python -m pip install "bemt[{extra}]"'
         raise GeometryError([(module, "no such library", f"the extra [{extra}]", hint)]) from error
+
+
+@contextmanager
+def _whole() -> Iterator[None]:
+    """Hold Ctrl-C back to the end: a compiled library that is interrupted while it loads fails or crashes."""
+    own, pressed = signal.getsignal(signal.SIGINT), list[int]()
+    held = callable(own) and threading.current_thread() is threading.main_thread()
+    if held:
+        signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        if held:
+            signal.signal(signal.SIGINT, own)
+    if pressed:
+        signal.raise_signal(pressed[0])
 
 
 class Faults:

@@ -158,7 +158,8 @@ def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> di
     path.write_text("".join(pieces), encoding="ascii")
     expected = sum(part.volume for part in model.parts)
     _check_file([path], UNITS[unit], expected, len(model.parts))
-    return {"path": path.name, "format": kind, "unit": unit, "watertight": True, "surfaces": _surfaces(model)}
+    closed = True if kind == "obj" or sum(len(part.names) for part in model.parts) == 1 else "the named solids together"
+    return {"path": path.name, "format": kind, "unit": unit, "watertight": closed, "surfaces": _surfaces(model)}
 
 
 _THREE_MF = {

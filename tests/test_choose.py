@@ -233,19 +233,10 @@ def test_the_nominal_thrust_is_met_as_often_as_not(motor: KnownMotor) -> None:
 
 
 def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [
-        "choose",
-        "--thrust-N",
-        "6",
-        "--cells",
-        "3",
-        "--kv",
-        "800:1000",
-        "--labels",
-        *FEW,
-        "--out",
-        str(tmp_path / "o"),
-    ]
-    assert main(words) == 0
+    motors = tmp_path / "motors.csv"
+    motors.write_text("name,kv,resistance_mohm,no_load_A\nM,900,80,0.6\n")
+    words = ["choose", "--thrust-N", "6", "--cells", "3", "--labels", *FEW]
+    assert main([*words, "--motors", str(tmp_path / "none.csv")]) == 2
+    assert main([*words, "--motors", str(motors), "--out", str(tmp_path / "o")]) == 0
     assert {f.name for f in (tmp_path / "o").iterdir()} == {"choose.json", "choose.csv", "choose.png"}
     assert "P(met)" in capsys.readouterr().out

@@ -7,6 +7,8 @@ import io
 import json
 import os
 import shutil
+import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,9 +20,10 @@ import pytest
 import bemt as package
 from bemt import __version__
 from bemt.app import cli, registry
-from bemt.app.face import PROGRESS, parameters, parser_of
+from bemt.app.face import PROGRESS, nothing_empty, parameters, parser_of
 from bemt.base.action import Told, about
 from bemt.base.errors import Fault, InputError
+from geometry.common import needs as geometry_needs
 
 ROOT = Path(__file__).resolve().parents[1]
 MALFORMED = ROOT / "tests" / "malformed"
@@ -103,6 +106,12 @@ def test_both_doors_have_the_same_words(command: str) -> None:
     assert name == command and set(given) <= own, "the example parses"
 
 
+def test_points_of_a_design_are_words() -> None:
+    """A parameter that takes text is never read as a number."""
+    words = ["thrust=6,airspeed=15", "thrust=4,airspeed=20,rpm=7000,weight=2"]
+    assert cli.parsed(["design", "--points", *words])[1] == {"points": words}
+
+
 def test_the_commands_that_are_shown_are_few(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([]) == 0
     shown = capsys.readouterr().out
@@ -173,6 +182,7 @@ def test_wrong_usage_is_2_and_says_so_on_stderr(arguments: list[str], capsys: py
         (["plan", "c", "--case", "a", "--case", "b"], "argument --case: got it twice; expected it once"),
         (["estimate", "8x5", "--rpm", "5000", "--chord", "3"], "unrecognized arguments: --chord 3"),
         (["sweep", "cases", "--tolerance-pct", "nan"], "got nan; expected a finite number of 0 or more"),
+        (["sweep", "cases", "--tolerance-pct", "3"], "--tolerance-pct: got 3; expected --strict"),
         (["sweep", "cases", "--tolerance-pct", "few"], "--tolerance-pct: got few; expected a number, without its unit"),
         (["sweep", "cases", "--jobs", "two"], "--jobs: got two; expected a whole number"),
         (["sweep", "cases", "--jobs", "0"], "--jobs: got 0; expected a whole number of 1 or more"),
@@ -423,3 +433,39 @@ def test_colour_is_for_terminals_and_verdicts(
     for text in (out.getvalue(), err.getvalue()):
         assert ("\x1b[3" in text) is coloured
     assert "\x1b[31m  ! error:\x1b[0m" in out.getvalue() or not coloured
+
+
+def test_an_interrupted_command_leaves_no_empty_folder(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), nothing_empty(tmp_path / "new" / "out"):
+        (tmp_path / "new" / "out" / "case").mkdir(parents=True)
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_waits_for_a_library_that_is_loading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled libraries turn an interrupt into an ImportError, or crash."""
+    (tmp_path / "slow_library.py").write_text("import signal; signal.raise_signal(signal.SIGINT); whole = True")
+    monkeypatch.syspath_prepend(tmp_path)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            geometry_needs("slow_library", "cad")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert sys.modules["slow_library"].whole
+
+
+@pytest.mark.parametrize("command", ["import", "fly", "sweep"])
+def test_a_pipe_is_refused_for_what_it_is(command: str, tmp_path: Path) -> None:
+    """Looking at its start takes it away: it is no empty and no damaged file."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    done = bemt(command, str(pipe))
+    assert done.returncode == 2 and "got a pipe, which can be read once; expected a file" in done.stderr
+
+
+def test_a_port_in_use_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("localhost", 0)) as server:
+        port = server.getsockname()[1]
+        assert cli.main(["ui", "--no-browser", "--port", str(port)]) == 2
+    assert f"--port: got {port}, which is in use; expected a free port." in capsys.readouterr().err

@@ -105,3 +105,19 @@ def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:
     (tmp_path / "radial.csv").write_text("run,r_m\na,0.1\n")
     with pytest.raises(InputError, match="thrust_per_radius_N_m"):
         read_blade_loads(tmp_path / "radial.csv")
+
+
+def test_loads_beside_too_few_readings_are_read_and_shown(project: Path, tmp_path: Path) -> None:
+    import bemt
+    from bemt.base.errors import InputError
+
+    (tmp_path / "one.csv").write_text("rpm,thrust_N\n6000,5\n")
+    case = fan(project, tmp_path / "fan")
+    given = {"case": case.path.parent, "airspeed_m_s": 0.0}
+    with pytest.raises(InputError, match="none.csv"):
+        bemt.diagnose(tmp_path / "one.csv", along=tmp_path / "none.csv", **given)
+    lines = [f"a,6000,0,1.2,{r:g},1.0,0.01" for r in np.linspace(0.006, 0.014, 9)]
+    head = "run,rpm,airspeed_m_s,density_kg_m3,r_m,thrust_per_radius_N_m,torque_per_radius_Nm_m"
+    (tmp_path / "radial.csv").write_text("\n".join([head, *lines]) + "\n")
+    found = bemt.diagnose(tmp_path / "one.csv", along=tmp_path / "radial.csv", **given)
+    assert found.verdict == "insufficient" and "a" in found.to_dict()["along_blade"] and "0.84-0.95 R" in found.text

@@ -634,6 +634,11 @@ def test_files_are_closed_named_and_state_their_unit(propeller: Rotor, tmp_path:
         assert unit == "mm" and solid.is_watertight and solid.is_winding_consistent and solid.body_count == 2
         assert solid.volume == pytest.approx(volume * 1e9, rel=1e-6)
         assert np.ptp(points[:, 0]) > size
+    plain = {kind: trimesh.load(tmp_path / f"p.{kind}", force="mesh") for kind in ("stl", "obj")}
+    assert plain["obj"].is_watertight and named["p.obj"]["watertight"] is True
+    assert not plain["stl"].is_watertight and named["p.stl"]["watertight"] == "the named solids together"
+    plain["stl"].merge_vertices()
+    assert plain["stl"].is_watertight, "their corners are equal to the last digit"
     words = [line.split()[1] for line in (tmp_path / "p.stl").read_text().splitlines() if line.startswith("solid ")]
     assert words == ["blade", "hub", "duct"]
     assert (tmp_path / "constant/triSurface/blade.stl").read_text(encoding="ascii").startswith("solid blade\n")

@@ -311,6 +311,8 @@ def test_a_folder_is_a_table(tmp_path: Path) -> None:
     answer = fly(tmp_path, mass_kg=1.5, out_csv=tmp_path / "t.csv")
     assert [Path(r["file"]).name for r in answer.table()] == ["a.bin", "b.bin"] and len(answer.faults) == 1
     assert len((tmp_path / "t.csv").read_text().splitlines()) == 3 and "c.bbl" in str(answer)
+    one = fly(tmp_path / "a.bin")
+    assert one.verdict == one.to_dict()["decision"]["verdict"] and "--healthy" in one.text and "--" not in str(one)
     with pytest.raises(InputError, match="blackbox_decode"):
         fly(tmp_path / "c.bbl")
 

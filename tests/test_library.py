@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pydoc
 import re
 import subprocess
@@ -10,11 +11,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import bemt
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
+
+SPEEDS = np.arange(4000.0, 9001.0, 500.0)
+FRAME = pd.DataFrame({"rpm": SPEEDS, "thrust_N": 1e-7 * SPEEDS**2})
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -295,3 +300,52 @@ def test_the_sources_of_an_answer_are_bibtex(project: Path) -> None:
         bare = re.sub(r"\\[{}]|\\text\w+\{\}", "", line)
         assert bare.count("{") == bare.count("}") and not re.search(r"(?<!\\)[&%$#_]", bare.replace("doi = {", ""))
     assert "doi = {10.1002/we.1636}" in text
+    assert {"mccormick1967", "pereira2008", "kuechemann1953", "idelchik2007"} <= set(keys)
+    assert all("author = {" in line and "year = {" in line for line in entries)
+    notes = [re.search(r"note = \{(.*?); in ", line)[1] for line in entries if "; in " in line]  # type: ignore[index]
+    assert all(re.match(r"[A-Za-z]", note) and not re.search("`|=$", note) for note in notes), notes
+
+
+def test_numbers_of_numpy_are_numbers_and_answers_are_plain_values() -> None:
+    found = bemt.drive("10x4.5", kv=np.float32(900.0), cells=np.int64(4), rotors=np.int32(4), mass_kg=1.0)
+    assert json.dumps(found.to_dict()) == json.dumps(
+        bemt.drive("10x4.5", kv=900, cells=4, rotors=4, mass_kg=1.0).to_dict()
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: bemt.prove(size="nonsense"), "size: got 'nonsense'; expected one of small, full"),
+        (lambda: bemt.diagnose(FRAME, "10x5", channels=["lift"]), "channels: got 'lift'; expected one of thrust"),
+        (lambda: bemt.estimate(["10x5"], rpm=6000), "label: got list"),
+        (lambda: bemt.propeller("10x5").curve(rpm=6000, J=-99), "J: got 2514.6 m/s; expected up to 300 m/s"),
+        (lambda: bemt.import_(FRAME), "files: got DataFrame"),
+        (lambda: bemt.compare(FRAME, FRAME), "the same recording twice"),
+    ],
+)
+def test_a_word_or_an_object_that_is_none_is_named(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(bemt.InputError) as error:
+        call()
+    assert words in str(error.value)
+
+
+def test_frames_are_compared_as_files_are(tmp_path: Path) -> None:
+    weak = FRAME.assign(thrust_N=0.9 * FRAME.thrust_N)
+    files = tmp_path / "a.csv", tmp_path / "b.csv"
+    for frame, file in zip((FRAME, weak), files, strict=True):
+        frame.to_csv(file, index=False)
+    by_frames, by_files = bemt.compare(FRAME, weak), bemt.compare(*files)
+    assert (by_frames.verdict, by_frames.effects) == (by_files.verdict, by_files.effects)
+    assert bemt.compare(FRAME, weak, case="cases/prop_10x5").document["case"] == "prop_10x5"
+
+
+def test_an_estimate_prints_its_text_with_parameters_and_takes_a_reading_by_name() -> None:
+    assert "chord_mm" in str(bemt.estimate("10x5", 6000)) and "--" not in str(bemt.estimate("10x5", 6000))
+    by_name = bemt.estimate("10x5", 6000, reading={"rpm": 5400, "thrust_g": 410})
+    assert by_name.text == bemt.estimate("10x5", 6000, reading="rpm=5400,thrust_g=410").text
+
+
+def test_the_help_of_the_package_lists_its_functions() -> None:
+    shown = pydoc.plain(pydoc.render_doc(bemt))
+    assert all(f"    {name}(" in shown for name in ("estimate", "diagnose", "drive", "propeller"))

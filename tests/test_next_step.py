@@ -182,3 +182,12 @@ def test_a_wider_blade_is_among_the_rotors_that_fit_the_loads(grid: dict[str, np
     wide = recording(case(), grid, (other_rotor._Chord(factor),))
     problem = build([of(wide)], [case()])
     assert f"chord {100.0 * (factor - 1.0):+.0f} %" in other_rotor.nearest_rotors(problem)
+
+
+@pytest.mark.parametrize(("top", "faster"), [(np.inf, True), (1.02, False)])
+def test_no_run_is_asked_for_beyond_what_the_stand_may_do(compared: chain.Diagnosis, top: float, faster: bool) -> None:
+    part = compared.problem.parts[0]
+    record = replace(part.record, top_rpm=top * float(part.record.rpm.max()))
+    flow = SimpleNamespace(R=part.flow.R, J=part.flow.J, M_tip=np.array([0.3]), ducted=False)
+    runs = [option.rpm.max() for option in suggest._options(SimpleNamespace(record=record, flow=flow))]
+    assert bool(max(runs) > 1.02 * record.rpm.max()) is faster

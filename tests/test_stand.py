@@ -256,6 +256,8 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
     assert {"recording.csv", "reference.csv", "1_again.csv", "2_reference.csv", "log.txt", "story.html", "story.png",
             "stand.json"} <= {f.name for f in folder.iterdir()}  # fmt: skip
     assert json.loads((folder / "stand.json").read_text())["schema"] == "bemt.stand/1"
+    speeds = [float(row.split(",")[1]) for file in folder.glob("[1-9]_*.csv") for row in file.read_text().split()[1:]]
+    assert max(speeds) <= 1.01 * 20_000.0, "no run beyond the top, which is the case's"
     assert "img alt" in (folder / "story.html").read_text()
     log = (folder / "log.txt").read_text()
     assert log.index("sealed: ") < log.index("run: ") < log.index("said: ") < log.index("unsealed: ")

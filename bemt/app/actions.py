@@ -29,7 +29,7 @@ def ui(*, port: int = 8501, browser: bool = True) -> Told:
     Raises
     ------
     InputError
-        For a port that is not 1024 to 65535, and without the extra ``ui``.
+        For a port that is in use or not 1024 to 65535, and without the extra ``ui``.
 
     Examples
     --------
@@ -43,6 +43,8 @@ def ui(*, port: int = 8501, browser: bool = True) -> Told:
 
     if not 1024 <= port <= 65535:
         raise InputError(Fault("--port", "", f"{port}", "1024 to 65535"))
+    if served.taken(port):
+        raise InputError(Fault("--port", "", f"{port}, which is in use", "a free port", f"Try --port {port + 1}"))
     needs("streamlit", "ui")
     code = served.serve(port, browser)
     document = {"schema": "bemt.ui/1", "port": port, "returncode": code}

@@ -10,13 +10,14 @@ import argparse
 import inspect
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
 from bemt.app import registry
 from bemt.app.registry import complain, progress
-from bemt.base.action import Declaration, about, check_counts, did_you_mean
+from bemt.base.action import Declaration, about, check_counts, choices_of, did_you_mean
 from bemt.base.errors import EXIT_OK
 
 PROGRESS = "progress"
@@ -85,13 +86,13 @@ def parameters(function: Callable[..., Any]) -> tuple[Option, ...]:
         if name == PROGRESS:
             continue
         kind = str(given.annotation)
-        choices = re.search(r"Literal\[(.*?)\]", kind)
+        words = tuple(filter(None, choices_of(kind)))
         what = (
-            "flag" if kind == "bool" else "choice" if choices else "mapping" if "Mapping[str, str]" in kind
-            else "pair" if "tuple[float, float]" in kind else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
+            "flag" if kind == "bool" else "choice" if words else "mapping" if "Mapping[str, str]" in kind
+            else "pair" if "tuple[float, float]" in kind else "text" if re.search(r"\bstr\b(?!, Array)", kind)
+            else "number" if re.search(r"float|(?<!str, )ArrayLike", kind)
             else "count" if re.search(r"\bint\b|Count", kind) else "text"
         )  # fmt: skip
-        words = tuple(re.findall(r"[\"']([^\"']+)[\"']", choices[1])) if choices else ()
         many = re.search(r"Sequence|(?<!str, )ArrayLike", kind) is not None
         found.append(Option(name, what, many, given.default, words, told.get(name, "")))
     return tuple(found)
@@ -261,9 +262,10 @@ def run(function: Callable[..., Any], argv: Sequence[str], prog: str = "bemt") -
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")  # RFC 8259, 8.1
     given = values(function, args)
     check_folders(told.command, given)
+    check_files({p.name for p in parameters(function) if p.kind == "text"}, given)
     inner = inspect.unwrap(function)  # the faults of the command line name options
     check_counts([p.name for p in parameters(function) if "Count" in str(inner.__annotations__[p.name])], given)
-    with progress(args.quiet or args.json) as say:
+    with progress(args.quiet or args.json) as say, nothing_empty(given.get("out")):
         if PROGRESS in inspect.signature(function).parameters:
             given[PROGRESS] = say
         answer = inner(**given)
@@ -285,6 +287,42 @@ def show(answer: Any, as_json: bool, quiet: bool, details: bool) -> int:
     if text:
         sys.stdout.write(text if text.endswith("\n") else f"{text}\n")
     return int(getattr(answer, "exit_code", EXIT_OK))
+
+
+def check_files(names: Set[str], given: Mapping[str, Any]) -> None:
+    """Refuse a pipe in place of a file: its format is found, then it is read, and it can be read once."""
+    from pathlib import Path
+    from stat import S_ISFIFO, S_ISSOCK
+
+    from bemt.base.errors import Fault, InputError
+
+    faults = []
+    for name in names - {"out_csv", "picture"}:
+        value: Any = given.get(name)
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            with suppress(OSError, TypeError, ValueError):  # no name of a file
+                mode = Path(one).stat().st_mode
+                if S_ISFIFO(mode) or S_ISSOCK(mode):
+                    hint = "Write it to a file first, cat > FILE"
+                    faults.append(Fault(one, "", "a pipe, which can be read once", "a file", hint))
+    if faults:
+        raise InputError(faults)
+
+
+@contextmanager
+def nothing_empty(out: Any) -> Iterator[None]:
+    """Take back the empty folders of a command that has failed or was interrupted."""
+    from pathlib import Path
+
+    folder = Path(str(out or "."))
+    new = [] if folder.exists() else [folder, *(parent for parent in folder.parents if not parent.exists())]
+    try:
+        yield
+    except BaseException:
+        for one in [*sorted(new[0].rglob("*/"), reverse=True), *new] if new else ():
+            with suppress(OSError):  # not empty
+                one.rmdir()
+        raise
 
 
 FILE_ENDINGS = tuple(".csv .json .txt .md .html .png .pdf .stl .step .stp .obj .3mf".split())

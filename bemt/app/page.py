@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import tempfile
 import zipfile
 from pathlib import Path
@@ -73,7 +74,8 @@ def asked(st: Any) -> tuple[bemt.Propeller, dict[str, float]]:
         chord = st.slider("Largest chord / radius", 0.05, 0.40, 0.20, 0.005, disabled=not known)
         pitch = st.slider("Pitch / pitch of the label", 0.7, 1.3, 1.0, 0.01)
         st.header("Operating point")
-        rpm = st.slider("Speed of rotation [rev/min]", 1000, 25000, 6000, 100, help=told("rpm"))
+        sonic = math.ceil(60.0 * 340.0 / (math.pi * bemt.propeller(label).case.diameter_m) / 1000.0) * 1000
+        rpm = st.slider("Speed of rotation [rev/min]", 1000, max(sonic, 2000), min(6000, sonic), 100, help=told("rpm"))
         airspeed = st.slider("Airspeed [m/s]", 0.0, 40.0, 0.0, 0.5, help=told("airspeed_m_s"))
         st.header("Motor and battery")
         motor = st.checkbox("With a motor")
@@ -116,7 +118,7 @@ def recording(st: Any, propeller: bemt.Propeller) -> Any:
         if st.button("Diagnose", type="primary"):
             with st.spinner("Comparing with every effect and fault ..."):
                 found = bemt.diagnose(path, propeller)
-            head, _, rest = found.text.partition("\n")
+            head, _, rest = found.text.replace(f"{folder}/", "").partition("\n")  # commands name your file
             shown = st.success if found.verdict in ("named", "none") else st.info
             shown(head)
             with st.expander("The whole answer", expanded=True):

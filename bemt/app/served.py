@@ -41,14 +41,19 @@ def serve(port: int, browser: bool) -> int:
         server.terminate()
 
 
+def taken(port: int) -> bool:
+    """Whether somebody answers at a port of this machine."""
+    with socket.socket() as probe:
+        return probe.connect_ex(("localhost", port)) == 0
+
+
 def _open(port: int) -> None:
     """Open the page when the server answers."""
     end = time.monotonic() + WAIT_S
     while time.monotonic() < end:
-        with socket.socket() as probe:
-            if probe.connect_ex(("localhost", port)) == 0:
-                webbrowser.open(f"http://localhost:{port}")
-                return
+        if taken(port):
+            webbrowser.open(f"http://localhost:{port}")
+            return
         time.sleep(0.2)
 
 

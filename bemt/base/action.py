@@ -21,8 +21,8 @@ from typing import Any, ParamSpec, TypeVar
 from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
 
 __all__ = [
-    "Declaration", "Count", "Told", "about", "action", "did_you_mean", "in_words_of_the_library", "options_of",
-    "worded",
+    "Declaration", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
+    "in_words_of_the_library", "options_of", "worded",
 ]  # fmt: skip
 
 P = ParamSpec("P")
@@ -55,7 +55,7 @@ class Told:
     files: tuple[Path, ...] = ()  # what was written
 
     def __str__(self) -> str:
-        return self.text
+        return in_words(self.text)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
@@ -84,7 +84,7 @@ def about(function: Callable[..., Any]) -> Declaration:
 
 
 def worded(function: Callable[P, T]) -> Callable[P, T]:
-    """Function that suggests the right keyword, checks its counts, and names parameters in its faults.
+    """Function that suggests the right keyword, checks counts and choices, and names parameters in its faults.
 
     >>> @worded
     ... def solve(rpm, airspeed_m_s=0.0): return rpm
@@ -95,14 +95,18 @@ def worded(function: Callable[P, T]) -> Callable[P, T]:
     """
     code = function.__code__
     names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-    counts = tuple(name for name, kind in function.__annotations__.items() if "Count" in str(kind))
+    kinds = {name: str(kind) for name, kind in function.__annotations__.items() if name in names}
+    counts = tuple(name for name, kind in kinds.items() if "Count" in kind)
+    choices = {name: found for name, kind in kinds.items() if (found := choices_of(kind))}
 
     @functools.wraps(function)
     def call(*args: P.args, **more: P.kwargs) -> T:
         if unknown := [name for name in more if name not in names]:
             near = did_you_mean(unknown[0], names) or f" It takes {', '.join(n for n in names if n != 'self')}."
             raise TypeError(f"{function.__name__}() got {unknown[0]!r}.{near}")
-        check_counts(counts, more)
+        given = dict(zip(names, args, strict=False)) | more
+        check_counts(counts, given)
+        check_choices(choices, given)
         with in_words_of_the_library():
             return function(*args, **more)
 
@@ -121,6 +125,29 @@ def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:
     refuse(faults)
 
 
+def choices_of(kind: str) -> tuple[str, ...]:
+    """Words of an annotation's Literal.
+
+    >>> choices_of("Sequence[Literal['thrust', 'torque']]"), choices_of("float | None")
+    (('thrust', 'torque'), ())
+    """
+    found = re.search(r"Literal\[(.*?)\]", kind)
+    return tuple(re.findall(r"[\"']([^\"']*)[\"']", found[1])) if found else ()
+
+
+def check_choices(choices: Mapping[str, tuple[str, ...]], given: Mapping[str, Any]) -> None:
+    """Refuse words that are none of those declared."""
+    faults = []
+    for name, known in choices.items():
+        value = given.get(name)
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            if one is not None and one not in known:
+                near = did_you_mean(str(one), known).strip()
+                faults.append(Fault("", name, repr(one), f"one of {', '.join(known)}", near))
+    if faults:
+        raise InputError(faults)
+
+
 def did_you_mean(got: str, known: Iterable[str]) -> str:
     """`` Did you mean X?`` when a known word is near, else nothing.
 
@@ -132,11 +159,13 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
 
 
 def in_words(sentence: str) -> str:
-    """A sentence with parameters in place of options; a whole line for the shell stays.
+    """Lines with parameters in place of options; a whole line for the shell stays.
 
     >>> in_words("As in --thrust-N 27 --cells 6"), in_words("Try bemt new --scan FILE")
     ('As in thrust_N=27, cells=6', 'Try bemt new --scan FILE')
     """
+    if "\n" in sentence:
+        return "\n".join(map(in_words, sentence.split("\n")))
     if "--" not in sentence or re.search(r"\bbemt [a-z]", sentence):
         return sentence
     valued = re.sub(r"(--[a-z][\w-]*) (\d[\d.]*)", lambda m: f"{_name(m[1])}={m[2]}", sentence)

@@ -38,7 +38,9 @@ def path_text(name: str, value: Any) -> str:
     """Path as text; anything else is an error."""
     if isinstance(value, (str, os.PathLike)) and os.fspath(value):
         return os.fspath(value)
-    raise InputError(Fault("", name, f"{type(value).__name__} {value!r:.40}", "the path of a file or folder"))
+    hint = "A table is read already: compare and diagnose take it" if hasattr(value, "columns") else ""
+    got = f"{type(value).__name__} {' '.join(repr(value).split()):.40}"
+    raise InputError(Fault("", name, got, "the path of a file or folder", hint))
 
 
 def number(name: str, value: Any, finite: bool = True) -> float:

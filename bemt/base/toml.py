@@ -97,17 +97,26 @@ class _Number:
         low, high = ((None if math.isinf(v) else v) for v in (self.limits.low, self.limits.high))
         if source is int:
             made: Any = core_schema.int_schema(ge=low, le=high, strict=True)  # type: ignore[arg-type]
-            made = core_schema.no_info_before_validator_function(
-                lambda v: int(v) if isinstance(v, float) and v.is_integer() else v, made
-            )
         else:
             made = core_schema.float_schema(ge=low, le=high, strict=True, allow_inf_nan=False)
+        made = core_schema.no_info_before_validator_function(_own if source is float else _whole, made)
         return core_schema.no_info_after_validator_function(self._plausible, made) if self.limits.suspect else made
 
     def _plausible(self, value: float) -> float:
         if self.limits.suspect and self.limits.suspect(value):
             raise PydanticCustomError("suspect", "not plausible")
         return value
+
+
+def _own(value: Any) -> Any:
+    """A number of numpy as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _whole(value: Any) -> Any:
+    """The same, and 4.0 as a whole number."""
+    value = _own(value)
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def entry(

@@ -37,6 +37,7 @@ def diagnose(
     only: Sequence[str] = (), ruled_out: Sequence[str] = (), changed: Sequence[str] = (), off: Sequence[str] = (),
     baseline: Literal["bemt", "k1k2"] = "bemt", channels: Sequence[Literal["thrust", "torque", "speed"]] = (),
     rpm: ArrayLike = (), airspeed_m_s: ArrayLike = (), repeatability_pct: float | None = None,
+    top_rpm: float | None = None,
     unit: Mapping[str, str] = {}, column: Mapping[str, str] = {}, sign: Mapping[str, str] = {},  # noqa: B006
     zones: Sequence[str] = (), along: Path | None = None, out: Path | None = None, figures: bool = True,
     progress: Callable[[str], None] | None = None,
@@ -71,6 +72,8 @@ def diagnose(
         Airspeed for files without one: one for all, or one per file; from the case by default. [m/s]
     repeatability_pct : float, optional
         What runs of this stand differ by, standard deviation; 0.2 to 2, from the readings, by default. [%]
+    top_rpm : float, optional
+        Fastest that the stand may run: no run beyond it is asked for. [rev/min]
     unit, column, sign : mapping
         Runs of CFD: what their exports do not say, as `import` takes it: thrust=N, thrust=fz, torque=-1.
     zones : sequence of str
@@ -111,7 +114,7 @@ def diagnose(
     return diagnosed(
         recordings, case, reference, reference_case, only=only, ruled_out=ruled_out, changed=changed, off=off,
         baseline=baseline, channels=channels, rpm=rpm, airspeed_m_s=airspeed_m_s,
-        repeatability_pct=repeatability_pct, along=along, out=out, figures=figures, progress=progress,
+        repeatability_pct=repeatability_pct, top_rpm=top_rpm, along=along, out=out, figures=figures, progress=progress,
         run={"unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
 
@@ -121,7 +124,7 @@ def diagnose(
     common=("case", "label", "rows_a", "rows_b", "air_a", "air_b", "out"),
 )  # fmt: skip
 def compare(
-    a: Path, b: Path | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
+    a: Recording, b: Recording | None = None, *, case: Propeller | Path | None = None, label: str | None = None,
     diameter_m: float | None = None, rows_a: Sequence[str] = (), rows_b: Sequence[str] = (), air_a: str | None = None,
     air_b: str | None = None, rpm: float | None = None, unit: Mapping[str, str] = {},  # noqa: B006
     column: Mapping[str, str] = {}, sign: Mapping[str, str] = {}, zones: Sequence[str] = (),  # noqa: B006
@@ -131,9 +134,9 @@ def compare(
 
     Parameters
     ----------
-    a : path
+    a : path, Dataset or DataFrame
         First recording, before or without the change.
-    b : path, optional
+    b : path, Dataset or DataFrame, optional
         Second recording, after or with the change; without it `a` is one CFD run, compared with BEMT of the case.
     case : Propeller, str or path, optional
         Case or label of the rotor: `b` is diagnosed with `a` as its reference. Without it, causes that scale like the
@@ -185,13 +188,15 @@ def compare(
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import number, path_text
     from bemt.judge.diagnose import contrast
+    from bemt.judge.diagnose.load import is_table
     from bemt.judge.import_files import words
 
     if diameter_m is not None and not 0.01 <= number("diameter_m", diameter_m) <= 10.0:
         raise InputError(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", "Is that in mm? Divide by 1000"))
-    names = path_text("a", a), None if b is None else path_text("b", b)
+    one = a if b is not None and is_table(a) else path_text("a", a)
+    two = b if b is None or is_table(b) else path_text("b", b)
     return contrast.compared(
-        *names, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
+        one, two, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a, air_b=air_b,
         out=None if out is None else path_text("out", out), figures=figures, progress=progress,
         run={"rpm": rpm, "unit": words(unit), "column": words(column), "sign": words(sign), "zones": list(zones)},
     )  # fmt: skip
@@ -317,7 +322,7 @@ def prove(
     Parameters
     ----------
     size : {"small", "full", "stand", "ccblade", "real"}
-        41, 605 or, for a stand, 60 generated items, 68 by CCBlade (extra wisdem), or published recordings.
+        Items: small makes 41, full 605, stand 60 for a stand, ccblade 68 (extra wisdem); real is published recordings.
     seed : int, optional
         Random seed; from the operating system by default.
     jobs : int, optional

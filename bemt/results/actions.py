@@ -23,7 +23,7 @@ __all__ = ["effects", "report", "sweep"]
 )  # fmt: skip
 def sweep(
     cases: Path | Sequence[Path] = ".", *, out: Path | None = None, jobs: Count | None = None, strict: bool = False,
-    tolerance_pct: float = 15.0, resume: bool = True, engine: Literal["local", "dask"] = "local",
+    tolerance_pct: float | None = None, resume: bool = True, engine: Literal["local", "dask"] = "local",
     scheduler: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> SweepAnswer:  # fmt: skip
@@ -39,8 +39,8 @@ def sweep(
         Solve so many cases in parallel; by default one case, its grid on all cores. With dask: local workers.
     strict : bool
         End with 1 if a point is unconverged or BEMT differs from a reference by more than the tolerance.
-    tolerance_pct : float
-        Thrust tolerance of strict, percent of the reference. [%]
+    tolerance_pct : float, optional
+        Thrust tolerance of strict, percent of the reference; 15 by default. [%]
     resume : bool
         Reuse results found in the folder.
     engine : {"local", "dask"}
@@ -71,12 +71,15 @@ def sweep(
     from bemt.base.given import path_text, paths_text
     from bemt.results.sweep.answer import sweep as run
 
-    if not 0.0 <= tolerance_pct < float("inf"):
-        raise InputError(Fault("", "--tolerance-pct", f"{tolerance_pct:g}", "a finite number of 0 or more"))
+    tolerance = 15.0 if tolerance_pct is None else tolerance_pct
+    if not 0.0 <= tolerance < float("inf"):
+        raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "a finite number of 0 or more"))
+    if tolerance_pct is not None and not strict:
+        raise InputError(Fault("", "--tolerance-pct", f"{tolerance:g}", "--strict, which ends with 1 beyond it"))
     return run(
         paths_text("cases", cases), None if out is None else path_text("out", out), jobs=jobs, resume=resume,
         progress=progress or (lambda line: None), engine=engine, scheduler=scheduler,
-        tolerance=tolerance_pct if strict else None,
+        tolerance=tolerance if strict else None,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from bemt.base.action import Count, Told, action
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -26,7 +26,8 @@ __all__ = ["calibrate", "cite", "estimate", "measured_rotors", "new", "stations"
 def estimate(
     label: str, rpm: ArrayLike, airspeed_m_s: ArrayLike = 0.0, *, blades: Count | None = None,
     chord_mm: float | None = None, measured_pitch_in: float | None = None, series: str | None = None,
-    density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0, reading: str | None = None,
+    density_kg_m3: float | None = None, angle_deg: ArrayLike = 0.0,
+    reading: str | Mapping[str, float] | None = None,
 ) -> RotorEstimate:  # fmt: skip
     """Estimate thrust and power from a label such as 10x5, with bands; K1/K2 for comparison.
 
@@ -52,7 +53,7 @@ def estimate(
         Air density; 1.225 by default, with 1.16 to 1.29 in the band. [kg/m3]
     angle_deg : array_like
         Angles between wind and shaft: 0 climb, 90 edgewise, 180 descent. [deg]
-    reading : str, optional
+    reading : str or mapping, optional
         One reading of this propeller, or several: ``rpm=5400,thrust_g=410`` with
         ``airspeed_m_s`` and ``power_W`` if known.
 
@@ -93,7 +94,8 @@ def new(
     scan: str | os.PathLike[str] | None = None, unit: Literal["mm", "m", "in"] | None = None,
     diameter_mm: float | None = None, diameter_in: float | None = None, fan: bool = False,
     blades: Count | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0, series: str | None = None,
-    kv: float | None = None, cells: Count | None = None, reading: str | None = None, campaign: bool = False,
+    kv: float | None = None, cells: Count | None = None,
+    reading: str | Mapping[str, float] | None = None, campaign: bool = False,
     out: str | os.PathLike[str] | None = None,
 ) -> Told:  # fmt: skip
     """Write a new case: from a label, blade stations, a scan, or a fan's diameter.
@@ -124,7 +126,7 @@ def new(
         Speed constant of the motor. [rev/min/V]
     cells : int, optional
         LiPo cells in series, with K_v.
-    reading : str, optional
+    reading : str or mapping, optional
         With a label: one reading of this propeller, ``rpm=5400,thrust_g=410``.
     campaign : bool
         Also write ``cfd/campaign.toml``: OpenFOAM runs on three grids.
@@ -153,13 +155,14 @@ def new(
 
     from bemt.base.errors import Fault, InputError
     from bemt.rotors.case import new_folder
+    from bemt.rotors.case.reading import reading_text
 
     if diameter_in is not None and diameter_mm is not None:
         raise InputError(Fault("", "--diameter-mm, --diameter-in", "both", "one of them"))
     diameter_mm = diameter_mm if diameter_in is None else diameter_in * 25.4
     table, solid = (None if path is None else os.fspath(path) for path in (stations, scan))
     wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
-                               cells, campaign, reading)  # fmt: skip
+                               cells, campaign, None if reading is None else reading_text(reading))  # fmt: skip
     folder, files = new_folder.write(wanted, None if out is None else os.fspath(out))
     typed = shlex.quote(folder.as_posix())
     lines = [f"{folder.as_posix()}: {', '.join(files)}", f"next: bemt sweep {typed}"]

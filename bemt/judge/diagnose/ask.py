@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base.action import Told, as_html
 from bemt.base.errors import Fault, InputError, refuse, system_fault
-from bemt.base.given import path_text
+from bemt.base.given import number, path_text
 from bemt.data.recordings.grid_study import together
 from bemt.data.recordings.load import as_stated, import_file
 from bemt.judge.compare import one_run
@@ -160,14 +160,18 @@ def several(given: Any) -> list[Any]:
 def diagnosed(
     recordings: Any, case: Any, reference: Any, reference_case: Any, *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, channels: Sequence[str], rpm: Any, airspeed_m_s: Any,
-    repeatability_pct: float | None, along: Any, out: Any, figures: bool, progress: Callable[[str], None] | None,
+    repeatability_pct: float | None, top_rpm: float | None, along: Any, out: Any, figures: bool,
+    progress: Callable[[str], None] | None,
     run: Mapping[str, Any],
 ) -> Answer | OnePoint:  # fmt: skip
     """Diagnose, and write what is asked; parameters as `bemt.diagnose`."""
     only = [only] if isinstance(only, str) else list(only)
     given, files = sorted_out(several(case), several(recordings))
     known = several(reference)
+    channels = [channels] if isinstance(channels, str) else list(channels)
     _both_there(given, files, known, reference_case, repeatability_pct)
+    if top_rpm is not None and not number("top_rpm", top_rpm) > 0.0:
+        raise InputError(Fault("--top-rpm", "", f"{top_rpm:g}", "a speed above 0 rev/min"))
     target = None if out is None else path_text("out", out)
     theirs = None if reference_case is None else cases_of([reference_case], off, 1)[0]
     speeds, winds = (np.atleast_1d(np.asarray(v, dtype=float)).tolist() for v in (rpm, airspeed_m_s))
@@ -178,11 +182,15 @@ def diagnosed(
                               reference_case=theirs)  # fmt: skip
     if repeatability_pct is not None:
         records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
+    if top_rpm is not None:
+        records = [replace(r, top_rpm=top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
     asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
-                   reference_case=reference_case, repeatability_pct=repeatability_pct)  # fmt: skip
+                   reference_case=reference_case, repeatability_pct=repeatability_pct, top_rpm=top_rpm)  # fmt: skip
     heard = [CHANNELS[c] for c in channels] or None
+    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+    beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
     try:
         answer = diagnose(records, each, only or None, progress, baseline=baseline, given=asked, channels=heard)
     except InputError as error:
@@ -191,13 +199,11 @@ def diagnosed(
         # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
         found = one_run.compare_run(seen, cases[0], progress)
-        told = found.document() | {"verdict": "insufficient", "effects": []}
-        return OnePoint(told, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
-    blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
+        told = found.document() | {"verdict": "insufficient", "effects": []} | beside
+        words = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
+        return OnePoint(told, "\n\n".join([words, *(c.text() for c in blade.values())]))
     names = [one if isinstance(one, str) else "recording" for one in files]
-    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]}
-    if blade:
-        told["along_blade"] = {run: c.document() for run, c in blade.items()}
+    told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
         folder.write(target, answer, told, cases, figures=figures)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
@@ -218,6 +224,7 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
 def _asked(
     files: list[Any], cases: list[Any], known: list[Any], *, only: Sequence[str], ruled_out: Sequence[str],
     changed: Sequence[str], off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
+    top_rpm: float | None,
 ) -> Given:  # fmt: skip
     """What was asked, for the command of the next step; objects of the library have a word in place of their file."""
 
@@ -231,6 +238,8 @@ def _asked(
         words += ["--reference-case", *quoted(several(reference_case), "CASE")]
     if repeatability_pct is not None:
         words += ["--repeatability-pct", f"{repeatability_pct:g}"]
+    if top_rpm is not None:
+        words += ["--top-rpm", f"{top_rpm:g}"]
     if baseline != "bemt":
         words += ["--baseline", baseline]
     return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out),

@@ -8,6 +8,7 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,8 +107,8 @@ class Contrast:
 
 
 def compare(
-    a: str | os.PathLike[str],
-    b: str | os.PathLike[str],
+    a: Any,
+    b: Any,
     case: Propeller | Case | str | os.PathLike[str] | None = None,
     *,
     diameter_m: float | None = None,
@@ -118,7 +119,7 @@ def compare(
     air_b: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Contrast:
-    """Say what changed between two recordings of one stand.
+    """Say what changed between two recordings of one stand: paths, Datasets or DataFrames.
 
     ``label``, such as ``"10x5"``, gives the diameter. ``air_a`` and ``air_b`` say what the files do not:
     ``"22C,1013hPa"``, ``"22C"``, ``"1.19kg/m3"``, ``"18m/s"``.
@@ -129,8 +130,10 @@ def compare(
     Williams 2006, eq. 2.23 to 2.24 and 2.37 to 2.42). Density counts where both recordings tell it.
     """
     from bemt.data.recordings.load import import_file
+    from bemt.judge.diagnose.load import is_table
+    from bemt.physics.dataset import from_pandas
 
-    names = [os.fspath(a), os.fspath(b)]
+    names = ["A" if is_table(a) else os.fspath(a), "B" if is_table(b) else os.fspath(b)]
     asked = Invocation(
         names[0], names[1], tuple(rows_a), tuple(rows_b), air_a, air_b, label,
         None if case is None else os.fspath(case) if isinstance(case, str | os.PathLike)
@@ -139,7 +142,7 @@ def compare(
     diameter_m = label_diameter(label) if diameter_m is None else diameter_m
     case = None if case is None else rotor_of(case).case
     conditions = [list(rows_a), list(rows_b)]
-    if Path(names[0]).resolve() == Path(names[1]).resolve() and sorted(rows_a) == sorted(rows_b):
+    if (a is b or Path(names[0]).resolve() == Path(names[1]).resolve()) and sorted(rows_a) == sorted(rows_b):
         raise InputError(
             Fault(
                 names[0], "", "the same recording twice", "two recordings, or two choices of rows",
@@ -148,9 +151,13 @@ def compare(
         )  # fmt: skip
     read: list[Dataset] = []
     faults: list[Fault] = []
-    for name, rows, air, option in zip(names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True):
+    for given, name, rows, air, option in zip(
+        (a, b), names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True
+    ):
         with gathered(faults):
-            read.append(with_air(selected(import_file(name), rows, name), air, option))
+            made = from_pandas(given, name=name) if hasattr(given, "columns") else given
+            whole = made if is_table(given) else import_file(name)
+            read.append(with_air(selected(whole, rows, name), air, option))
     refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
     findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
@@ -173,14 +180,17 @@ def compare(
 
 
 def compared(
-    a: str, b: str | None, case: Any, *, label: str | None, diameter_m: float | None, rows_a: Sequence[str],
+    a: Any, b: Any, case: Any, *, label: str | None, diameter_m: float | None, rows_a: Sequence[str],
     rows_b: Sequence[str], air_a: str | None, air_b: str | None, out: str | None, figures: bool,
     progress: Callable[[str], None] | None, run: Mapping[str, Any] | None = None,
 ) -> Contrast | Told:  # fmt: skip
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
     from bemt.data.recordings.load import as_stated
     from bemt.judge.compare import one_run, two_runs
+    from bemt.judge.diagnose.load import is_table
 
+    two = partial(compare, a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
+                  air_b=air_b, progress=progress)  # fmt: skip
     found: Contrast | Told
     if b is None:
         if case is None:
@@ -188,11 +198,12 @@ def compared(
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
         one = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
         found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
+    elif is_table(a) or is_table(b):
+        found = two()
     elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
         found = Told(runs.document(), runs.text)
     else:
-        found = compare(a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
-                        air_b=air_b, progress=progress)  # fmt: skip
+        found = two()
     if out is not None:
         beside = case if figures and not (rows_a or rows_b or air_a or air_b) else None
         _write(Path(out), found, figures, [name for name in (a, b) if name is not None], beside)
@@ -271,8 +282,12 @@ def _diagnosed(
     from bemt.judge.diagnose.document import document as diagnosis
     from bemt.judge.diagnose.document import explanation
     from bemt.judge.diagnose.load import load
+    from bemt.judge.diagnose.record import from_series
 
-    a, b = (load(name, case, imported) for name, imported in zip((asked.a, asked.b), read, strict=True))
+    a, b = (
+        load(name, case, imported) if "format" in imported.provenance else from_series(imported, case)
+        for name, imported in zip((asked.a, asked.b), read, strict=True)
+    )
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=_given(asked), change=found)
     by_case = diagnosis(answer)
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]

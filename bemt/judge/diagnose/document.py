@@ -261,7 +261,7 @@ def _next(d: Diagnosis) -> list[str]:
     if step.minutes and step.gain:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
     case = "if nothing is wrong with it" if step.kind == "mend" else "without such a reference"
-    other = [] if step.otherwise is None else [f"  {case}: {step.otherwise.text}"]
+    other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
     unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
     return [f"Next: {step.text}{gain}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 

@@ -411,7 +411,9 @@ def points_of(record: Record) -> Dataset:
     rho = np.broadcast_to(np.asarray(record.air.rho, dtype=float), record.rpm.shape)
     state = {"rpm": record.rpm, "airspeed_m_s": record.V, "density_kg_m3": rho}
     values = state | {c: record.measured[c] for c in loads}
-    return Dataset("points", record.name, values, {c: record.u[c] for c in loads})
+    first, *more = record.name.split(", ")  # a legend has no room for several
+    name = f"{first} and {len(more)} more" if more else first
+    return Dataset("points", name, values, {c: record.u[c] for c in loads})
 
 
 def first_picture(records: Sequence[Record], cases: Sequence[Case]) -> list[PredictionView]:

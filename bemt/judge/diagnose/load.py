@@ -315,10 +315,15 @@ def _together(*steps: Callable[[], Any]) -> list[Any]:
     return out
 
 
+def is_table(given: Any) -> bool:
+    """Whether a recording is given as a Dataset or a DataFrame, not as a file."""
+    return isinstance(given, Dataset) or hasattr(given, "columns")
+
+
 def _there(path: Any) -> None:
     """Refuse a recording that does not exist."""
     if not isinstance(path, str):
-        if not isinstance(path, Dataset) and not hasattr(path, "columns"):
+        if not is_table(path):
             expected = "a path, a Dataset or a DataFrame"
             raise InputError(Fault("", "recordings", f"{type(path).__name__} {path!r:.40}", expected))
     elif not Path(path).exists():

@@ -75,6 +75,7 @@ class Record:
     # Standard deviation of what runs of this stand differ by, a share, as stated; NaN: not stated [1]
     repeatability: float = np.nan
     electrical: bool = False  # Whether torque is electrical power over the indicated speed
+    top_rpm: float = np.inf  # Fastest that the stand may run [rev/min]
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -382,6 +383,7 @@ def merged(records: Sequence[Record]) -> Record:
         tuple(dict.fromkeys(f for r in records for f in r.findings)),
         tuple(dict.fromkeys(f for r in records for f in r.contradictions)),
         max((r.repeatability for r in records if np.isfinite(r.repeatability)), default=np.nan),
+        top_rpm=min(r.top_rpm for r in records),
     ))  # fmt: skip
 
 

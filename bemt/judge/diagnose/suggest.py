@@ -48,6 +48,7 @@ LEVEL = 0.1
 """A load off the case by more than this, at usual, is no agreement, even if calibration may be that far off [1]."""
 
 _POINTS = 4
+_FASTER = 1.1  # A run less fast than that shows little that the recording does not: declared [1]
 _ENOUGH = ALIKE
 # A run is worth its time if it takes away this much doubt; no explanation counts less than the least.
 _WORTH, _LEAST = 0.02, 1e-6
@@ -99,7 +100,7 @@ class Suggestion:
     checks: str = ""  # Effect that a check looks for
     minutes: float = 0.0  # Time that it takes on a stand [min]
     gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
-    otherwise: Suggestion | None = None  # What to do if there can be no such reference, or nothing to mend
+    otherwise: Suggestion | None = None  # What to do if there can be no such reference or run, or nothing to mend
 
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -123,7 +124,7 @@ def _options(part: Part) -> list[_Option]:
     """Runs that this stand can do, around what was recorded: one that never had wind is a bench without a tunnel."""
     record, f = part.record, part.flow
     D = 2.0 * f.R
-    low, high = float(record.rpm.min()), float(record.rpm.max())
+    low, high = float(record.rpm.min()), min(float(record.rpm.max()), record.top_rpm)
     middle = float(np.median(record.rpm))
     top_J = float(np.max(f.J))
     tip = float(np.max(f.M_tip))
@@ -149,8 +150,8 @@ def _options(part: Part) -> list[_Option]:
     if top_J > _AT_REST:
         wind = np.linspace(0.2, 1.15 * J0, _POINTS) * middle / 60.0 * D
         out.append(at(f"runs in wind at {middle:.0f} rev/min, J 0.2 to {1.15 * J0:.2f}", same, wind))
-    if tip < 0.75:
-        up = min(1.3, 0.85 / max(tip, 1e-6))
+    up = min(1.3, 0.85 / max(tip, 1e-6), record.top_rpm / high)
+    if tip < 0.75 and up >= _FASTER:
         out.append(
             at(f"faster: static at {high:.0f} to {up * high:.0f} rev/min", np.linspace(1.0, up, _POINTS) * high, static)
         )
@@ -331,8 +332,8 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     # without a reference, one that tells only the others apart is better than nothing
     instead = look or max(worth, key=lambda c: c.gain / c.minutes, default=None)
     if able and not (look and certain):
-        run = next((c for c in able if c.kind == "run"), instead)
-        return replace(able[0], otherwise=run) if able[0].kind == "reference" else able[0]
+        other = next((c for c in able if c.kind != able[0].kind), instead if able[0].kind == "reference" else None)
+        return replace(able[0], otherwise=other)
     if look:
         return replace(look, before=before, after=before)
     if certain:

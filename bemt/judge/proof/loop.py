@@ -262,7 +262,7 @@ def _recommended(item: _Item, answer: ToldAnswer) -> _Taken | str:
     if step.kind == "look" and not step.checks:  # of a class, the fault that is sure is to be put right
         return _put_aside(item, [s[0] for s in answer.sets if len(s) == 1 and _at_the_stand(s[0])], False)
     taken = _step(item, step)
-    if taken in ("no reference", "mend") and step.otherwise:
+    if taken in ("no reference", "no run", "mend") and step.otherwise:
         taken = _step(item, step.otherwise)
     return "none" if answer.verdict == "none" and taken == "no run" else taken
 
@@ -360,7 +360,7 @@ def _course(
 
 def follow(
     box: Path, first: ToldAnswer, hand: Hand, runs: int, *, wanted: Sequence[Points] | None = None, enough: float = 0.0,
-    tell: Callable[[Course], None] | None = None,
+    tell: Callable[[Course], None] | None = None, words: Sequence[str] = (),
 ) -> Course:  # fmt: skip
     """Take the step that follows from each answer, for so many runs.
 
@@ -380,8 +380,10 @@ def follow(
         Expected loss of "none" below which no further run is worth its cost. [one "insufficient"]
     tell : callable, optional
         Called with the course after each answer.
+    words : sequence of str, optional
+        Command that was answered first; that of a proof by default.
     """
-    course, item = Course("", [first]), _Item(hand, box, runs, prove.question(box))
+    course, item = Course("", [first]), _Item(hand, box, runs, [*words] or prove.question(box))
     for number in count():
         last = course.answers[-1]
         if wanted is not None and number == runs:

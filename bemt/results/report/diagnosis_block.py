@@ -128,7 +128,7 @@ def answer(result: Result) -> str:
     >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
     >>> audit = Audit("cfd", (), math.nan, 0.041)
     >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))
-    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4.1 % or more.'
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4 % or more, without that of the grid, which is unknown.'
     """  # noqa: E501
     own = _solved(result)
     if isinstance(own, tuple):
@@ -169,7 +169,10 @@ def _audited(result: Result, c: Comparison) -> str:
     share = audit.u_relative_known if audit else 0.0
     if not _finite(share) or share <= 0:
         return ""
-    return f"; our audit of the recording finds an error of {100.0 * share:.2g} % or more"
+    lines = audit.lines if audit else ()
+    grid = next((line.u_relative for line in lines if line.topic == "grid study"), math.nan)
+    rest = f"{100.0 * grid:.1g} % of the grid" if _finite(grid) else "without that of the grid, which is unknown"
+    return f"; our audit of the recording finds an error of {100.0 * share:.1g} % or more, {rest}"
 
 
 def headline(result: Result) -> str:

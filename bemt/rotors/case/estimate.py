@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.action import in_words
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, gathered
 from bemt.base.given import numbers
@@ -21,7 +22,7 @@ from bemt.rotors.case import Case, case_of, fresh
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.case.propagate import propagate
-from bemt.rotors.case.reading import parse_reading
+from bemt.rotors.case.reading import parse_reading, reading_text
 from bemt.rotors.case.schema import AIRSPEED, ANGLE, RPM
 from bemt.rotors.measured import records
 from bemt.rotors.validity import counted
@@ -86,7 +87,7 @@ def case_of_label(
 def of_label(
     label: str, rpm: Any, airspeed_m_s: Any = 0.0, blades: int | None = None, chord_mm: float | None = None,
     measured_pitch_in: float | None = None, series: str | None = None, density: float | None = None,
-    angle_deg: Any = 0.0, reading: str | None = None,
+    angle_deg: Any = 0.0, reading: str | Mapping[str, float] | None = None,
 ) -> RotorEstimate:  # fmt: skip
     """Estimate every speed [rev/min] with every airspeed [m/s] at every angle between wind and shaft [deg].
 
@@ -95,12 +96,13 @@ def of_label(
 
     An unreadable label, impossible numbers and an unknown series are refused, all at once.
     """
+    told = None if reading is None else reading_text(reading)
     asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
     axes = [np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked]
     try:
-        return _of_label(label, axes, blades, chord_mm, measured_pitch_in, series, density, reading)
+        return _of_label(label, axes, blades, chord_mm, measured_pitch_in, series, density, told)
     except InputError as error:
-        if not Path(label).exists():
+        if not isinstance(label, str) or not Path(label).exists():
             raise
         hint = f"A case? bemt sweep {label} solves it"
         raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
@@ -177,7 +179,7 @@ def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fau
         return None, list(error.faults)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RotorEstimate(Dataset):
     """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
 
@@ -213,6 +215,9 @@ class RotorEstimate(Dataset):
         if more and self.given["known_from"] == "label":
             notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
         return "\n".join([text_table(head, map(list, cells), left=()), *notes]) + "\n"
+
+    def __str__(self) -> str:
+        return in_words(self.text)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.estimate/2``; unknown numbers are None."""

@@ -68,6 +68,8 @@ def _blocks(*unknowns: Unknown) -> str:
 
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
+    if not isinstance(label, str):
+        raise InputError(Fault("", "label", f"{type(label).__name__} {label!r:.40}", "a label, such as 10x5"))
     try:
         one = records().get(label.strip())
         found = parse_designation(label) if one is None else one.designation

@@ -45,22 +45,21 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
         faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
     elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
         faults.append(Fault("", "rpm", f"{np.max(found['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
-    fast = np.max(np.abs(found.get("airspeed_m_s", np.zeros(1))))
-    if fast > AIRSPEED_MAX:
-        hint = "km/h? Divide by 3.6"
-        faults.append(Fault("", "airspeed_m_s", f"{fast:g}", f"up to {AIRSPEED_MAX:g} m/s", hint))
     shapes = {name: value.shape for name, value in found.items()}
     try:
         np.broadcast_shapes(*shapes.values())
     except ValueError:
         got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
         faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
-    refuse(faults)
+        refuse(faults)
     n = found.get("rpm", np.asarray(case.rpm, dtype=float))
-    if J is not None:
+    V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
+    if "J" in found:
         V = found["J"] * n / 60.0 * case.diameter_m
-    else:
-        V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
+    if (fast := np.max(np.abs(V))) > AIRSPEED_MAX:
+        name, hint = ("J", "V = J n D") if "J" in found else ("airspeed_m_s", "km/h? Divide by 3.6")
+        faults.append(Fault("", name, f"{fast:g} m/s", f"up to {AIRSPEED_MAX:g} m/s", hint))
+    refuse(faults)
     n, V = np.broadcast_arrays(n, V)
     return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
 

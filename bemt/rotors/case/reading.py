@@ -121,7 +121,7 @@ def _value(name: str, value: str) -> tuple[str, float]:
     return _SHORT.get(base, base), si * 30.0 / math.pi if dimension == "angular_speed" else si
 
 
-def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> str:
+def reading_text(reading: str | Mapping[str, float | str] | Sequence[Mapping[str, float | str]]) -> str:
     """Readings as one text, of a text or of names and numbers.
 
     >>> reading_text({"rpm": 5400, "thrust_g": 410})
@@ -130,7 +130,9 @@ def reading_text(reading: str | Mapping[str, float] | Sequence[Mapping[str, floa
     if isinstance(reading, str):
         return reading
     rows = [reading] if isinstance(reading, Mapping) else reading
-    return "; ".join(", ".join(f"{k}={v:.10g}" for k, v in row.items()) for row in rows)
+    return "; ".join(
+        ", ".join(f"{k}={v}" if isinstance(v, str) else f"{k}={v:.10g}" for k, v in row.items()) for row in rows
+    )
 
 
 def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mapping[str, float]]) -> Case:

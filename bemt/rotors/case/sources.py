@@ -15,11 +15,22 @@ from bemt.rotors.case import Case
 from bemt.rotors.measured import records
 
 SCHEMA = "bemt.sources/1"
+YEAR = 2026
+"""Of this version."""
 BEMT = ("bemt, propellers and ducted fans by blade element momentum theory, compared with recordings, version {}; "
         "CITATION.cff gives the entry to cite")  # fmt: skip
 METHOD = (
     "Blade element momentum theory: Glauert (1935), Airplane Propellers, in Durand, Aerodynamic Theory IV, ch. VII; "
     "one residual in the inflow angle: Ning (2014), Wind Energy 17:1327, doi:10.1002/we.1636"
+)
+DUCT = (
+    "control volume of rotor and duct: McCormick (1967), Aerodynamics of V/STOL Flight, ch. 9; Pereira (2008), PhD "
+    "thesis Univ. of Maryland, eq. 2.20-2.40; walls as ring vortices: Kuechemann and Weber (1953), Aerodynamics of "
+    "Propulsion, ch. 4 and 6; not checked; jet: Drela and Youngren (2005), Axisymmetric Analysis and Design of Ducted "
+    "Rotors; not checked; Bontempo and Manna (2013), J. Fluid Mech. 728:163; not checked; swirl in the jet: Glauert "
+    "(1935); Horlock (1958), Axial Flow Compressors, ch. 4; not checked; lip: Crane TP-410, p. A-29; Idelchik (2007), "
+    "Handbook of Hydraulic Resistance, diagram 3-4; not checked; walls: Hoerner (1965), Fluid-Dynamic Drag, ch. 3 and "
+    "6; not checked"
 )
 TABLES = (
     "NeuralFoil (Sharpe 2024, github.com/peterdsharpe/NeuralFoil), a fit to XFOIL (Drela 1989, in Low Reynolds Number "
@@ -86,6 +97,7 @@ def sources(case: Case) -> Sources:
     found = Sources((
         Source("method", "program", BEMT.format(__version__)),
         Source("method", "blade element momentum", METHOD),
+        *([Source("method", "duct", DUCT)] if case.ducted else []),
         *(Source("effect", e.id, source_of(type(e)) or "declared by this project") for e in effects),
         *_sections(case),
         *_bands(case),
@@ -133,7 +145,7 @@ def _data(case: Case) -> list[Source]:
 
 _WORK = re.compile(
     r"(?P<who>[A-Z]\w+(?:,? (?:and |van |von )*[A-Z][\w.'-]*)*(?: et al\.)?)(?:,)? \(?(?P<year>1[89]\d\d|20[0-4]\d)\)?"
-    r"(?P<what>(?:(?!(?<=[a-z]{4})\. [A-Z`])[^;()])*)"
+    r"(?P<what>(?:(?!(?:(?<=[a-z]{4})|(?<=\d))\. [A-Z`]|,(?: and)? [A-Z]\w+ \(?(?:1[89]|20)\d\d)[^;()])*)"
 )
 """Authors, year and what follows in a source, up to the next semicolon, bracket or sentence."""
 _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/"}
@@ -164,14 +176,15 @@ def bibtex(found: Sources) -> str:
         for work in works:
             plain = unicodedata.normalize("NFKD", work["who"]).encode("ascii", "ignore").decode()
             key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + work["year"]
-            what = " ".join(work["what"].split()).strip(" ,.:")
+            what = " ".join(work["what"].split()).strip(" ,.:").removeprefix("not checked")
             if re.match(r"[ (,;]*(?:\w+ ){0,2}not checked", source.source[work.end() :]):
                 what = f"{what} (not checked)".strip()
-            entry = entries.setdefault(key, (work["who"], work["year"], what, []))
-            entry[3].append(source.name)
+            known = entries.get(key, (work["who"], work["year"], "", []))
+            entries[key] = (*known[:2], known[2] or what, [*known[3], source.name])
         if not works:
             bare.append(f"% {source.name}: {' '.join(source.source.split())}")
-    lines = [f"@software{{bemt, title = {{bemt}}, version = {{{__version__}}}, note = {{see CITATION.cff}}}}"]
+    about = {"author": "{the bemt maintainers}", "title": "bemt", "year": YEAR, "version": __version__}
+    lines = [f"@software{{bemt, {', '.join(f'{k} = {{{v}}}' for k, v in about.items())}}}"]
     for key, (who, year, what, used) in entries.items():
         author = re.sub(r"\s*,\s*(?:and )?", " and ", who).replace(" et al.", " and others")
         doi = re.search(r"doi:\s*(10\.\d+/[^\s,)]+)", what)

@@ -25,7 +25,8 @@ __all__ = ["choose", "design"]
 )  # fmt: skip
 def choose(
     thrust_N: float | None = None, cells: Count | None = None, *, kv: tuple[float, float] | float = (80.0, 8000.0),
-    motors: Path | Sequence[KnownMotor] = (), labels: str | Sequence[str] = (), blades: Count | Sequence[Count] = (2,),
+    motors: Path | Sequence[Path | KnownMotor] = (),
+    labels: str | Sequence[str] = (), blades: Count | Sequence[Count] = (2,),
     mass_kg: float | None = None, rest_kg: float | None = None, rotors: Count = 1, airspeed_m_s: float = 0.0,
     max_diameter_in: float | None = None, arm_mm: float | None = None, max_tip_mach: float = 0.8,
     capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
@@ -41,8 +42,8 @@ def choose(
         LiPo cells in series.
     kv : float or (low, high)
         Speed constant, or the range of which 72 are tried. [rev/min/V]
-    motors : path or sequence of KnownMotor
-        Real motors instead: a CSV with name,kv,resistance_mohm,no_load_A.
+    motors : path, or sequence of paths or KnownMotor
+        Real motors instead: CSV files with name,kv,resistance_mohm,no_load_A.
     labels : str or sequence of str
         Propellers to try, as 10x5 or 9x4.5x3; standard sizes by default.
     blades : int or sequence of int

@@ -120,8 +120,9 @@ class Target:
 
 def choose(
     thrust_N: float | None = None, cells: int | None = None, *, kv: float | Sequence[float] = (80.0, 8000.0),
-    motors: Sequence[KnownMotor] | str | os.PathLike[str] = (), labels: str | Sequence[str] = (),
-    blades: int | Sequence[int] = (2,), mass_kg: float | None = None, rest_kg: float | None = None, rotors: int = 1,
+    motors: str | os.PathLike[str] | Sequence[str | os.PathLike[str] | KnownMotor] = (),
+    labels: str | Sequence[str] = (), blades: int | Sequence[int] = (2,), mass_kg: float | None = None,
+    rest_kg: float | None = None, rotors: int = 1,
     airspeed_m_s: float = 0.0, max_diameter_in: float | None = None, arm_mm: float | None = None,
     max_tip_mach: float = 0.8, capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
     fluid: str = "air", coaxial: bool = False, sure: float = 0.9,
@@ -147,7 +148,8 @@ def choose(
     most = min(room, math.inf if max_diameter_in is None else max_diameter_in)
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
-    known = read_motors(motors) if isinstance(motors, (str, os.PathLike)) else tuple(motors)
+    given = [motors] if isinstance(motors, (str, os.PathLike)) else motors
+    known = tuple(m for one in given for m in ((one,) if isinstance(one, KnownMotor) else read_motors(one)))
     target = dataclasses.replace(target, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)

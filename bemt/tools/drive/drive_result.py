@@ -17,7 +17,7 @@ import numpy as np
 from bemt.base.action import as_html
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, refuse
-from bemt.base.tables import csv_text, json_text, number_text, write_atomic
+from bemt.base.tables import csv_text, json_text, number_text, plain, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
@@ -134,12 +134,14 @@ class DriveResult:
                  "battery_mohm": 1e3 * battery.resistance_ohm}  # fmt: skip
         parts = {name: {k: vars(b) for k, b in getattr(self, name).items()} for name in ("full", "hover")}
         steady = {f.name: getattr(self.steady, f.name) for f in dataclasses.fields(Steady)}
-        return {"schema": SCHEMA, "case": self.case.name, "given": given, "off": sorted(self.drive.off), **parts,
+        made = {"schema": SCHEMA, "case": self.case.name, "given": given, "off": sorted(self.drive.off), **parts,
                 "steady": steady | {f"u_{k}": v for k, v in self.u.items()},
                 "full_thrust_settled_temperature_C": self.settled_C,
                 "response": [dataclasses.asdict(s) for s in self.response],
                 "unknowns": {item.key: f"{item.range_text} ({item.why})" for item in self.case.assumptions},
                 "notes": list(self.notes)}  # fmt: skip
+        found: dict[str, Any] = plain(made)
+        return found
 
 
 def with_drive(case: Case, motor: str | None = None, **given: float | None) -> Case:

@@ -476,12 +476,13 @@ class DiskExport(Export):
         """Loads of the point, and what the written numbers integrate to."""
         point = job.loading
         T, Q = self.totals(job, files)
+        own = "; not held: the target solves the inflow itself" if None in (T, Q) else ""
         return {
             "point": point.document(),
             "fit_error_pct": {
                 "thrust": None if T is None else 100.0 * abs(T / point.thrust_N - 1.0),
                 "torque": None if Q is None else 100.0 * abs(Q / point.torque_Nm - 1.0),
-                "of": "the loads of the rotor at this point; null: the target solves the inflow itself",
+                "of": f"the loads of the rotor at this point{own}",
             },
             "band": job.band_at_point.document(),
             "range": {"rpm": point.rpm, "airspeed_m_s": point.airspeed_m_s, "density_kg_m3": point.rho},

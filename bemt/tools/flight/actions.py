@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from bemt.base.action import Told, action
+from bemt.base.action import Told, action, in_words
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, gathered, refuse
 
 if TYPE_CHECKING:
@@ -34,8 +34,22 @@ class FlightsAnswer:
     mass_kg: float | None = None  # Mass that was stated [kg]
 
     def __str__(self) -> str:
-        """Text without details."""
-        return self.text
+        """Text without details, with parameters in place of options."""
+        return in_words(self.text)
+
+    def __repr__(self) -> str:
+        """Say the verdict in a line."""
+        return f"<flight {', '.join(a.log.file for a in self.flights)}: {self.verdict} {', '.join(self.effects)}>"
+
+    @property
+    def verdict(self) -> str:
+        """Verdict of the flight; of several, each once, with commas."""
+        return ", ".join(dict.fromkeys(a.judged.said.verdict for a in self.flights))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the verdicts."""
+        return tuple(dict.fromkeys(str(e) for a in self.flights for e in a.judged.said.effects))
 
     @property
     def exit_code(self) -> int:
@@ -138,8 +152,8 @@ def fly(
     Returns
     -------
     FlightsAnswer
-        With ``.text``, ``.details``, ``.to_dict()`` (schema ``bemt.flight/1``), ``.table()``, ``.csv()`` and
-        ``.figure()``.
+        With ``.verdict``, ``.effects``, ``.text``, ``.details``, ``.to_dict()`` (schema ``bemt.flight/1``),
+        ``.table()``, ``.csv()`` and ``.figure()``.
 
     Raises
     ------
@@ -155,8 +169,6 @@ def fly(
     faults = []
     if not given:
         faults.append(Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg"))
-    if healthy_day not in ("", "same", "other"):
-        faults.append(Fault("", "healthy_day", repr(healthy_day), "same, other, or nothing"))
     if out_case is not None and case is None:
         faults.append(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
     refuse(faults)

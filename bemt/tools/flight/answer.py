@@ -154,7 +154,7 @@ def answer_on(
         raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
     faults = mass_faults(log, mass_kg, "--mass-kg")
     for h in healthy:
-        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass")
+        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
     refuse(faults)
     if layout:
         log = replace(log, layout=layout)

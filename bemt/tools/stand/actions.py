@@ -97,7 +97,7 @@ def stand(
     import shutil
     from pathlib import Path as File
 
-    from bemt.base.errors import Fault, InputError, refuse
+    from bemt.base.errors import Fault, refuse
     from bemt.base.given import path_text
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.stand.session import sit
@@ -122,7 +122,7 @@ def stand(
             seed=seed, lapse=lapse if on == "simulated" else 1.0, yes=yes, out=folder,
             say=progress or (lambda text: None),
         )  # fmt: skip
-    except InputError:
+    except BaseException:
         if not list(folder.glob("1_*.csv")):  # nothing was measured: nothing stays
             shutil.rmtree(folder, ignore_errors=True)
         raise

@@ -225,11 +225,12 @@ def sit(
             made = hand.made
             if text := hand.again((), 0):
                 write_atomic(out / "recording.csv", text)
-                first, words = prove.asked(out, prove.question(out))
+                question = [*prove.question(out), "--top-rpm", f"{top:g}"]
+                first, said = prove.asked(out, question)
                 if not first:
-                    raise InputError(Fault(str(out / "recording.csv"), "", words[-300:], "a recording to diagnose"))
+                    raise InputError(Fault(str(out / "recording.csv"), "", said[-300:], "a recording to diagnose"))
                 told(Course("", [first]))
-                course = follow(out, first, hand, runs, enough=A_RUN, tell=told)
+                course = follow(out, first, hand, runs, enough=A_RUN, tell=told, words=question)
         except Stopped as error:
             stopped = str(error)
             sure = not stopped.startswith(("wire lost", "no row", "the guard"))
@@ -269,8 +270,7 @@ def _limits(
         if name not in stated:
             stated[name] = asked_number(name)
     found = {**_USUAL, **stated}
-    top = top_rpm or (math.inf if on == "simulated" else rotor.case.rpm)
-    limits = Limits(**found, rpm=_ABOVE * top)
+    limits = Limits(**found, rpm=_ABOVE * (top_rpm or rotor.case.rpm))
     if not limits.stop_us < limits.largest_us <= 2500.0 or limits.ramp_us_s <= 0.0:
         got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
         raise InputError(Fault("", "largest_us, ramp_us_s", got, "1000 to 2500 us and a rise above 0"))
