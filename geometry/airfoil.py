@@ -351,11 +351,9 @@ def parse_dat(text: str, name: str = "") -> Airfoil:
         faults.add("section file", f"{len(rows)} points", "7 points or more", "Is it a coordinate file?")
     if counts is not None and sum(counts) != len(rows) and not faults.found:
         faults.add(
-            "section file",
-            f"{len(rows)} points",
-            f"{counts[0]} + {counts[1]} as its second line says",
+            "section file", f"{len(rows)} points", f"{counts[0]} + {counts[1]} as its second line says",
             "Truncated file?",
-        )
+        )  # fmt: skip
     faults.check()
     points = np.array([row[1:] for row in rows])
     if not (abs(points[:, 0].max() - 1) <= 0.02 and abs(points[:, 0].min()) <= 0.02):
@@ -431,15 +429,9 @@ def published(name: str) -> Airfoil:
     # both sides leave the nose like a root
     high, low = (pchip(np.sqrt(s), side, np.sqrt(x)) for side in (upper, lower))
     nose, tail = np.array([0.0, upper[0]]), np.array([1.0, 0.5 * (upper[-1] + lower[-1])])
-    return Airfoil(name, *_on_chord(np.r_[x[::-1], x[1:]], np.r_[high[::-1], low[1:]], nose, tail))
-
-
-def _on_chord(x: Array, y: Array, nose: Array, tail: Array) -> tuple[Array, Array]:
-    """Turn and stretch points so that a chord lies from 0 to 1 along x."""
-    along = tail - nose
-    c, s = along / float(along @ along)
-    dx, dy = x - nose[0], y - nose[1]
-    return c * dx + s * dy, c * dy - s * dx
+    along, dx, dy = tail - nose, np.r_[x[::-1], x[1:]] - nose[0], np.r_[high[::-1], low[1:]] - nose[1]
+    c, s = along / float(along @ along)  # turned and stretched so that the chord lies from 0 to 1 along x
+    return Airfoil(name, c * dx + s * dy, c * dy - s * dx)
 
 
 def thickened(section: Airfoil, thickness: float) -> Airfoil:

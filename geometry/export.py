@@ -36,16 +36,9 @@ READ_TOLERANCE = 2e-6  # of the size of the part, when CAD surfaces are meshed
 
 
 def export(
-    rotor: Rotor,
-    duct: Duct | None,
-    out: Path,
-    formats: Sequence[str],
-    *,
-    name: str = "rotor",
-    unit: str = "mm",
-    options: Options | None = None,
-    model: MeshModel | None = None,
-) -> dict[str, Any]:
+    rotor: Rotor, duct: Duct | None, out: Path, formats: Sequence[str], *, name: str = "rotor", unit: str = "mm",
+    options: Options | None = None, model: MeshModel | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Write the solids of a rotor and its duct; `model` is their mesh with these options, if there is one already."""
     faults = Faults()
     for word in formats:

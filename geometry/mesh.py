@@ -37,17 +37,9 @@ from geometry.solid import (
 )
 
 __all__ = [
-    "Mesh",
-    "MeshModel",
-    "Options",
-    "blade_volume",
-    "build",
-    "hub_profile",
-    "rings",
-    "radii",
-    "rotor_mesh",
+    "Mesh", "MeshModel", "Options", "blade_volume", "build", "hub_profile", "rings", "radii", "rotor_mesh",
     "wrapped_outline",
-]
+]  # fmt: skip
 
 VOLUME_TOLERANCE = 5e-3
 BETWEEN = 1.02
@@ -209,13 +201,9 @@ def _rotor(rotor: Rotor, options: Options) -> tuple[Mesh, dict[str, float], Opti
     thick = [float(_thickness(curve)) for curve in curves[1:]]
     edge = min(np.linalg.norm(c[0] - c[-1]) if curves.shape[1] % 2 else 0.0 for c in curves[1:])
     checks = {
-        "volume_rotor_mesh": mesh.volume,
-        "volume_rotor_sections": expected,
-        "volume_blade_sections": sections,
-        "tip_radius": tip,
-        "min_section_thickness": min(thick),
-        "min_trailing_edge": float(edge),
-    }
+        "volume_rotor_mesh": mesh.volume, "volume_rotor_sections": expected, "volume_blade_sections": sections,
+        "tip_radius": tip, "min_section_thickness": min(thick), "min_trailing_edge": float(edge),
+    }  # fmt: skip
     if printed is not None:
         del checks["min_section_thickness"], checks["min_trailing_edge"]  # of the rounded tip, where they mean nothing
         checks |= {"min_thickness": thin, "trailing_edge": printed.edge, "flare": printed.blend or 0.0}

@@ -79,12 +79,10 @@ class Printed:
 
 
 ADAPTERS: dict[str, dict[str, Any]] = {
-    "ring": {"bore": 6.35e-3, "recess": (9.5e-3, 3.1e-3)},
-    "m3": {"bore": 3.2e-3, "hexagon": (5.7e-3, 2.6e-3)},
-    "m5": {"bore": 5.2e-3, "hexagon": (8.2e-3, 4.9e-3)},
-    "m6": {"bore": 6.2e-3, "hexagon": (10.2e-3, 5.4e-3)},
+    "ring": {"bore": 6.35e-3, "recess": (9.5e-3, 3.1e-3)}, "m3": {"bore": 3.2e-3, "hexagon": (5.7e-3, 2.6e-3)},
+    "m5": {"bore": 5.2e-3, "hexagon": (8.2e-3, 4.9e-3)}, "m6": {"bore": 6.2e-3, "hexagon": (10.2e-3, 5.4e-3)},
     "m8": {"bore": 8.2e-3, "hexagon": (13.2e-3, 7.0e-3)},
-}
+}  # fmt: skip
 """Holes for what propellers are mounted on. ``ring``: a quarter-inch bore and a recess for adapter rings, declared from
 one propeller on sale, 9.5 mm wide and 3.1 mm deep. ``m3`` to ``m8``: a bolt and its nut by ISO 4032 (across flats
 5.5, 8, 10, 13 mm; height 2.4, 4.7, 5.2, 6.8 mm; not checked against the standard) with 0.2 mm to spare."""

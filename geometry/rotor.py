@@ -131,14 +131,10 @@ class Blade:
     def scaled(self, factor: float) -> Blade:
         """Return the blade with every length multiplied by `factor` (> 0) [-]; angles and sections stay."""
         return replace(
-            self,
-            r=self.r * factor,
-            chord=self.chord * factor,
-            R=self.R * factor,
-            Rhub=self.Rhub * factor,
+            self, r=self.r * factor, chord=self.chord * factor, R=self.R * factor, Rhub=self.Rhub * factor,
             sweep=None if self.sweep is None else self.sweep * factor,
             rake=None if self.rake is None else self.rake * factor,
-        )
+        )  # fmt: skip
 
     def pitch_m(self, r_over_R: float = 0.75) -> float:
         """Return the geometric pitch 2 pi r tan(beta), the advance per turn, at one r/R (0.75 unless told) [m]."""
@@ -221,11 +217,9 @@ def _check_arrays(blade: Blade, faults: Faults) -> None:
             k = int(np.argmax(np.abs(values)))
             if abs(values[k]) > math.pi / 2 + 1e-9:
                 faults.add(
-                    f"beta[{k}]",
-                    f"{values[k]:g} rad",
-                    "radians from -pi/2 to pi/2",
+                    f"beta[{k}]", f"{values[k]:g} rad", "radians from -pi/2 to pi/2",
                     "Given in degrees? Multiply by pi/180",
-                )
+                )  # fmt: skip
 
 
 def _check_stations(r: Array, R: float, faults: Faults) -> None:

@@ -93,8 +93,8 @@ def test_ducted_rotors_are_scored_but_never_fitted():
     ducts = tuple(replace(p, ducted=i in (2, 7)) for i, p in enumerate(points.propellers))
     with_ducts = replace(points, propellers=ducts, CT=np.where(np.isin(points.index, (2, 7)), 9 * points.CT, points.CT))
     assert fit.fit(with_ducts).K1 == pytest.approx(0.31, abs=1e-9)
-    rows = calibrate.score(with_ducts, {"m": with_ducts.CT})["bands"]
-    assert [(r["band"], r["points"]) for r in rows if r["quantity"] == "ducted"] == [("no", 40), ("yes", 8)]
+    rows = calibrate.score(with_ducts, {"m": with_ducts.CT}).bands
+    assert [(r.band, r.points) for r in rows if r.quantity == "ducted"] == [("no", 40), ("yes", 8)]
 
 
 def test_too_little_to_fit_is_refused():
@@ -199,10 +199,10 @@ def test_volume_1_against_the_thesis(volume_1: FitPoints):
     models = {"thesis": fit.CT_k1k2(volume_1, fit.THESIS.K1, fit.THESIS.K2)}
     models["refit"] = fit.left_out(volume_1)
     found = calibrate.score(volume_1, models)
-    static, flight = found["static"]["models"], found["flight"]["models"]
-    assert static["thesis"]["within_13"] == pytest.approx(0.572, abs=1e-3)
-    assert static["refit"]["within_13"] == pytest.approx(0.586, abs=5e-3)  # a better K1 and K2 hardly help
-    assert flight["refit"]["within_26"] < 0.3  # and not at all in flight: the shape is wrong
+    static, flight = found.static.models, found.flight.models
+    assert static["thesis"].within_13 == pytest.approx(0.572, abs=1e-3)
+    assert static["refit"].within_13 == pytest.approx(0.586, abs=5e-3)  # a better K1 and K2 hardly help
+    assert flight["refit"].within_26 < 0.3  # and not at all in flight: the shape is wrong
 
 
 @pytest.mark.slow
@@ -210,7 +210,7 @@ def test_the_report_is_what_the_command_gives(shared_data: Path, project: Path):
     """The committed table is of version 0.2, with models that have left; K1/K2 is the same."""
     kept = json.loads((project / "reports" / "calibration" / "calibration.json").read_text())
     sets = [gather.load([shared_data / "uiuc" / f"volume-{v}"]) for v in (1, 2)]
-    found = calibrate.calibrate(*sets)
+    found = calibrate.calibrate(*sets).document()
     for name in ("calibration", "test"):
         for motion in ("static", "flight"):
             for model, row in found["scores"][name][motion]["models"].items():

@@ -506,7 +506,7 @@ def test_one_point_stands_beside_bemt_on_one_screen(
     assert Path("out/recording.png").read_bytes().startswith(b"\x89PNG")
     from bemt.judge.compare import one_run
 
-    screen = one_run.text(found)
+    screen = one_run.text(one_run.compare_run("run.toml", case))
     assert len(screen.splitlines()) <= 40 and max(map(len, screen.splitlines())) <= 120
     assert "no grid study: at least" in screen and "No cause is named from one point" in screen
     assert not {"verdict", "effects"} & found.keys()

@@ -15,8 +15,8 @@ from bemt.data.readers.cfd import unique
 from bemt.data.recordings.cfd_options import run_from, write_run
 from bemt.data.recordings.cfd_run import assemble, run_at
 from bemt.data.recordings.cfd_setup import grid_floor
-from bemt.data.recordings.cfd_study import are_grids, by_grid, together
 from bemt.data.recordings.channels import named
+from bemt.data.recordings.grid_study import are_grids, by_grid, together
 from bemt.data.recordings.load import as_dataset, document, import_file
 from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all

@@ -7,8 +7,8 @@ import math
 import runpy
 import shlex
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +20,11 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
 from bemt.judge.compare.change_document import document
-from bemt.judge.compare.contrast_figure import picture
 from bemt.judge.compare.contrast_text import text
 from bemt.judge.compare.drive_laws import LAWS
+from bemt.judge.compare.first_picture import picture
 from bemt.judge.compare.recordings import RunChange
+from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.compare.stand_run import StandRun, stand_run
 from bemt.judge.diagnose.by_laws import changed
 from bemt.judge.diagnose.contrast import compare
@@ -80,7 +81,7 @@ def pair(tmp_path: Path, change: Callable[[dict[str, Array]], None], seed: int =
     return written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)
 
 
-def ratios_of(a: str, b: str) -> Mapping[str, Mapping[str, Any]]:
+def ratios_of(a: str, b: str) -> Mapping[str, Ratio]:
     """Ratios without their cause, which takes most of the time of a comparison."""
     return changed(*(stand_run(import_file(file), file) for file in (a, b))).ratios
 
@@ -89,8 +90,8 @@ def test_intervals_hold_the_true_ratio_as_often_as_they_say(tmp_path: Path) -> N
     inside = 0
     for seed in range(24):
         ratios = ratios_of(*pair(tmp_path, scaled(thrust_N=1.08), seed))
-        inside += ratios["thrust_N"]["low95"] <= 1.08 <= ratios["thrust_N"]["high95"]
-        inside += ratios["torque_Nm"]["low95"] <= 1.0 <= ratios["torque_Nm"]["high95"]
+        inside += ratios["thrust_N"].low95 <= 1.08 <= ratios["thrust_N"].high95
+        inside += ratios["torque_Nm"].low95 <= 1.0 <= ratios["torque_Nm"].high95
     assert 42 <= inside <= 48
 
 
@@ -106,7 +107,7 @@ def test_exchanged_recordings_give_the_inverse_ratio(tmp_path: Path) -> None:
     a, b = pair(tmp_path, scaled(thrust_N=1.2))
     there, back = ratios_of(a, b), ratios_of(b, a)
     for channel in ("thrust_N", "torque_Nm"):
-        assert there[channel]["ratio"] * back[channel]["ratio"] == pytest.approx(1.0, abs=0.004)
+        assert there[channel].ratio * back[channel].ratio == pytest.approx(1.0, abs=0.004)
 
 
 def _zero(table: dict[str, Array]) -> None:
@@ -489,9 +490,9 @@ def test_with_a_case_the_text_says_the_answer_and_what_the_case_adds(tmp_path: P
 def test_the_answer_says_things_once_and_in_one_notation(tmp_path: Path) -> None:
     none = " ".join(compare(*pair(tmp_path, scaled())).text.split())
     assert "No change beyond the difference between two set-ups" in none and "No change: no change" not in none
-    doc = compare(*pair(tmp_path, scaled(thrust_N=2.1, torque_Nm=2.4))).document
-    wide = {**doc["ratios"]["thrust_N"], "ratio": 2.1, "low95": 1.7, "high95": 2.6}
-    said = text(doc | {"ratios": {**doc["ratios"], "thrust_N": wide}})
+    doc = compare(*pair(tmp_path, scaled(thrust_N=2.1, torque_Nm=2.4))).said
+    wide = replace(doc.ratios["thrust_N"], ratio=2.1, low95=1.7, high95=2.6)
+    said = text(replace(doc, ratios={**doc.ratios, "thrust_N": wide}))
     assert "thrust x2.10 (x1.70 to x2.60), torque x2.36 (x2.28 to x2.44)" in " ".join(said.split())
     a, b = stand(1), stand(2, scaled(torque_Nm=-1.0))
     turned = compare(written(tmp_path / "a.csv", a), written(tmp_path / "b.csv", b)).document["notes"]
@@ -541,7 +542,7 @@ def test_the_picture_names_what_is_drawn(tmp_path: Path, monkeypatch: pytest.Mon
         files.append(written(tmp_path / name, table))
     answer, drawn = compare(*files), []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
-    picture(answer.change, answer.document)
+    picture(answer.change, answer.said)
     (figure,) = drawn
     labels = [(axis.get_xlabel(), axis.get_ylabel()) for axis in figure.axes]
     assert labels[2] == ("speed of rotation [rev/min]", "electrical power / n³ [W s³]")
@@ -615,7 +616,7 @@ def test_runs_without_a_common_advance_ratio_name_nothing(tmp_path: Path) -> Non
     a = written(tmp_path / "a.csv", _tunnel(5003.0, np.linspace(0.05, 0.3, 12), 1))
     b = written(tmp_path / "b.csv", _tunnel(5003.0, np.linspace(0.5, 0.8, 12), 2))
     answer = compare(a, b)
-    assert answer.verdict == "insufficient" and "%" not in text(answer.document).splitlines()[0]
+    assert answer.verdict == "insufficient" and "%" not in text(answer.said).splitlines()[0]
     assert "B again" in answer.document["next_measurement"]["text"]
 
 
@@ -663,7 +664,7 @@ def panels(change: RunChange, monkeypatch: pytest.MonkeyPatch) -> list[Axes]:
     figures: list[Figure] = []
     saved = Figure.savefig
     monkeypatch.setattr(Figure, "savefig", lambda f, *a, **k: (figures.append(f), saved(f, *a, **k))[1])
-    picture(change, document(change) | {"recordings": ["a.csv", "b.csv"], "rows": {"A": [], "B": []}})
+    picture(change, replace(document(change), recordings=("a.csv", "b.csv"), rows={"A": (), "B": ()}))
     return list(figures[0].axes)
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from bemt.app import cli
-from bemt.base import cache, folders
+from bemt.base import cache, given
 from bemt.base.errors import InputError
 from bemt.data.recordings import database as data
 from bemt.data.recordings import database as data_archive
@@ -120,14 +120,14 @@ def left(folder: Path) -> set[str]:
 
 
 def test_fetched_data_are_found_by_every_reader(server, no_cache_but, capsys):
-    assert folders.find_data("uiuc") is None
+    assert given.find_data("uiuc") is None
     assert cli.main(["fetch", "uiuc", "--url", url(server), "--json"]) == 0
     doc = json.loads(capsys.readouterr().out)
     folder = no_cache_but / "data" / "uiuc"
     assert doc["schema"] == "bemt.data/1" and doc["propellers"] == 2 and doc["files"] == 4
     assert (doc["checksum"], doc["fetched"], doc["folder"]) == ("first use", True, str(folder))
     assert (folder / "volume-1" / "data" / "test_10x5_geom.txt").read_text() == GEOM  # the one top folder is left off
-    assert folders.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
+    assert given.find_data("uiuc") == folder and left(no_cache_but / "data") == {"uiuc"}
     assert cli.main(["calibrate", "--quiet"]) == 0  # reads the fetched data when no file is named
 
 
@@ -136,19 +136,19 @@ def test_a_named_folder_comes_before_the_cache(server, no_cache_but, tmp_path, m
     mine = tmp_path / "mine"
     (mine / "uiuc").mkdir(parents=True)
     monkeypatch.setenv("BEMT_DATA", str(mine))
-    assert folders.find_data("uiuc") == mine / "uiuc"
+    assert given.find_data("uiuc") == mine / "uiuc"
     monkeypatch.setenv("BEMT_CACHE", "off")
     (mine / "uiuc").rmdir()
-    assert folders.find_data("uiuc") is None
+    assert given.find_data("uiuc") is None
 
 
 def test_what_is_there_is_not_fetched_again(server, tmp_path):
     first = data.get("uiuc", tmp_path / "uiuc", url=url(server))
     again = data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    assert len(server.ranges) == 1 and again["sha256"] == first["sha256"]
-    assert (again["checksum"], again["fetched"]) == ("as recorded", False)
+    assert len(server.ranges) == 1 and again.sha256 == first.sha256
+    assert (again.checksum, again.fetched) == ("as recorded", False)
     fresh = data.get("uiuc", tmp_path / "uiuc", url=url(server), refresh=True)
-    assert len(server.ranges) == 2 and (fresh["checksum"], fresh["fetched"]) == ("as recorded", True)
+    assert len(server.ranges) == 2 and (fresh.checksum, fresh.fetched) == ("as recorded", True)
 
 
 def test_a_changed_archive_is_refused(server, tmp_path):
@@ -172,7 +172,7 @@ def test_an_interrupted_download_goes_on_where_it_stopped(server, tmp_path):
     server.cut = None
     doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
     assert server.ranges[-1] == f"bytes={have}-" and server.said[-1] == 206
-    assert doc["bytes"] == len(server.body) and left(tmp_path) == {"uiuc"}
+    assert doc.bytes == len(server.body) and left(tmp_path) == {"uiuc"}
 
 
 def test_after_a_change_the_rest_is_not_glued_to_the_old_part(server, tmp_path):
@@ -181,7 +181,7 @@ def test_after_a_change_the_rest_is_not_glued_to_the_old_part(server, tmp_path):
         data.get("uiuc", tmp_path / "uiuc", url=url(server))
     server.body, server.cut, server.tag = zipped(FILES, filler=500_000), None, '"two"'
     doc = data.get("uiuc", tmp_path / "uiuc", url=url(server))
-    assert server.said[-1] == 200 and doc["bytes"] == len(server.body)
+    assert server.said[-1] == 200 and doc.bytes == len(server.body)
 
 
 def test_an_address_that_does_not_answer_is_an_input_error(server, tmp_path, capsys):
@@ -212,7 +212,7 @@ def test_a_local_archive(tmp_path, capsys):
     assert archive.exists() and left(tmp_path) == {"mine.zip", "uiuc"}
     archive.write_bytes(zipped(FILES | {"UIUC-propDB/volume-1/data/new_9x5_static_kt0009.txt": STATIC}))
     doc = data.get("uiuc", tmp_path / "uiuc", archive)
-    assert (doc["propellers"], doc["checksum"]) == (3, "replaced")
+    assert (doc.propellers, doc.checksum) == (3, "replaced")
 
 
 def link() -> bytes:
@@ -287,22 +287,22 @@ def test_what_the_user_added_or_changed_is_not_deleted(server, tmp_path):
     refused("files added or changed since (1): volume-1/mine/notes.txt", "--out")
     refused("notes.txt", source=None, url=url(server), refresh=True)
     assert not server.ranges and left(tmp_path) == {"a.zip", "uiuc"}  # told before anything is fetched
-    assert "names" not in data.get("uiuc", folder)  # only looked at: nothing to refuse
+    assert data.get("uiuc", folder).names is None  # only looked at: nothing to refuse
     mine.unlink()
     table = folder / "volume-1" / "data" / "test_10x5_geom.txt"
     table.write_text(GEOM + "\n")  # corrected by hand
     refused("test_10x5_geom.txt")
     table.write_text(GEOM)
-    assert data.get("uiuc", folder, archive)["checksum"] == "as recorded"
+    assert data.get("uiuc", folder, archive).checksum == "as recorded"
     table.unlink()  # what is missing is put back
-    assert data.get("uiuc", folder, archive)["files"] == 4 and table.read_text() == GEOM
+    assert data.get("uiuc", folder, archive).files == 4 and table.read_text() == GEOM
     record = folder / data.RECORD  # of an earlier version: without names
     record.write_text(json.dumps({k: v for k, v in json.loads(record.read_text()).items() if k != "names"}))
     mine.parent.mkdir(exist_ok=True)
     mine.write_text("days of work")
     refused("5 files where its record counts 4")
     mine.unlink()
-    assert data.get("uiuc", folder, archive)["checksum"] == "as recorded"
+    assert data.get("uiuc", folder, archive).checksum == "as recorded"
 
 
 def test_a_mirror_beside_a_local_archive_is_refused(tmp_path, capsys):

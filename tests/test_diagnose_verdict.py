@@ -12,7 +12,6 @@ from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge import loss
 from bemt.judge.diagnose import (
-    blocks,
     chain,
     confusion,
     fit,
@@ -78,8 +77,8 @@ def test_references_are_in_no_block() -> None:
     problem: Any = SimpleNamespace(
         covariates=covariates, parts=(1, 2), point=np.tile(np.arange(12), 2), free=np.tile(rpm > 5000, 2)
     )
-    for _, block in blocks.partitions(problem):
-        assert np.array_equal(block == blocks.REFERENCE, rpm < 5000)
+    for _, block in chain.partitions(problem):
+        assert np.array_equal(block == chain.REFERENCE, rpm < 5000)
         assert np.unique(block[block >= 0]).size == 3
 
 

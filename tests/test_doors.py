@@ -20,7 +20,7 @@ from bemt.results.report import gather
 from bemt.results.sweep.case import solve_case
 from bemt.results.sweep.grid import Grid, GridSolver
 from bemt.rotors.case import Case, load_case
-from bemt.rotors.case.estimate import document as estimate
+from bemt.rotors.case.estimate import of_label as estimate
 from bemt.rotors.case.prepare import k1k2_case
 from bemt.rotors.case.propagate import propagate
 from bemt.tools.cfd.openfoam.write import Run, settings_of
@@ -123,7 +123,9 @@ def _report(case: Case, rpm: Any, V: Any) -> Answer:
 
 
 def _estimate(case: Case, rpm: Any, V: Any) -> Answer:
-    rows = [estimate(LABEL, [n], [v], angles=[case.angle_deg])["rows"][0] for n, v in zip(rpm, V, strict=True)]
+    rows = [
+        estimate(LABEL, [n], [v], angle_deg=[case.angle_deg]).to_dict()["rows"][0] for n, v in zip(rpm, V, strict=True)
+    ]
     return [(r["thrust_N"], r["u_thrust_N"], np.nan, np.nan, tuple(r["flags"])) for r in rows]
 
 
@@ -251,9 +253,9 @@ def test_one_run_is_compared_at_its_recorded_angle(channel: str, factor: float, 
     angles = (0.0, 60.0)
     rows = "".join(f"6000,10,1.225,{angle * factor:.12g},3,0.06\n" for angle in angles)
     (tmp_path / "cfd.csv").write_text(f"rpm,airspeed_m_s,density_kg_m3,{channel},thrust_N,torque_Nm\n{rows}")
-    points = compare_run(tmp_path / "cfd.csv", label)["points"]
+    points = compare_run(tmp_path / "cfd.csv", label).points
     expected = propagate(label, 6000.0, 10.0, 1.225, angle_deg=angles, bands=False).points
-    assert [point["loads"]["thrust_N"]["bemt"] for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
+    assert [point.loads["thrust_N"].bemt for point in points] == pytest.approx(list(expected.thrust_N), rel=1e-7)
 
 
 @pytest.mark.parametrize("table", ["operating]\nangle_deg = 30", "sweep]\nangle_deg = [0, 30]"])
@@ -339,7 +341,7 @@ def _words(label: str, rpm: float, V: float, folder: Path) -> dict[str, tuple[st
     return {
         "solve": p.solve(rpm, V, bands=False).flags[0],
         "sweep": _sweep(case, [rpm], [V])[0][4],
-        "estimate": tuple(estimate(label, [rpm], [V])["rows"][0]["flags"]),
+        "estimate": tuple(estimate(label, [rpm], [V]).to_dict()["rows"][0]["flags"]),
         "diagnose": tuple(words.removeprefix("3 of 3 points of the recording: ") for words in diagnosed),
     }
 

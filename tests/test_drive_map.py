@@ -107,13 +107,10 @@ def test_scatter_of_the_readings_is_told_from_that_of_the_esc() -> None:
     assert bench_map.held_out(points_of(thrust)).rms > 0.02
     assert np.max(np.abs(map_result.speed_known(points_of(thrust)))) < 1e-12
     noise = 0.01 * full * rng.standard_normal(pulse.size)
-    rms = map_result.scatter_document(points_of(thrust + noise))["rms_of_full_thrust"]
+    rms = map_result.scatter(points_of(thrust + noise))[2]
     assert 0.007 < rms < 0.025  # the level's own reading and its two neighbours'
-    assert map_result.scatter_document(map_points(pulse, {"thrust_N": thrust})) == {
-        "points": 0,
-        "worst_of_full_thrust": None,
-        "rms_of_full_thrust": None,
-    }
+    points, *errors = map_result.scatter(map_points(pulse, {"thrust_N": thrust}))
+    assert points == 0 and np.isnan(errors).all()
 
 
 def log(tmp_path: Path, sign: int = 1, extra: str = "") -> Path:
@@ -206,7 +203,7 @@ def test_where_a_round_trip_misses_the_readings_themselves_scatter(shared_data: 
     for file in files:
         got = points(importers.read(file), file.name)
         assert bench_map.held_out(got).worst > 0.01, file.name
-        assert map_result.scatter_document(got)["worst_of_full_thrust"] > 0.01, file.name
+        assert map_result.scatter(got)[1] > 0.01, file.name
 
 
 def test_five_runs_on_one_emptying_battery_tell_the_voltage(shared_data: Path) -> None:

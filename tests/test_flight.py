@@ -22,14 +22,12 @@ from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.balance import BUILD, axes_of, blade, features
 from bemt.tools.flight.change import change_in
 from bemt.tools.flight.identify import identify
-from bemt.tools.flight.inflow import inflow
 from bemt.tools.flight.judge import FlightVerdict, judge, posterior
-from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
+from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.mass import mass_faults
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
-from bemt.tools.flight.simulator import motor_lag, simulator_constants
+from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
 from bemt.tools.flight.wind import wind
 
 

@@ -14,12 +14,12 @@ from bemt.tools.flight import log as flight_log
 from bemt.tools.flight import px4
 from bemt.tools.flight.answer import FlightAnswer, answer_on
 from bemt.tools.flight.change import change_in
-from bemt.tools.flight.inflow import inflow
 from bemt.tools.flight.judge import judge
 from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.motor_speed import speed_changes
 from bemt.tools.flight.read import read_log
+from bemt.tools.flight.speed_sensor import speed_changes
+from bemt.tools.flight.thrust_curve import inflow
 
 pytest.importorskip("pyulog")
 pytest.importorskip("pymavlink")

@@ -19,7 +19,7 @@ from bemt.tools.flight.judge import judge
 from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.read import kind_of, read_log
-from bemt.tools.flight.sessions import sessions
+from bemt.tools.flight.repeat import sessions
 from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.text import pilot
 from bemt.tools.flight.thrust_curve import thrust_curve

@@ -12,8 +12,7 @@ from scipy.stats import multivariate_normal
 
 from bemt.base.gaussian.evidence import LinearTerms, log_sum, shares
 from bemt.base.gaussian.kernels import alike, modes, smooth
-from bemt.base.gaussian.reml import Restricted, contrasts
-from bemt.base.gaussian.whitening import conditional, leave_one_out, log_density, whitener
+from bemt.base.gaussian.whitening import Restricted, conditional, contrasts, leave_one_out, log_density, whitener
 
 Array = np.ndarray
 

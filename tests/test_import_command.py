@@ -14,8 +14,8 @@ import pytest
 
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.data.recordings.choice import Choice
-from bemt.data.recordings.load import document, import_file
+from bemt.data.recordings.adapt import Choice
+from bemt.data.recordings.load import import_file, import_files
 
 PERIOD = 0.5
 
@@ -72,7 +72,7 @@ def test_period_and_revolutions(put: Callable[..., Path], capsys: pytest.Capture
 
 
 def test_without_a_speed_the_mean_says_that_it_holds_the_start_up(put: Callable[..., Path]) -> None:
-    (file,) = document([put("q.out", history())])["files"]
+    (file,) = import_files([put("q.out", history())]).document()["files"]
     assert file["channels"]["torque"]["averaged_over"] == "all 300 rows, start-up included"
     assert any("give --rpm or --period-s" in w for w in file["warnings"])
     assert any(w.startswith("not settled") and "torque" in w for w in file["warnings"])
@@ -81,7 +81,7 @@ def test_without_a_speed_the_mean_says_that_it_holds_the_start_up(put: Callable[
 def test_a_steady_run_does_not_use_the_speed_and_must_have_settled(put: Callable[..., Path]) -> None:
     rows = "".join(f"{k} {5.0 + 0.01 * k}\n" for k in range(1, 201))
     path = put("t.out", '"t"\n"Iteration" "thrust"\n("Iteration" "thrust")\n' + rows)
-    (file,) = document([path], choice=Choice(period=0.1))["files"]
+    (file,) = import_files([path], choice=Choice(period=0.1)).document()["files"]
     assert file["channels"]["thrust"]["averaged_over"] == "last 40 rows"
     assert any("the speed of rotation is not used" in w for w in file["warnings"])
     assert any(w.startswith("not settled") and "thrust +5.73%" in w for w in file["warnings"])
@@ -90,22 +90,22 @@ def test_a_steady_run_does_not_use_the_speed_and_must_have_settled(put: Callable
 def test_restart_files_are_named_and_never_joined(put: Callable[..., Path]) -> None:
     a = put("q-rfile.out", history())
     b = put("q-rfile_1_1.out", history(per_turn=80))  # the same steps at other times
-    found = document([a, b], choice=Choice(period=PERIOD))["files"]
+    found = import_files([a, b], choice=Choice(period=PERIOD)).document()["files"]
     assert [f["rows"] for f in found] == [300, 480]
     assert any("(other clock): not joined; the same steps mean other times" in w for w in found[1]["warnings"])
     assert not any("joined" in w for w in found[0]["warnings"])
-    alone = document([b])["files"][0]
+    alone = import_files([b]).document()["files"][0]
     assert any(f"next to {a}: not joined" in w for w in alone["warnings"])
     c = put("other-rfile.out", history())
     d = put("other-rfile_1_300.out", history(start=3.0, first=301))
-    assert any("(continues): not joined" in w for w in document([c, d])["files"][1]["warnings"])
+    assert any("(continues): not joined" in w for w in import_files([c, d]).document()["files"][1]["warnings"])
 
 
 def test_openfoam_start_folders_are_restarts_too(put: Callable[..., Path]) -> None:
     head = "# Force\n# Time\ttotal_x total_y total_z\n"
     one = put("forces/0/force.dat", head + "".join(f"{0.01 * k:g} 1 0 0\n" for k in range(1, 30)))
     two = put("forces/0.2/force.dat", head + "".join(f"{0.2 + 0.01 * k:g} 2 0 0\n" for k in range(1, 30)))
-    found = document([one, two])["files"]
+    found = import_files([one, two]).document()["files"]
     assert any("not joined" in w for w in found[1]["warnings"]) and not any("joined" in w for w in found[0]["warnings"])
 
 
@@ -147,7 +147,7 @@ def test_wrong_options(
 def test_a_damaged_head_is_not_taken_for_a_plain_table(put: Callable[..., Path]) -> None:
     text = history()
     for cut in (70, 75, 78):
-        (file,) = document([put("q.out", text[cut:])])["files"]
+        (file,) = import_files([put("q.out", text[cut:])]).document()["files"]
         assert file["error"] and not file["channels"], cut
 
 
@@ -158,7 +158,7 @@ def test_other_formats_are_shown_as_well(put: Callable[..., Path], project: Path
         "r/R c/R beta\n" + "".join(f"{0.15 + 0.05 * k:.2f} 0.12 {40 - 1.5 * k}\n" for k in range(18)),
     )
     cases = sorted((project / "cases").glob("*/references.csv"))
-    found = document([static, blade, *cases])["files"]
+    found = import_files([static, blade, *cases]).document()["files"]
     assert [f["error"] for f in found] == [None] * len(found)
     assert (found[0]["kind"], found[0]["rows"], found[1]["kind"], found[1]["rows"]) == ("bench", 2, "geometry", 18)
     assert all(c["mean"] is None for c in found[0]["channels"].values())

@@ -17,10 +17,10 @@ from bemt.rotors.case.motor import class_resistance, full_speed, named_motor
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.case.reading import parse_reading, with_reading
+from bemt.rotors.conditioning import CAMPAIGN
 from bemt.rotors.measured import find, measured_rotors, records
 from bemt.rotors.model import coefficients
 from bemt.rotors.propeller import rotor_of
-from bemt.rotors.reference import CAMPAIGN
 from bemt.rotors.validate.points import measured
 from bemt.tools.drive import drive_result
 from geometry.common import GeometryError
@@ -125,7 +125,7 @@ def test_one_hover_makes_the_rotor_this_one() -> None:
     assert after.points.u["CT"][1] < before.points.u["CT"][1]
     other = propagate(with_reading(plain, {"rpm": 5400, "thrust_g": 430}), [5400.0, 7000.0], 0.0)
     assert other.points.thrust_N == pytest.approx(after.points.thrust_N, rel=1e-9)
-    row = estimate.document("10x5", [5400.0], reading=text)["rows"][0]
+    row = estimate.of_label("10x5", [5400.0], reading=text).to_dict()["rows"][0]
     assert row["thrust_N"] == pytest.approx(after.points.thrust_N[0], rel=1e-9)
     drive = drive_result.with_drive(with_reading(rotor_of("10x5").case, text), kv=900, cells=3)
     assert propagate(drive, 5400.0, 0.0, bands=False).points.thrust_N[0] == pytest.approx(row["thrust_N"], rel=1e-9)

@@ -68,7 +68,7 @@ MAY: dict[str, set[str]] = {
     "bemt.base.cache": {"files", "environment"},
     "bemt.base.packed": {"files"},
     "bemt.base.checkout": {"files"},
-    "bemt.base.folders": {"environment"},
+    "bemt.base.given": {"environment"},
     "bemt.base.tables|bemt.base.toml_text": {"files"},
     "bemt.rotors.case|bemt.rotors.case.*": {"files"},
     "bemt.rotors.population|bemt.rotors.propeller|bemt.rotors.actions": {"files"},
@@ -459,7 +459,7 @@ def test_a_planted_fault_is_found(tree: dict[str, str], module: str, line: str, 
         (
             "bemt.base",
             "from bemt.app import cli",
-            "bemt.base.folders:1: bemt.app.cli is not below it",
+            "bemt.base.given:1: bemt.app.cli is not below it",
         ),
         (
             "bemt.judge.proof",

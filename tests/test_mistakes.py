@@ -113,7 +113,7 @@ def test_a_mistake_is_answered_with_its_remedy(
     if name == "validate without data":
         monkeypatch.setenv("BEMT_DATA", str(tmp_path / "none"))
         monkeypatch.setenv("BEMT_CACHE", str(tmp_path / "cache"))
-        monkeypatch.setattr("bemt.base.folders.DEFAULT", tmp_path / "none", raising=False)
+        monkeypatch.setattr("bemt.base.given.DEFAULT", tmp_path / "none", raising=False)
     make, code, words = RUNS[name]
     try:
         got = main(make(put))

@@ -23,7 +23,6 @@ from bemt.judge.proof import (
     proof_text,
     prove,
     real,
-    resolve,
     rigs,
     score,
     seal,
@@ -537,11 +536,11 @@ def test_a_recommended_run_is_tried_on_the_truth() -> None:
     thin = [{"rpm": f * top, "airspeed_m_s": 0.0, "pressure_Pa": 50e3} for f in np.linspace(0.6, 1.0, 8)]
     same = [{"rpm": 0.5 * top, "airspeed_m_s": 0.0}]
     tried = {
-        name: resolve.resolves(bench, there, replace(said, next_measurement=Step(points=tuple(points))))
+        name: prove.resolves(bench, there, replace(said, next_measurement=Step(points=tuple(points))))
         for name, points in (("thin", thin), ("same", same))
     }
     assert tried == {"thin": True, "same": False}
-    assert resolve.resolves(bench, there, replace(said, next_measurement=Step())) is None
+    assert prove.resolves(bench, there, replace(said, next_measurement=Step())) is None
 
 
 def test_no_answer_is_no_virtue() -> None:

@@ -15,7 +15,7 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
 from bemt.data.readers import cfd
-from bemt.data.recordings.load import document, import_file
+from bemt.data.recordings.load import import_file, import_files
 from bemt.physics.dataset import Dataset
 
 RNG = np.random.default_rng(20)
@@ -421,7 +421,7 @@ EXACT = {"cut", "line", "column", "some", "zip", "encode"}
 
 def check(form: str, raw: bytes, kind: str, path: Path, truth: dict[str, Dataset]) -> str:
     path.write_bytes(raw)
-    (file,) = document([path], choice=None)["files"]
+    (file,) = import_files([path], choice=None).document()["files"]
     if file["error"] is not None:
         assert file["error"].strip() and not file["channels"]
         return "refused"
@@ -490,7 +490,7 @@ REFUSED = {
 def test_every_published_sample_is_read_or_refused_with_the_reason(shared_data: Path) -> None:
     files = [path for path in sorted((shared_data / "cfd_exports").rglob("*")) if path.is_file()]
     assert len(files) >= 30
-    for file in document(files)["files"]:
+    for file in import_files(files).document()["files"]:
         reason = REFUSED.get(Path(file["path"]).name)
         if reason is None:
             assert file["error"] is None and file["rows"] > 0 and file["channels"], file["path"]

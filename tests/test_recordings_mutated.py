@@ -237,7 +237,7 @@ def try_injured(count: int, seed: int, folder: Path, bases: dict[str, str]) -> C
                     for row, value in enumerate(record[own]):
                         if math.isfinite(value) and not math.isfinite(seen.values[channel][row]):
                             assert {(record.lines[row], channel), (record.lines[row], own)} & values, case
-            assert told is not None and points_text(told), case
+            assert told is not None and points_text(reduced), case
             outcome["reduced"] += 1
         else:
             assert reduced is None or ("got " in reduced and "expected " in reduced), case

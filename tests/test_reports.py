@@ -51,7 +51,7 @@ def test_committed_validation_is_what_the_data_give_and_within_its_bounds(
 ) -> None:
     folder = project / "reports" / "validation" / f"uiuc_volume_{volume}"
     kept = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
-    fresh = validate(shared_data / "uiuc" / f"volume-{volume}", match_J0=True)
+    fresh = validate(shared_data / "uiuc" / f"volume-{volume}", match_J0=True).document()
     assert fresh["unconverged"] == 0 and not fresh["faults"]
     for kind, bound in (("static", static), ("forward", forward)):
         assert fresh[kind]["CT"]["median_abs"] < bound[0]

@@ -20,12 +20,11 @@ from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate, solve_at
-from bemt.rotors.conditioning import condition
+from bemt.rotors.conditioning import ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import WEIGHTS, Population, population, sizes
 from bemt.rotors.predict import LEVELS, Prediction, half_width, inside, pair_half_width, predict
-from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validate import points
 from bemt.rotors.validate.points import ComparedRotor
 from bemt.rotors.validity import Validity

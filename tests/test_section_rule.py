@@ -75,10 +75,10 @@ def test_the_declared_rule_put_in_its_own_place_changes_nothing(
     for file in files:  # every third propeller: it holds for each or for none
         if "_".join(file.name.split("_")[:2]) in names[::3]:
             shutil.copy(file, tmp_path)
-    declared = validate(tmp_path)
+    declared = validate(tmp_path).document()
     rule = {"n_crit": section_rule.N_CRIT, "lift_floor": 0.0, "stall_delay": 3.0, "lifting_surface": 0.0, "camber": 0.0,
             "thickness": 0.09, "position": 0.4, "drag": section_rule.DRAG_LEVEL, "normal": 1.0}  # fmt: skip
-    same = validate(tmp_path, _install(monkeypatch, rule))
+    same = validate(tmp_path, _install(monkeypatch, rule)).document()
     for kind in ("static", "forward"):
         assert same[kind] == declared[kind]
 
@@ -91,7 +91,7 @@ def test_no_rule_drawn_at_random_meets_the_aims_on_volume_2(shared_data: Path) -
     for rule in (_draw(rng) for _ in range(24)):
         with pytest.MonkeyPatch.context() as patch:
             effects = _install(patch, rule)
-            docs = [validate(shared_data / "uiuc" / f"volume-{v}", effects) for v in (1, 2)]
+            docs = [validate(shared_data / "uiuc" / f"volume-{v}", effects).document() for v in (1, 2)]
         static.append(
             [docs[0]["static"]["CT"]["median_abs"], *(docs[1]["static"]["CT"][k] for k in ("median_abs", "p90_abs"))]
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def _folder(path: Path, thrust: float = 1.0, power: float = 1.0, turned_deg: flo
 
 
 def test_planted_errors_come_out(tmp_path: Path) -> None:
-    doc = propellers.validate(_folder(tmp_path, thrust=1.10, power=0.95))
+    doc = propellers.validate(_folder(tmp_path, thrust=1.10, power=0.95)).document()
     for kind in ("static", "forward"):
         assert doc["as_drawn"][kind]["propellers"] == 1
         assert doc["as_drawn"][kind]["CT"]["bias"] == pytest.approx(0.10, abs=1e-6)
@@ -60,7 +61,8 @@ def test_planted_errors_come_out(tmp_path: Path) -> None:
 
 def test_a_planted_blade_angle_is_found_and_kept_apart(tmp_path: Path) -> None:
     folder = _folder(tmp_path, power=0.95, turned_deg=-1.5)
-    plain, doc = propellers.validate(folder), propellers.validate(folder, match_J0=True)
+    plain, found = propellers.validate(folder).document(), propellers.validate(folder, match_J0=True)
+    doc = found.document()
     turned = doc.pop("matched_J0")
     assert turned["propellers"] == 1 and turned["shift_deg_p10_p50_p90"][1] == pytest.approx(-1.5, abs=0.02)
     for kind in ("static", "forward"):
@@ -70,7 +72,7 @@ def test_a_planted_blade_angle_is_found_and_kept_apart(tmp_path: Path) -> None:
         assert turned[kind]["points"] == plain[kind]["points"]
     assert doc["propellers"][0].pop("matched_J0")["shift_deg"] == turned["shift_deg_p10_p50_p90"][1]
     assert doc == plain
-    assert "turned to measured J0, 1" in propellers.text({**doc, "matched_J0": turned})
+    assert "turned to measured J0, 1" in propellers.text(found)
 
 
 def test_a_zero_thrust_J_that_no_blade_angle_gives_is_not_matched() -> None:
@@ -80,7 +82,7 @@ def test_a_zero_thrust_J_that_no_blade_angle_gives_is_not_matched() -> None:
 
 
 def test_forward_points_stop_at_the_share_of_zero_thrust_J(tmp_path: Path) -> None:
-    doc = propellers.validate(_folder(tmp_path))
+    doc = propellers.validate(_folder(tmp_path)).document()
     J0 = doc["propellers"][0]["J0"]
     J = np.linspace(0.1, 0.7, 13)
     assert doc["forward"]["points"] == np.count_nonzero(J <= points.J_SHARE * J0)
@@ -90,26 +92,26 @@ def test_rotors_as_built_come_with_what_their_intervals_hold(tmp_path: Path) -> 
     """A propeller that is exactly as the solver has it lies inside every interval; one far off lies outside."""
     (tmp_path / "good").mkdir()
     (tmp_path / "bad").mkdir()
-    good = propellers.validate(_folder(tmp_path / "good"))
-    bad = propellers.validate(_folder(tmp_path / "bad", thrust=1.6, power=1.6))
+    good = propellers.validate(_folder(tmp_path / "good")).document()
+    bad = propellers.validate(_folder(tmp_path / "bad", thrust=1.6, power=1.6)).document()
     for kind in ("static", "forward"):
         for q in ("CT", "CP"):
             assert good[kind][q]["coverage"] == {"68": 1.0, "95": 1.0} and 0.01 < good[kind][q]["width68"] < 0.5
             assert bad[kind][q]["coverage"]["68"] < 0.3
-    drawn = propellers.validate(tmp_path / "good", as_drawn=True)
+    drawn = propellers.validate(tmp_path / "good", as_drawn=True).document()
     assert "coverage" not in drawn["static"]["CT"] and "as_drawn" not in drawn
 
 
 def test_unconverged_points_count_as_infinitely_wrong() -> None:
     bad = points.statistics(np.array([0.01, np.nan, np.nan]))
-    assert bad["median_abs"] == np.inf
-    assert json.loads(json_text(bad)) == {"median_abs": None, "p90_abs": None, "bias": 0.01}
+    assert bad.median_abs == np.inf
+    assert json.loads(json_text(bad.document())) == {"median_abs": None, "p90_abs": None, "bias": 0.01}
 
 
 def test_unconverged_points_are_never_shown_as_zero(tmp_path: Path) -> None:
     doc = propellers.validate(_folder(tmp_path))
     nothing = points.statistics(np.array([np.nan, np.nan]))
-    doc["static"]["CT"] |= nothing
+    doc = replace(doc, static=replace(doc.static, CT=nothing))
     line = next(row for row in propellers.text(doc).splitlines() if row.startswith("all points"))
     assert line.split("|")[1].split() == ["inf", "inf", "-"]
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import html
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from bemt.base.errors import EXIT_OK, Fault, InputError
+from bemt.base.errors import EXIT_OK, Fault, InputError, refuse
 
 __all__ = [
     "Declaration", "Count", "Told", "about", "action", "choices_of", "did_you_mean", "in_words",
@@ -62,14 +63,9 @@ class Told:
 
 
 def action(
-    group: str,
-    example: str,
-    *,
-    words: tuple[str, ...] = (),
-    common: tuple[str, ...] = (),
-    shown: bool = False,
+    group: str, example: str, *, words: tuple[str, ...] = (), common: tuple[str, ...] = (), shown: bool = False,
     command: str = "",
-) -> Callable[[Callable[P, T]], Callable[P, T]]:
+) -> Callable[[Callable[P, T]], Callable[P, T]]:  # fmt: skip
     """Declare a public function as an action."""
 
     def declare(function: Callable[P, T]) -> Callable[P, T]:
@@ -126,8 +122,7 @@ def check_counts(names: Iterable[str], given: dict[str, Any]) -> None:
             whole = one is None or isinstance(one, bool) is False and hasattr(one, "__index__") and one >= 1
             if not whole:
                 faults.append(Fault("", name, repr(one), "a whole number of 1 or more"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def choices_of(kind: str) -> tuple[str, ...]:
@@ -214,3 +209,23 @@ def options_of(fault: Fault) -> Fault:
     if not words or not re.fullmatch(r"[a-z]\w*(, [a-z]\w*)*", words) or words in ("label", "recordings", "points"):
         return fault
     return replace(fault, where=re.sub(r"\w+", lambda m: "--" + m[0].replace("_", "-"), words))
+
+
+# Answers as a notebook shows them.
+def as_html(head: str, text: str) -> str:
+    """A heading and a text of fixed width, for notebooks.
+
+    >>> as_html("a < b", "text")
+    '<strong>a &lt; b</strong><pre style="line-height:1.35">text</pre>'
+    """
+    return f'<strong>{html.escape(head)}</strong><pre style="line-height:1.35">{html.escape(text)}</pre>'
+
+
+def table_html(head: str, rows: Mapping[str, str]) -> str:
+    """A heading and names with their values, for notebooks.
+
+    >>> table_html("10x5", {"blades": "2"})
+    '<strong>10x5</strong><table class="bemt"><tr><th>blades</th><td>2</td></tr></table>'
+    """
+    cells = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in rows.items())
+    return f'<strong>{html.escape(head)}</strong><table class="bemt">{cells}</table>'

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 
 DEFAULT_REVOLUTIONS = 4
@@ -112,8 +112,7 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
         faults.append(Fault("", "time", f"shape {t.shape} for values of shape {v.shape}", "equal lengths"))
     elif t.size and not (np.all(np.isfinite(t)) and np.all(np.diff(t) > 0.0)):
         faults.append(Fault("", "time", "times that do not ascend", "strictly ascending times", "Use keep_last first"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     none = Average(None, 0, 0, math.nan, math.nan)
     if t.size < 2:
         return replace(none, problem=f"{number_of(t.size, 'row')}: no revolution")

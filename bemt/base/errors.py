@@ -12,18 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 __all__ = [
-    "EXIT_INPUT",
-    "EXIT_INTERNAL",
-    "EXIT_OK",
-    "EXIT_UNCONVERGED",
-    "BemtWarning",
-    "ConvergenceWarning",
-    "Fault",
-    "InputError",
-    "RangeWarning",
-    "needs",
-    "system_fault",
-]
+    "EXIT_INPUT", "EXIT_INTERNAL", "EXIT_OK", "EXIT_UNCONVERGED", "BemtWarning", "ConvergenceWarning", "Fault",
+    "InputError", "RangeWarning", "gathered", "needs", "refuse", "system_fault",
+]  # fmt: skip
 
 EXIT_OK = 0
 """Everything fine."""
@@ -103,6 +94,34 @@ class InputError(ValueError):
     def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Fault, ...]]]:
         """Pickle by the faults (worker processes send errors back)."""
         return (type(self), (self.faults,))
+
+
+def refuse(faults: Iterable[Fault]) -> None:
+    """Raise `InputError` with all faults that were found; nothing happens where there are none."""
+    if found := tuple(faults):
+        raise InputError(found)
+
+
+class gathered:
+    """Add the faults of what is refused inside to others, and go on.
+
+    >>> faults = []
+    >>> with gathered(faults):
+    ...     raise InputError(Fault("a.csv", "", "no rows", "one row or more"))
+    >>> len(faults)
+    1
+    """
+
+    def __init__(self, faults: list[Fault]) -> None:
+        self._faults = faults
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: object, trace: object) -> bool:
+        """Whether it was a refusal."""
+        self._faults += error.faults if isinstance(error, InputError) else ()
+        return isinstance(error, InputError)
 
 
 def system_fault(error: OSError, file: str = "", expected: str = "a file or folder that can be used") -> Fault:

@@ -120,18 +120,10 @@ def _whole(value: Any) -> Any:
 
 
 def entry(
-    meaning: str,
-    unit: str | FieldLimits = "",
-    low: float = -math.inf,
-    high: float = math.inf,
-    suspect: Callable[[Any], str] | None = None,
-    *,
-    default: Any = None,
-    required: bool = False,
-    choices: Iterable[str] = (),
-    words: str = "",
-    alias: str | None = None,
-) -> Any:
+    meaning: str, unit: str | FieldLimits = "", low: float = -math.inf, high: float = math.inf,
+    suspect: Callable[[Any], str] | None = None, *, default: Any = None, required: bool = False,
+    choices: Iterable[str] = (), words: str = "", alias: str | None = None,
+) -> Any:  # fmt: skip
     """Declare one field of a :class:`Table`: what it means, its unit and range (or those of another), its default."""
     made = Field(... if required else default, description=meaning, alias=alias)
     made.metadata.append(

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import UNITS, convert, split_suffix
 
 
@@ -29,8 +29,7 @@ class Collector:
 
     def check(self) -> None:
         """Raise the faults so far, if any."""
-        if self.faults:
-            raise InputError(self.faults)
+        refuse(self.faults)
 
     def refuse(self, where: object, got: str, expected: str, hint: str = "") -> NoReturn:
         """Raise the faults so far, with this one as the last."""

@@ -72,26 +72,12 @@ def _table() -> dict[str, Unit]:
         "density": {"kg_m3": 1.0, "g_cm3": 1e3},
         "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": KGF, "gf": KGF * 1e-3, "lbf": LBF, "ozf": OZF},
         "torque": {
-            "Nm": 1.0,
-            "mNm": 1e-3,
-            "Ncm": 1e-2,
-            "Nmm": 1e-3,
-            "kgf_m": KGF,
-            "kgf_cm": KGF * 1e-2,
-            "gf_cm": KGF * 1e-5,
-            "lbf_in": LBF * INCH,
-            "lbf_ft": LBF * FOOT,
-            "ozf_in": OZF * INCH,
+            "Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "Nmm": 1e-3, "kgf_m": KGF, "kgf_cm": KGF * 1e-2, "gf_cm": KGF * 1e-5,
+            "lbf_in": LBF * INCH, "lbf_ft": LBF * FOOT, "ozf_in": OZF * INCH,
         },
         "power": {"W": 1.0, "kW": 1e3, "hp": HP},
         "pressure": {
-            "Pa": 1.0,
-            "hPa": 1e2,
-            "mbar": 1e2,
-            "kPa": 1e3,
-            "bar": 1e5,
-            "inHg": 3386.389,
-            "mmHg": 133.3224,
+            "Pa": 1.0, "hPa": 1e2, "mbar": 1e2, "kPa": 1e3, "bar": 1e5, "inHg": 3386.389, "mmHg": 133.3224,
             "psi": LBF / INCH**2,
         },
         "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
@@ -99,7 +85,7 @@ def _table() -> dict[str, Unit]:
         "current": {"A": 1.0, "mA": 1e-3},
         "fraction": {"pct": 1e-2},
         "viscosity": {"Pa_s": 1.0},
-    }
+    }  # fmt: skip
     out = {s: Unit(s, dim, f) for dim, units in groups.items() for s, f in units.items()}
     out["K"] = Unit("K", "temperature", 1.0)
     out["C"] = Unit("C", "temperature", 1.0, ZERO_CELSIUS)

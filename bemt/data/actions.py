@@ -103,4 +103,4 @@ def fetch(
 
     where, archive = (None if path is None else os.fspath(path) for path in (out, source))
     found = database.get(kind, database.folder_of(kind, where), archive, url, refresh, bytes_had)
-    return Told(found, database.text(found))
+    return Told(found.document(), found.text)

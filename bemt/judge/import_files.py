@@ -94,7 +94,7 @@ def import_(
     from bemt.base.errors import Fault, InputError
     from bemt.base.given import paths_text
     from bemt.data.recordings import cfd_options, load
-    from bemt.data.recordings.choice import asked
+    from bemt.data.recordings.adapt import asked
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
@@ -106,7 +106,7 @@ def import_(
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
     lines, insist = [], any(told.values()) or any(run.values()) or out is not None
     if insist and (table := _table(names, run)):
-        from bemt.data.recordings.stated import write_recording
+        from bemt.data.recordings.cfd_options import write_recording
 
         if out is None:
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
@@ -116,17 +116,19 @@ def import_(
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
-    found = load.document(names, format, choice, made, insist)
-    if out is not None and found["runs"]:
-        made = made.model_copy(update={"run": made.run.model_copy(update={"files": tuple(found["runs"][-1]["files"])})})
+    found = load.import_files(names, format, choice, made, insist)
+    if out is not None and found.runs:
+        own = tuple(found.runs[-1].provenance["files"])
+        made = made.model_copy(update={"run": made.run.model_copy(update={"files": own})})
         wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
+    document = found.document()
     if case is not None:
         runs: list[Any] = [] if wrote else load.runs_of(names, made)[0]  # as the options say, not as the files do
-        rest = [f["path"] for f in found["files"] if f["kind"] != "cfd"] if runs else names
+        rest = [f.path for f in found.files if f.record is None or f.record.kind != "cfd"] if runs else names
         seen = [wrote] if wrote else [*runs, *rest]
-        sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
+        sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
-    return Told(found, "\n".join([*lines, load.text(found, wrote)]), exit_code=load.exit_code(found))
+    return Told(document, "\n".join([*lines, found.text(wrote)]), exit_code=found.exit_code)
 
 
 def words(given: Mapping[str, str]) -> list[str]:
@@ -155,7 +157,7 @@ def _beside(
 ) -> tuple[str, dict[str, Any]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
     from bemt.base.tables import write_atomic
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     speed = [rpm] if rpm is not None and not stated else []

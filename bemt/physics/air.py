@@ -26,7 +26,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, ZERO_CELSIUS
 
 R_DRY = 287.05287
@@ -137,8 +137,7 @@ def _within(given: Sequence[tuple[str, float, float, float, str, str]]) -> None:
         for name, value, low, high, unit, hint in given
         if not low <= value <= high
     ]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 @dataclass(frozen=True)
@@ -164,8 +163,7 @@ class Air:
             for name in ("rho", "mu", "a_sound", "temperature_K")
             if not _positive(value := getattr(self, name))
         ]
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
 
     @property
     def temperature(self) -> float:

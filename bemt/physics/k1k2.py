@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
@@ -80,8 +80,7 @@ def _check(D: Array, pitch: Array, rpm: Array, V: Array, rho: Array, hub: Array)
     ]
     if not faults and np.any(hub >= D):
         faults.append(Fault("", "hub_diameter_m", f"{float(np.max(hub)):g}", "less than the diameter"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def pitch_speed(rpm: ArrayLike, pitch_m: ArrayLike) -> Any:
@@ -106,13 +105,9 @@ def zero_thrust_J(diameter_m: ArrayLike, pitch_m: ArrayLike) -> Any:
 
 
 def thrust(
-    diameter_m: ArrayLike,
-    pitch_m: ArrayLike,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    rho: ArrayLike = RHO_FIXED,
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, rho: ArrayLike = RHO_FIXED,
     hub_diameter_m: ArrayLike = 0.0,
-) -> Any:
+) -> Any:  # fmt: skip
     """Thrust by the K1/K2 model. [N]
 
     Reference [1] of the module, final equation of part 1.  Its worked example: 10x6 at 10 500 rev/min, 1619 gf.
@@ -162,14 +157,9 @@ def validity_flags(d_over_p: float, M_tip: float = 0.0, J: float = 0.0, ducted: 
 
 
 def estimate(
-    diameter_m: ArrayLike,
-    pitch_m: ArrayLike,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    air: Air | None = None,
-    hub_diameter_m: ArrayLike = 0.0,
-    ducted: bool = False,
-) -> Dataset:
+    diameter_m: ArrayLike, pitch_m: ArrayLike, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None,
+    hub_diameter_m: ArrayLike = 0.0, ducted: bool = False,
+) -> Dataset:  # fmt: skip
     """Thrust by the K1/K2 model with coefficients, uncertainty and flags.
 
     >>> from bemt.base.units import KGF

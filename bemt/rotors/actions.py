@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from bemt.base.action import Count, Told, action
 
@@ -329,11 +329,11 @@ def validate(
         raise InputError(Fault("", "--reynolds", f"{reynolds:g}", "a Reynolds number from 1e3 to 1e9"))
     effects = propellers.effects_without(off)
     found = [propellers.where(name) for name in paths_text("folders", folders, 1)]
-    document = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
+    made = propellers.validate(found, effects, reynolds, progress, match_J0=match_J0, as_drawn=as_drawn)
     if out is not None:
-        propellers.write(document, os.fspath(out))
-    code = EXIT_UNCONVERGED if document["unconverged"] else EXIT_OK
-    return Told(document, propellers.text(document), exit_code=code)
+        propellers.write(made, os.fspath(out))
+    code = EXIT_UNCONVERGED if made.unconverged else EXIT_OK
+    return Told(made.document(), propellers.text(made), exit_code=code)
 
 
 @action("Models and checks", "calibrate uiuc --out calibration", words=("files",))
@@ -376,10 +376,11 @@ def calibrate(
 
     from bemt.base.given import paths_text
     from bemt.rotors import k1k2_calibration as k1k2
+    from bemt.rotors.k1k2_points import read
 
     fitted, held = paths_text("files", files), paths_text("test", test)
-    points, scored = k1k2.read(fitted, held)
-    found: dict[str, Any] = k1k2.document(points, scored, fitted, held, progress or (lambda line: None))
+    points, scored = read(fitted, held)
+    found = k1k2.calibrate(points, scored, fitted, held, progress or (lambda line: None))
     if out is not None:
         k1k2.write(found, os.fspath(out))
-    return Told(found, k1k2.text(found))
+    return Told(found.document(), k1k2.text(found))

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.physics import coefficients as co
-from bemt.rotors.conditioning import Conditioned, condition
+from bemt.rotors.conditioning import SESSION, Conditioned, ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import Prior
 from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import WEIGHTS, population
 from bemt.rotors.predict import sense
-from bemt.rotors.reference import SESSION, ReferenceRun, noise_of_run, scatter
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air

@@ -11,8 +11,7 @@ Schema ``bemt.calibration/2``: ``k1k2``, ``scores`` (``calibration`` and ``test`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import find_data
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.base.units import INCH
 from bemt.physics import k1k2 as empirical
-from bemt.rotors.k1k2_points import FitPoints, files, load
+from bemt.rotors.k1k2_points import FitPoints
 
 # K1 and K2 from measured points: robust regression in logarithms, bootstrap over propellers, the thesis's goal-seek.
 #
@@ -41,8 +40,7 @@ SEED = 20240617
 DRAWS = 1000
 
 
-@dataclass(frozen=True)
-class K1K2:
+class K1K2(Documented):
     """Constants with their 95 % intervals."""
 
     # Constants [-]
@@ -185,6 +183,77 @@ def left_out(points: FitPoints, flight: bool = False) -> Array:
 
 Mask = NDArray[np.bool_]
 
+
+class Hits(Documented):
+    """Made over measured values: their median, and which share is near."""
+
+    points: int
+    median: float | None
+    within_13: float | None
+    within_26: float | None
+
+    def __str__(self) -> str:
+        if not self.points or self.median is None or self.within_13 is None or self.within_26 is None:
+            return "-"
+        return f"{self.median:.2f} {100 * self.within_13:3.0f} {100 * self.within_26:3.0f}"
+
+
+class BandScore(Documented):
+    """Models over some of the points."""
+
+    propellers: int
+    points: int
+    models: Mapping[str, Hits]
+    quantity: str | None = None
+    band: str | None = None
+    motion: str | None = None
+
+
+class Scores(Documented):
+    """Models over all points and in bands."""
+
+    static: BandScore
+    flight: BandScore
+    x: tuple[BandScore, ...]  # By J/(P/D)
+    bands: tuple[BandScore, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Plain values; the bands of J/(P/D) by that name."""
+        own = super().document()
+        return own | {"J/(P/D)": own.pop("x")}
+
+
+class Counts(Documented):
+    """What there is of the data."""
+
+    propellers: int
+    points: int
+    static: int
+    ducted: int
+
+    @classmethod
+    def of(cls, points: FitPoints) -> Counts:
+        """Of points that were read."""
+        still, ducted = int(np.count_nonzero(points.J == 0)), sum(p.ducted for p in points.propellers)
+        return cls(len(points.propellers), int(points.rpm.size), still, ducted)
+
+
+class Calibration(Documented):
+    """``bemt.calibration/2``; of the test None where there is none."""
+
+    files: tuple[str, ...]
+    test_files: tuple[str, ...]
+    data: Mapping[str, Counts | None]
+    k1k2: Mapping[str, K1K2]
+    scores: Mapping[str, Scores | None]
+    refused: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"schema": SCHEMA, **super().document()}
+
+
 SCHEMA = "bemt.calibration/2"
 NAMES = {
     "thesis": "K1/K2, thesis", "goal_seek": "K1/K2, goal-seek", "refit": "K1/K2, refit at rest",
@@ -196,20 +265,9 @@ X_MAX = 0.8
 """J/(P/D) up to which relative errors in flight are counted: thrust vanishes soon after [-]."""
 X_EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2)
 _EDGES: dict[str, tuple[float, ...]] = {
-    "P/D": (0.0, 0.4, 0.6, 0.8, 1.0, np.inf),
-    "diameter [in]": (0.0, 6.0, 9.0, 12.0, 16.0, np.inf),
-    "tip Mach": (0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, np.inf),
-    "blades": (1.5, 2.5, 3.5, 4.5, np.inf),
-}
-
-
-def _counts(points: FitPoints) -> dict[str, int]:
-    return {
-        "propellers": len(points.propellers),
-        "points": int(points.rpm.size),
-        "static": int(np.count_nonzero(points.J == 0)),
-        "ducted": sum(p.ducted for p in points.propellers),
-    }
+    "P/D": (0.0, 0.4, 0.6, 0.8, 1.0, np.inf), "diameter [in]": (0.0, 6.0, 9.0, 12.0, 16.0, np.inf),
+    "tip Mach": (0.0, 0.1, 0.15, 0.2, 0.25, 0.3, 0.5, np.inf), "blades": (1.5, 2.5, 3.5, 4.5, np.inf),
+}  # fmt: skip
 
 
 def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, K1K2]:
@@ -226,31 +284,22 @@ def _k1k2(points: FitPoints, draws: int, notes: list[str]) -> dict[str, K1K2]:
 
 
 def calibrate(
-    points: FitPoints,
-    test: FitPoints | None = None,
-    draws: int = DRAWS,
-    progress: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
-    """Fit, leave out, score."""
+    points: FitPoints, test: FitPoints | None, given: Sequence[str] = (), held: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda line: None,
+) -> Calibration:  # fmt: skip
+    """Fit, leave out, score; the names of the files stand in the document."""
     notes = [*points.notes, *(test.notes if test else ())]
-    if progress:
-        progress("K1 and K2")
-    k1k2 = _k1k2(points, draws, notes)
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "data": {"calibration": _counts(points), "test": _counts(test) if test else None},
-        "k1k2": {name: asdict(c) for name, c in k1k2.items()},
-        "scores": {"calibration": None, "test": None},
-    }
-    for name, which in (("calibration", points), ("test", test)):
-        if which is None:
-            continue
-        CT = {key: CT_k1k2(which, c.K1, c.K2) for key, c in k1k2.items()}
-        for key, in_flight in (("refit", False), ("refit_flight", True)) if name == "calibration" else ():
-            if key in k1k2:
-                CT[key] = left_out(which, in_flight)
-        document["scores"][name] = score(which, CT)
-    return document | {"refused": [*points.refused, *(test.refused if test else ())], "notes": notes}
+    progress("K1 and K2")
+    k1k2 = _k1k2(points, DRAWS, notes)
+    CT = {key: CT_k1k2(points, c.K1, c.K2) for key, c in k1k2.items()}
+    CT |= {key: left_out(points, key == "refit_flight") for key in ("refit", "refit_flight") if key in k1k2}
+    tested = None if test is None else score(test, {key: CT_k1k2(test, c.K1, c.K2) for key, c in k1k2.items()})
+    return Calibration(
+        tuple(Path(f).name for f in given or ["uiuc"]), tuple(Path(f).name for f in held),
+        {"calibration": Counts.of(points), "test": Counts.of(test) if test else None}, k1k2,
+        {"calibration": score(points, CT), "test": tested},
+        (*points.refused, *(test.refused if test else ())), tuple(notes),
+    )  # fmt: skip
 
 
 def flight(points: FitPoints) -> Mask:
@@ -258,22 +307,18 @@ def flight(points: FitPoints) -> Mask:
     return (points.J > 0) & (points.x < X_MAX)
 
 
-def ratios(ratio: Array) -> dict[str, Any]:
+def ratios(ratio: Array) -> Hits:
     """Count ratios of made to measured values. [-]
 
     >>> ratios(np.array([1.0, 1.1, 1.2, 2.0]))
-    {'points': 4, 'median': 1.15, 'within_13': 0.5, 'within_26': 0.75}
+    Hits(points=4, median=1.15, within_13=0.5, within_26=0.75)
     """
     if ratio.size == 0:
-        return {"points": 0, "median": None, "within_13": None, "within_26": None}
+        return Hits(0, None, None, None)
     e = np.where(np.isfinite(ratio), np.abs(ratio - 1.0), np.inf)
     median = float(np.median(ratio[np.isfinite(ratio)])) if np.any(np.isfinite(ratio)) else None
-    return {
-        "points": int(ratio.size),
-        "median": median,
-        "within_13": float(np.mean(e <= NEAR + 1e-12)),
-        "within_26": float(np.mean(e <= FAR + 1e-12)),
-    }
+    near, far = (float(np.mean(e <= limit + 1e-12)) for limit in (NEAR, FAR))
+    return Hits(int(ratio.size), median, near, far)
 
 
 def _labels(edges: tuple[float, ...]) -> list[str]:
@@ -285,175 +330,76 @@ def _labels(edges: tuple[float, ...]) -> list[str]:
     ]
 
 
-def score(points: FitPoints, models: Mapping[str, Array]) -> dict[str, Any]:
+def score(points: FitPoints, models: Mapping[str, Array]) -> Scores:
     """Score models of CT over all points and in bands."""
     open_rotors, positive = ~points.ducted, points.CT > 0
-    still, moving = points.J == 0, flight(points)
+    motions = {"static": points.J == 0, "flight": flight(points)}
 
-    def row(mask: Mask) -> dict[str, Any]:
+    def row(mask: Mask, quantity: str | None = None, band: str | None = None, motion: str | None = None) -> BandScore:
         m = mask & positive
-        found: dict[str, Any] = {"propellers": int(np.unique(points.index[m]).size), "points": int(m.sum())}
-        found["models"] = {name: ratios(CT[m] / points.CT[m]) for name, CT in models.items()}
-        return found
+        hits = {name: ratios(CT[m] / points.CT[m]) for name, CT in models.items()}
+        return BandScore(int(np.unique(points.index[m]).size), int(m.sum()), hits, quantity, band, motion)
 
-    out: dict[str, Any] = {"static": row(still & open_rotors), "flight": row(moving & open_rotors)}
-    x = points.x
-    out["J/(P/D)"] = [
-        {"band": f"{a:.1f} to {b:.1f}", **row((points.J > 0) & (x >= a) & (x < b) & open_rotors)}
-        for a, b in zip(X_EDGES[:-1], X_EDGES[1:], strict=True)
+    x, edges = points.x, zip(X_EDGES[:-1], X_EDGES[1:], strict=True)
+    by_x = [row((points.J > 0) & (x >= a) & (x < b) & open_rotors, band=f"{a:.1f} to {b:.1f}") for a, b in edges]
+    values = {"P/D": points.P_D, "diameter [in]": points.of("diameter_m") / INCH, "tip Mach": points.M_tip,
+              "blades": points.of("blades")}  # fmt: skip
+    parts = [
+        (quantity, label, (v >= a) & (v < b) & open_rotors)
+        for quantity, v in values.items()
+        for label, a, b in zip(_labels(_EDGES[quantity]), _EDGES[quantity][:-1], _EDGES[quantity][1:], strict=True)
     ]
-    values = {
-        "P/D": points.P_D,
-        "diameter [in]": points.of("diameter_m") / INCH,
-        "tip Mach": points.M_tip,
-        "blades": points.of("blades"),
-    }
-    rows: list[dict[str, Any]] = []
-    for quantity, v in values.items():
-        edges = _EDGES[quantity]
-        for label, a, b in zip(_labels(edges), edges[:-1], edges[1:], strict=True):
-            for motion, where in (("static", still), ("flight", moving)):
-                found = row((v >= a) & (v < b) & where & open_rotors)
-                if found["points"]:
-                    rows.append({"quantity": quantity, "band": label, "motion": motion, **found})
-    for label, duct in (("no", open_rotors), ("yes", ~open_rotors)):
-        for motion, where in (("static", still), ("flight", moving)):
-            found = row(duct & where)
-            if found["points"]:
-                rows.append({"quantity": "ducted", "band": label, "motion": motion, **found})
-    out["bands"] = rows
-    return out
+    parts += [("ducted", "no", open_rotors), ("ducted", "yes", ~open_rotors)]
+    rows = [row(mask & where, q, label, motion) for q, label, mask in parts for motion, where in motions.items()]
+    still, moving = (row(where & open_rotors) for where in motions.values())
+    return Scores(still, moving, tuple(by_x), tuple(r for r in rows if r.points))
 
 
-def _found(name: str) -> str:
-    """Path as given, or the database of this name (``uiuc/volume-2``)."""
-    return name if Path(name).exists() else str(find_data(name) or name)
-
-
-def _resolved(name: str) -> frozenset[Path]:
-    """Files that a name stands for, each under its one true name."""
-    return frozenset(file.resolve() for file in files(Path(_found(name))))
-
-
-def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
-    """Names that stand for files seen before; what they stand for is added to those."""
-    faults = []
-    hint = "Held-out data must not be fitted" if option == "--test" else "FitPoints that count twice weigh twice"
-    for name in names:
-        own = _resolved(name)
-        again = sorted(own & seen.keys())
-        if again:
-            some = ", ".join(file.name for file in again[:3]) + (", ..." if len(again) > 3 else "")
-            got = f"files that {seen[again[0]]} holds too ({len(again)}: {some})"
-            faults.append(Fault(option, name, got, "every file once", hint))
-        seen |= {file: f"{option} {name}" for file in own if file not in seen}
-    return faults
-
-
-def _read(given: Sequence[str], test: Sequence[str]) -> tuple[FitPoints, FitPoints | None]:
-    """FitPoints to fit, and held out; all faults of both at once."""
-    seen: dict[Path, str] = {}
-    faults = _twice("FILES", given, seen)
-    faults += _twice("--test", test, seen)
-    found = frozenset[Path]() if given else _resolved("uiuc")
-    held = found & seen.keys()  # of the data that nobody named
-    names = given or ["uiuc"]
-    if held and held == found:
-        faults.append(Fault("--test", "", "all of the data found", "less than all", "Or name other FILES to fit"))
-        names = []
-    read: list[FitPoints] = []
-    for which, without in ((names, held), (test, frozenset[Path]())):
-        try:
-            read += [load(map(_found, which), without)] if which else []
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
-    points = read[0]
-    if held:
-        note = f"{len(held)} files of --test are left out of uiuc before the fit, with all runs of their propellers"
-        points = replace(points, notes=(note, *points.notes))
-    return points, read[1] if test else None
-
-
-def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, FitPoints | None]:
-    """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
-    if not given and find_data("uiuc") is None:
-        hint = "Name files, or fetch a database: bemt lab fetch uiuc"
-        raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
-    return _read(given, test)
-
-
-def document(
-    points: FitPoints,
-    test: FitPoints | None,
-    given: Sequence[str],
-    held: Sequence[str],
-    progress: Callable[[str], None],
-) -> dict[str, Any]:
-    """Do as `calibrate`, with the names of the files in the document."""
-    found = calibrate(points, test, progress=progress)
-    names = {"files": [Path(f).name for f in given or ["uiuc"]], "test_files": [Path(f).name for f in held]}
-    return {"schema": found["schema"], **names, **found}
-
-
-def write(found: dict[str, Any], out: str | Path) -> None:
+def write(found: Calibration, out: str | Path) -> None:
     """Write calibration.json and .txt."""
-    folder = Path(out)
-    write_atomic(folder / "calibration.json", json_text(found))
-    write_atomic(folder / "calibration.txt", text(found) + "\n")
+    write_atomic(Path(out) / "calibration.json", json_text(found.document()))
+    write_atomic(Path(out) / "calibration.txt", text(found) + "\n")
 
 
-def _cell(row: Mapping[str, Any] | None) -> str:
-    if not row or not row["points"] or row["median"] is None:
-        return "-"
-    return f"{row['median']:.2f} {100 * row['within_13']:3.0f} {100 * row['within_26']:3.0f}"
-
-
-def _totals(found: Mapping[str, Any]) -> str:
-    rows = []
-    for key in found["static"]["models"]:
-        row = [NAMES.get(key, key), _cell(found["static"]["models"][key]), _cell(found["flight"]["models"][key])]
-        row += [_cell(band["models"][key])[:4] for band in found["J/(P/D)"][:5]]
-        rows.append(row)
-    header = ["thrust, made/measured: median, % in 13, 26 %", "at rest", "in flight"]
-    return text_table([*header, *[band["band"] for band in found["J/(P/D)"][:5]]], rows, indent="  ")
-
-
-def _set(name: str, found: Mapping[str, Any]) -> list[str]:
-    s, f = found["static"], found["flight"]
+def _set(name: str, found: Scores) -> list[str]:
+    s, f = found.static, found.flight
     title = {"calibration": "CALIBRATION, fitted models with the propeller left out", "test": "TEST, held out"}[name]
-    models = [k for k in ("thesis", "refit") if k in s["models"]]
+    totals = [
+        [NAMES.get(k, k), str(s.models[k]), str(f.models[k]), *[str(band.models[k])[:4] for band in found.x[:5]]]
+        for k in s.models
+    ]
+    first = [
+        "thrust, made/measured: median, % in 13, 26 %", "at rest", "in flight", *[str(b.band) for b in found.x[:5]],
+    ]  # fmt: skip
+    models = [k for k in ("thesis", "refit") if k in s.models]
     rows = [
-        [r["quantity"], r["band"], r["motion"], str(r["propellers"]), str(r["points"]),
-         *[_cell(r["models"][k]) for k in models]]
-        for r in found["bands"]
+        [str(r.quantity), str(r.band), str(r.motion), str(r.propellers), str(r.points),
+         *[str(r.models[k]) for k in models]]
+        for r in found.bands
     ]  # fmt: skip
     header = ["where", "band", "motion", "propellers", "points", *[NAMES[k] for k in models]]
     return [
         "",
-        f"{title}: {s['points']} points of {s['propellers']} propellers at rest, {f['points']} of "
-        f"{f['propellers']} in flight (J/(P/D) below 0.8)",
-        _totals(found),
+        f"{title}: {s.points} points of {s.propellers} propellers at rest, {f.points} of {f.propellers} in flight "
+        "(J/(P/D) below 0.8)",
+        text_table(first, totals, indent="  "),
         "",
         text_table(header, rows, left=(0, 1, 2), indent="  "),
     ]
 
 
-def text(doc: Mapping[str, Any]) -> str:
+def text(doc: Calibration) -> str:
     """Tables for people."""
     rows = []
-    for key, c in doc["k1k2"].items():
-        spans = [f"{c[k][0]:.4f} to {c[k][1]:.4f}" if c[k][0] == c[k][0] else "-" for k in ("K1_95", "K2_95")]
-        rows.append([NAMES[key], f"{c['K1']:.4f}", spans[0], f"{c['K2']:.3f}", spans[1], str(c["points"] or "-"),
-                     str(c["propellers"] or "-")])  # fmt: skip
+    for key, c in doc.k1k2.items():
+        spans = [f"{low:.4f} to {high:.4f}" if low == low else "-" for low, high in (c.K1_95, c.K2_95)]
+        rows.append([NAMES[key], f"{c.K1:.4f}", spans[0], f"{c.K2:.3f}", spans[1], str(c.points or "-"),
+                     str(c.propellers or "-")])  # fmt: skip
     header = ["F = rho A (vp^2 - vp V) (K1 D/p)^K2", "K1", "95 % (bootstrap)", "K2", "95 %", "points", "propellers"]
     lines = [text_table(header, rows)]
-    for name, found in doc["scores"].items():
-        if found is not None:
-            lines += _set(name, found)
-    if doc["refused"]:
-        lines += ["", f"Left out ({len(doc['refused'])}):", *[f"  {line}" for line in doc["refused"][:10]]]
-        lines += [f"  and {len(doc['refused']) - 10} more (--json lists them)"] if len(doc["refused"]) > 10 else []
-    lines += [f"note: {note}" for note in doc["notes"][:10]]
-    return "\n".join(lines)
+    for name, found in doc.scores.items():
+        lines += _set(name, found) if found is not None else []
+    if doc.refused:
+        lines += ["", f"Left out ({len(doc.refused)}):", *[f"  {line}" for line in doc.refused[:10]]]
+        lines += [f"  and {len(doc.refused) - 10} more (--json lists them)"] if len(doc.refused) > 10 else []
+    return "\n".join([*lines, *(f"note: {note}" for note in doc.notes[:10])])

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.given import find_data
 from bemt.base.tables import number_of
 from bemt.base.units import INCH, ZERO_CELSIUS
 from bemt.data import readers as importers
@@ -309,6 +310,56 @@ def load(paths: Iterable[str | os.PathLike[str]], without: frozenset[Path] = fro
         rows += made
         refused += why
         notes += note
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return join(rows, refused, notes)
+
+
+def _found(name: str) -> str:
+    """Path as given, or the database of this name (``uiuc/volume-2``)."""
+    return name if Path(name).exists() else str(find_data(name) or name)
+
+
+def _resolved(name: str) -> frozenset[Path]:
+    """Files that a name stands for, each under its one true name."""
+    return frozenset(file.resolve() for file in files(Path(_found(name))))
+
+
+def _twice(option: str, names: Iterable[str], seen: dict[Path, str]) -> list[Fault]:
+    """Names that stand for files seen before; what they stand for is added to those."""
+    faults = []
+    hint = "Held-out data must not be fitted" if option == "--test" else "FitPoints that count twice weigh twice"
+    for name in names:
+        own = _resolved(name)
+        again = sorted(own & seen.keys())
+        if again:
+            some = ", ".join(file.name for file in again[:3]) + (", ..." if len(again) > 3 else "")
+            got = f"files that {seen[again[0]]} holds too ({len(again)}: {some})"
+            faults.append(Fault(option, name, got, "every file once", hint))
+        seen |= {file: f"{option} {name}" for file in own if file not in seen}
+    return faults
+
+
+def read(given: Sequence[str], test: Sequence[str] = ()) -> tuple[FitPoints, FitPoints | None]:
+    """FitPoints to fit (of the data found when none are named) and held-out points; all faults of both at once."""
+    if not given and find_data("uiuc") is None:
+        hint = "Name files, or fetch a database: bemt lab fetch uiuc"
+        raise InputError(Fault("FILES", "", "none, and no UIUC data found", "measured propellers", hint))
+    seen: dict[Path, str] = {}
+    faults = _twice("FILES", given, seen)
+    faults += _twice("--test", test, seen)
+    found = frozenset[Path]() if given else _resolved("uiuc")
+    held = found & seen.keys()  # of the data that nobody named
+    names = given or ["uiuc"]
+    if held and held == found:
+        faults.append(Fault("--test", "", "all of the data found", "less than all", "Or name other FILES to fit"))
+        names = []
+    read: list[FitPoints] = []
+    for which, without in ((names, held), (test, frozenset[Path]())):
+        with gathered(faults):
+            read += [load(map(_found, which), without)] if which else []
+    refuse(faults)
+    points = read[0]
+    if held:
+        note = f"{len(held)} files of --test are left out of uiuc before the fit, with all runs of their propellers"
+        points = replace(points, notes=(note, *points.notes))
+    return points, read[1] if test else None

@@ -2,7 +2,7 @@
 
 `measured.npz` holds numbers of our own fit, no measured ones: each propeller of the population was fitted to its
 readings on its stations (`reports/studies/measured_rotors.py`); a dozen smooth readings of that fit then conditioned
-the rotor that its label draws, as those of another piece in another campaign (`bemt.rotors.reference.apart`).
+the rotor that its label draws, as those of another piece in another campaign (`bemt.rotors.conditioning.apart`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from bemt.base.arrays import Array
 from bemt.base.cache import shipped_arrays
 from bemt.data.readers.uiuc_names import FAMILIES, class_of, family_of
+from bemt.rotors.conditioning import SESSION, ReferenceRun, apart, noise_of_run
 from bemt.rotors.latents import NAMES, Prior, Sensed
 from bemt.rotors.population import population
-from bemt.rotors.reference import SESSION, ReferenceRun, apart, noise_of_run
 from geometry.designation import Designation
 
 DATABASE = "UIUC Propeller Database"

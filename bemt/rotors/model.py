@@ -21,8 +21,8 @@ from bemt.rotors.predict import Prediction, Solve, predict, sense
 if TYPE_CHECKING:
     from bemt.physics.air import Air
     from bemt.physics.bem.model import Model
+    from bemt.rotors.conditioning import ReferenceRun
     from bemt.rotors.latents import Prior
-    from bemt.rotors.reference import ReferenceRun
 
 
 def air_fields(air: Air) -> dict[str, Array]:

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.rotors.conditioning import tangents
+from bemt.rotors.conditioning import CAMPAIGN, ReferenceRun, apart, gains_at, tangents
 from bemt.rotors.latents import NAMES, Prior, Sensed, inflow_angle_deg
 from bemt.rotors.population import WEIGHTS, Population
-from bemt.rotors.reference import CAMPAIGN, ReferenceRun, apart, gains_at
 
 # Mixtures of normal laws with one centre: probabilities and quantiles.
 

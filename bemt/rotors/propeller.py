@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bemt.base.action import in_words_of_the_library, worded
-from bemt.base.errors import Fault, InputError
-from bemt.base.face import table_html
+from bemt.base.action import in_words_of_the_library, table_html, worded
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.given import number, numbers, path_text
 from bemt.base.tables import number_of
 from bemt.physics.bem.coaxial import LOADS, RATIOS
@@ -513,8 +512,7 @@ def propeller(
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
     if label is not None and diameter_m is not None:
         faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "nothing, because the label states it"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if label is not None:
         text = fresh.label_text(label, blades, rpm, airspeed_m_s)
         return Propeller(case_of(text), text)

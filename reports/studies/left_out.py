@@ -20,10 +20,9 @@ from population_fit import fit
 from bemt import __version__
 from bemt.base.tables import json_text, plain, write_atomic
 from bemt.physics.coefficients import M_tip
-from bemt.rotors.conditioning import condition
+from bemt.rotors.conditioning import ReferenceRun, condition, noise_of_run, scatter
 from bemt.rotors.latents import Prior
 from bemt.rotors.population import WEIGHTS, Population
-from bemt.rotors.reference import ReferenceRun, noise_of_run, scatter
 from bemt.rotors.validate.points import (
     J_SHARE,
     KINDS,
@@ -111,7 +110,9 @@ def leave_out(seen: Sequence[Observed], name: str, fitted: tuple[Population, Any
             if one.record.static.any() and not one.record.static.all():
                 for on in ("static", "static_and_one"):
                     pools[f"on_{on}"].add_kind(conditioned(one, p, on), "forward")
-    out = {"schema": SCHEMA, "folder": name, "families": families} | {k: pool.total() for k, pool in pools.items()}
+    out = {"schema": SCHEMA, "folder": name, "families": families} | {
+        k: pool.total().document() for k, pool in pools.items()
+    }
     return out | {"transfer": transfer(seen, numbers, say)}
 
 
@@ -128,7 +129,7 @@ def transfer(seen: Sequence[Observed], numbers: Any, say: Say = None) -> dict[st
         for one in mine:
             found = expect(one, replace(p, families={}))
             pool.add(found.rows, found)
-        out[volume] = pool.total()
+        out[volume] = pool.total().document()
     return out
 
 

@@ -23,10 +23,10 @@ from bemt.rotors import measured
 from bemt.rotors.as_measured import as_measured
 from bemt.rotors.case import case_of, fresh
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.conditioning import apart
 from bemt.rotors.measured import MeasuredRotor
 from bemt.rotors.population import Population, population
 from bemt.rotors.predict import predict
-from bemt.rotors.reference import apart
 from bemt.rotors.validate.points import Observed, counted, read_folders
 from bemt.rotors.validate.propellers import effects_without, where
 

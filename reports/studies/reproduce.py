@@ -20,7 +20,7 @@ import numpy as np
 import thesis as th
 
 from bemt import __version__
-from bemt.base.folders import find_data
+from bemt.base.given import find_data
 from bemt.base.units import INCH, KGF, RPM
 from bemt.physics import coefficients as co
 from bemt.physics import k1k2 as k
@@ -32,7 +32,7 @@ UIUC_POINTS, UIUC_PROPELLERS = 4122, 248
 
 
 def find_uiuc() -> Path | None:
-    """Folder of the UIUC data, see :func:`bemt.base.folders.find_data`."""
+    """Folder of the UIUC data, see :func:`bemt.base.given.find_data`."""
     return find_data("uiuc")
 
 

@@ -38,17 +38,8 @@ from bemt.base.packed import MAX_BYTES, packed, unpacked
 from bemt.base.toml_text import Collector
 
 __all__ = [
-    "HEAD_BYTES",
-    "Reader",
-    "SourceText",
-    "decode",
-    "detect",
-    "head_text",
-    "importers",
-    "load_text",
-    "number",
-    "read",
-]
+    "HEAD_BYTES", "Reader", "SourceText", "decode", "detect", "head_text", "importers", "load_text", "number", "read",
+]  # fmt: skip
 
 HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""

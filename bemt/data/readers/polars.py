@@ -467,12 +467,9 @@ def _field(source: SourceText, at: int, line: str, k: int, expected: str) -> flo
 
 
 def _spread(
-    a0: NDArray[np.float64],
-    m0: NDArray[np.float64],
-    table: NDArray[np.float64],
-    alpha: NDArray[np.float64],
+    a0: NDArray[np.float64], m0: NDArray[np.float64], table: NDArray[np.float64], alpha: NDArray[np.float64],
     mach: NDArray[np.float64],
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64]:  # fmt: skip
     """Table (Na0, Nm0) on other axes, linear, held at the ends."""
     on_alpha = np.stack([np.interp(alpha, a0, table[:, j]) for j in range(m0.size)], axis=1)
     return np.stack([np.interp(mach, m0, on_alpha[i]) for i in range(alpha.size)], axis=0)

@@ -20,7 +20,7 @@ import numpy as np
 
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
@@ -98,8 +98,7 @@ class Builder:
 
     def check(self) -> None:
         """Raise the faults so far, if any."""
-        if self.faults:
-            raise InputError(self.faults)
+        refuse(self.faults)
 
     def need(self, *names: str) -> None:
         """Note channels that are not there."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import create_model
 
 from bemt.base import units
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
@@ -225,12 +225,9 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     runs: list[Dataset] = []
     faults: list[Fault] = []
     for name in head.files:
-        try:
+        with gathered(faults):
             runs.append(_run(out.file, Path(path).with_name(name), made))
-        except InputError as error:
-            faults.extend(error.faults)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     joined = _join(runs, head.files)
     warnings = list(joined.notes)
     air = {"pressure_Pa", "temperature_K"} <= joined.values.keys() or "density_kg_m3" in joined
@@ -302,8 +299,7 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
             faults.append(Fault(file, f"columns.{name}.column", got, f"one of {known}"))
         else:
             places[index] = name
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     build = Builder(table, KIND)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal

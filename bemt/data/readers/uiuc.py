@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.tables import number_of
 from bemt.data.readers import HEAD_BYTES
 from bemt.data.readers.uiuc_names import FAMILIES, VARIABLE_PITCH, UiucFile, UiucName, parse_file_name
@@ -237,8 +237,7 @@ def scan_folder(path: str | os.PathLike[str]) -> UiucFolder:
 def read_folder(path: str | os.PathLike[str]) -> list[UiucPropeller]:
     """Import a folder in the archive's layout; refuse it whole when a file of it is faulty."""
     folder = scan_folder(path)
-    if folder.faults:
-        raise InputError(folder.faults)
+    refuse(folder.faults)
     if not folder.propellers:
         hint = "File names such as apce_10x5_geom.txt are expected"
         raise InputError(Fault(os.fspath(path), "", "no propellers", "files in UIUC layout", hint))

@@ -6,16 +6,17 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bemt.base import tables
-from bemt.base.averaging import Mean
-from bemt.base.errors import Fault, InputError
+from bemt.base.averaging import Average, Mean, keep_last, revolution_average
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import packed, unpacked
+from bemt.base.tables import number_of
 from bemt.data.readers import load_bytes, polars, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
@@ -92,44 +93,41 @@ def ranges(lines: Iterable[tuple[int, int]]) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
 
 
-def points_text(found: Mapping[str, Any]) -> list[str]:
+def points_text(reduced: Dataset | str) -> list[str]:
     """Steady points, what was dropped and the notes, as lines of text."""
-    if found["error"] is not None:
-        return [f"  not reduced: {found['error']}"]
-    points = found["points"]
-    names = [k for k in SHOWN if any(_number(p.get(k)) is not None for p in points)]
+    if isinstance(reduced, str):
+        return [f"  not reduced: {reduced}"]
+    how, n = reduction(reduced), len(reduced)
+    values, none = reduced.values, np.full(n, np.nan)
+    names = [k for k in SHOWN if k in values and np.isfinite(values[k]).any()]
     names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
-    head = ["from"]
+    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
     for name in names:
-        head += [name] + ([f"u({name})"] if any(_number(p["u"].get(name)) is not None for p in points) else [])
-    rows = []
-    for p in points[:MOST]:
-        row = [str(p.get("label", "")).rsplit(":", 1)[-1]]
-        for name in names:
-            row.append(tables.number_text(_number(p.get(name)), 5))
-            if f"u({name})" in head:
-                row.append(tables.number_text(_number(p["u"].get(name)), 2))
-        rows.append([*row, ", ".join(p["flags"]) or "-"])
-    many = "" if len(points) <= MOST else f", the first {MOST} of them"
-    what = "one per row" if found["mode"] == "points" else "means of plateaus"
-    out = [f"  {len(points)} steady point{'s' if len(points) > 1 else ''}, {what}{many}:"]
-    out.append(tables.text_table([*head, "flags"], rows, (len(head),), "    "))
+        columns[name] = [tables.number_text(_finite(x), 5) for x in values[name][:MOST]]
+        if np.isfinite(u := reduced.u.get(name, none)).any():
+            columns[f"u({name})"] = [tables.number_text(_finite(x), 2) for x in u[:MOST]]
+    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
+    many = "" if n <= MOST else f", the first {MOST} of them"
+    what = "one per row" if how.mode == "points" else "means of plateaus"
+    out = [f"  {tables.number_of(n, 'steady point')}, {what}{many}:"]
+    rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
+    out.append(tables.text_table(list(columns), rows, (len(columns) - 1,), "    "))
     reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
-    for lost in found["dropped"]:
-        what = "rows" if not lost["channel"] else f"values of {lost['channel']}"
-        reasons.setdefault((what, lost["reason"]), []).append((lost["line"], lost["last"]))
+    for lost in how.dropped:
+        what = "rows" if not lost.channel else f"values of {lost.channel}"
+        reasons.setdefault((what, lost.reason), []).append((lost.line, lost.last))
     for (what, reason), lines in reasons.items():
         text = ranges(lines)
         text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
         out.append(f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
-    for channel, parts in found["correlated"].items():
+    for channel, parts in how.correlated.items():
         words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
         out.append(f"  shared by all points, {channel}: {words}")
-    return out + [f"  . {note}" for note in found["notes"]]
+    return out + [f"  . {note}" for note in reduced.notes]
 
 
-def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
@@ -303,3 +301,77 @@ def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Datase
     if not columns:
         columns = {"diameter_in": np.array([item.diameter_in for item in found])}
     return dataset(form, "bench", _channels(columns), notes, {"file": name})
+
+
+# Averages of one history over whole revolutions, whose duration only the user knows.
+@dataclass(frozen=True)
+class Choice:
+    """What only the user knows."""
+
+    period: float | None = None  # Duration of a revolution [s]; None: no average over revolutions
+    revolutions: int | None = None  # How many; None takes 4, or half of the run
+
+
+def averaged(record: Dataset, period: float, revolutions: int | None = None) -> Dataset:
+    """Replace the means of a history by those over its last whole revolutions.
+
+    >>> import numpy as np
+    >>> t = np.arange(1, 401) * 0.01
+    >>> r = Dataset("cfd", "x", {"time_s": t, "q": 2 + np.sin(2 * np.pi * t)}, units={"q": ""},
+    ...             provenance={"clock": "time", "time_channel": "time_s", "clock_channels": "time_s"})
+    >>> mean = averaged(r, 1.0).provenance["means"]["q"]
+    >>> round(mean.value, 9), mean.over
+    (2.0, 'last 2 revolutions (2 to 4 s, 200 rows)')
+    """
+    name = record.provenance.get("time_channel", "time_s")
+    own = {name, *record.provenance.get("clock_channels", "").split("\t")}
+    if name not in record:
+        note = "no column of time: the speed of rotation is not used"
+        return replace(record, notes=(*record.notes, note))
+    time = record[name]
+    told = record.provenance.get("means", {})
+    index, notes = keep_last(time, name)
+    problems: dict[str, list[str]] = {}
+    scatter: dict[str, float] = {}
+    means: dict[str, Mean] = {}
+    for key, values in record.values.items():
+        if key in own or (key not in told and record.unit(key) == "s"):
+            continue
+        average = revolution_average(time[index], values[index], period, revolutions)
+        turns = average.per_revolution
+        if average.mean and turns and max(turns) - min(turns) > 0.02 * abs(average.mean):
+            scatter[key] = (max(turns) - min(turns)) / abs(average.mean)
+        if average.problem:
+            problems.setdefault(average.problem, []).append(key)
+        if average.mean is not None:
+            means[key] = Mean(average.mean, _span(average), average.drift)
+    more = [
+        f"{'no mean' if 'only' not in text else 'doubtful mean'} of {', '.join(keys)}: {text}"
+        for text, keys in problems.items()
+    ]
+    if scatter:
+        worst = ", ".join(f"{key} {value:.2%}" for key, value in list(scatter.items())[:6])
+        more.append(f"means of single revolutions differ: {worst}")
+    return replace(record, provenance={**record.provenance, "means": means}, notes=(*record.notes, *notes, *more))
+
+
+def _span(average: Average) -> str:
+    turns = f"{average.revolutions} revolution" + ("s" if average.revolutions > 1 else "")
+    return f"last {turns} ({average.start:.6g} to {average.end:.6g} s, {number_of(average.rows, 'row')})"
+
+
+def asked(rpm: float | None = None, period: float | None = None, revolutions: int | None = None) -> Choice:
+    """Make a choice of options, or refuse them, all faults at once."""
+    faults = []
+    if rpm is not None and not (math.isfinite(rpm) and 0.01 <= rpm <= 1e6):
+        faults.append(Fault("", "--rpm", f"{rpm:g}", "a number from 0.01 to 1e6 rev/min"))
+    if period is not None and not (math.isfinite(period) and 6e-5 <= period <= 6e3):
+        faults.append(Fault("", "--period-s", f"{period:g}", "a time from 6e-5 to 6000 s"))
+    if rpm is not None and period is not None:
+        faults.append(Fault("", "--rpm, --period-s", "both", "one of them"))
+    if revolutions is not None and not 1 <= revolutions <= 10**6:
+        faults.append(Fault("", "--revolutions", str(revolutions), "a whole number of 1 or more"))
+    if revolutions is not None and rpm is None and period is None:
+        faults.append(Fault("", "--revolutions", "no speed", "--rpm or --period-s as well"))
+    refuse(faults)
+    return Choice(60.0 / rpm if rpm is not None else period, revolutions)

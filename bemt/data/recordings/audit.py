@@ -164,11 +164,9 @@ def _drift(f: CfdFacts) -> Judged:
 def _wall(f: CfdFacts) -> Judged:
     y = f.y_plus
     words = {
-        "function": "wall functions",
-        "scalable": "scalable wall functions",
-        "automatic": "automatic wall functions",
+        "function": "wall functions", "scalable": "scalable wall functions", "automatic": "automatic wall functions",
         "resolved": "resolved down to the wall",
-    }.get(f.wall, "wall treatment not stated")
+    }.get(f.wall, "wall treatment not stated")  # fmt: skip
     if math.isnan(y):
         return "not stated", f"{words}; y+ not stated", "skin friction and stall unknown", math.nan
     words = f"{words}, mean y+ {y:.3g}"
@@ -241,16 +239,10 @@ def _frame(f: CfdFacts) -> Judged:
 
 
 JUDGES: Mapping[str, Callable[[CfdFacts], Judged]] = {
-    "domain against disk": _domain,
-    "compressibility against tip Mach": _compressibility,
-    "grid study": _grid,
-    "iterative drift": _drift,
-    "balance of mass and momentum": _balance,
-    "wall treatment against y+": _wall,
-    "turbulence model": _turbulence,
-    "where the thrust was read": _thrust,
-    "frozen rotor against inflow": _frame,
-}
+    "domain against disk": _domain, "compressibility against tip Mach": _compressibility, "grid study": _grid,
+    "iterative drift": _drift, "balance of mass and momentum": _balance, "wall treatment against y+": _wall,
+    "turbulence model": _turbulence, "where the thrust was read": _thrust, "frozen rotor against inflow": _frame,
+}  # fmt: skip
 
 
 def audit(facts: CfdFacts) -> tuple[AuditLine, ...]:

@@ -23,9 +23,8 @@ from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
 from bemt.data.recordings.cfd_setup import with_grid_floor
-from bemt.data.recordings.cfd_study import by_grid, groups, together
 from bemt.data.recordings.channels import moves
-from bemt.data.recordings.grid_study import COVERAGE
+from bemt.data.recordings.grid_study import COVERAGE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
 __all__ = ["NO_LOAD", "assemble", "document", "is_run", "run_at", "run_text"]
@@ -342,28 +341,25 @@ _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]",
           "torque_Nm": "torque [N m]", "power_W": "power [W]", "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
 
 
-def run_text(found: Mapping[str, Any]) -> str:
+def run_text(d: Dataset) -> str:
     """A run for a terminal: points with u, what was averaged, what was decided."""
-    points = found["points"]
-    names = [k for k in _SHOWN if any(k in p for p in points)]
-    rows = []
-    for p in points:
-        u = {k: p.get(f"u_{k}", math.nan) for k in names}
-        rows.append(
-            [number_text(p[k], 5) + (f" ± {number_text(u[k], 2)}" if math.isfinite(u[k]) else "") for k in names]
+    averaged, drifts, set_up = (d.provenance[k] for k in ("averaged", "drift", "conditions"))
+    names = [k for k in _SHOWN if k in d]
+    rows = [
+        [number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "") for x, u in zip(*row, strict=True)]
+        for row in zip(
+            zip(*(d[k] for k in names), strict=True), zip(*(d.u[k] for k in names), strict=True), strict=True
         )
-    lines = [f"one run: {', '.join(Path(f).name for f in found['files'])}"]
+    ]
+    lines = [f"one run: {', '.join(Path(f).name for f in d.provenance['files'])}"]
     lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
-    for over in dict.fromkeys(found["averaged"].values()):
-        own = [k.rsplit("_", 1)[0] for k, v in found["averaged"].items() if v == over]
-        drift = ", ".join(
-            f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in found["drift"].items() if found["averaged"].get(k) == over
-        )
+    for over in dict.fromkeys(averaged.values()):
+        own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]
+        drift = ", ".join(f"{k.rsplit('_', 1)[0]} {v:+.2%}" for k, v in drifts.items() if averaged.get(k) == over)
         lines.append(f"  {', '.join(own)}: {over}" + (f"; drift {drift}" if drift else ""))
-    shown = {k: v for k, v in found["conditions"].items() if k not in ("thrust_from", "drift_thrust", "u_grid")}
     words = [
         f"{k.replace('_', ' ')} {'yes' if v is True else 'no' if v is False else f'{v:,.0f}' if k == 'cells' else v}"
-        for k, v in shown.items()
+        for k, v in set_up.items()
+        if k not in ("thrust_from", "drift_thrust", "u_grid")
     ]
-    lines.append(f"  set-up: {', '.join(words)}")
-    return "\n".join([*lines, *(f"  ! {note}" for note in found["notes"])])
+    return "\n".join([*lines, f"  set-up: {', '.join(words)}", *(f"  ! {note}" for note in d.notes)])

@@ -20,13 +20,9 @@ _ROOMS = (slips, columns)
 
 @np.errstate(all="ignore")  # a damaged file may hold any number
 def check(
-    source: Dataset,
-    *,
-    diameter_m: float | None = None,
-    pitch_m: float | None = None,
-    blades: int | None = None,
+    source: Dataset, *, diameter_m: float | None = None, pitch_m: float | None = None, blades: int | None = None,
     ducted: bool = False,
-) -> tuple[Finding, ...]:
+) -> tuple[Finding, ...]:  # fmt: skip
     """Look for faults in a recording.
 
     >>> rpm = [4000.0, 5000.0, 6000.0, 7000.0]

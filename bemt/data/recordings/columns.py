@@ -12,8 +12,7 @@ from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.recordings.channels import shaft_power
-from bemt.data.recordings.findings import MANY, Facts, Finding, check_for
-from bemt.data.recordings.windmilling import zero_thrust_speed
+from bemt.data.recordings.findings import MANY, Facts, Finding, check_for, zero_thrust_speed
 from bemt.physics import coefficients as co
 from bemt.physics.air import LIQUID
 

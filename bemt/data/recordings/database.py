@@ -18,12 +18,14 @@ import shutil
 import stat
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bemt.base.cache import cache_dir
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.packed import MAX_BYTES
 from bemt.base.tables import file_hash, json_text, number_of
@@ -203,13 +205,51 @@ CITE = {
 """What the publisher asks to cite."""
 
 
-def _record(folder: Path) -> dict[str, Any] | None:
+class FetchedData(Documented):
+    """A database in a folder: where it came from, what is in it, and what this run did."""
+
+    sha256: str
+    kind: str = ""
+    folder: str = ""
+    url: str | None = None
+    archive: str | None = None
+    bytes: int = 0
+    files: int = 0
+    propellers: int = 0
+    refused: int = 0
+    cite: str = ""
+    names: Mapping[str, str] | None = None  # Start of the hash of every file, by its path
+    checksum: str | None = None
+    fetched: bool | None = None
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.data/1``."""
+        return {"schema": SCHEMA, "url": None, "archive": None, **super().document()}
+
+    @property
+    def text(self) -> str:
+        """Where the data lie and where they came from."""
+        said = {
+            "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
+            "as recorded": "as recorded at its first use",
+            "replaced": "a different archive than before, as given by --source",
+        }
+        lines = [
+            f"{self.kind}: {self.propellers} propellers, {self.files} files in {self.folder}",
+            f"from {self.url or self.archive}, {self.bytes} bytes",
+            f"sha256 {self.sha256} ({said[self.checksum or 'first use']})",
+        ]
+        if self.refused:
+            lines.append(f"{self.refused} faults in its files; bemt lab calibrate names them")
+        return "\n".join([*lines, f"please cite: {self.cite}"])
+
+
+def _record(folder: Path) -> FetchedData | None:
     """What an earlier run wrote beside the data; None when there is none."""
     try:
-        found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return FetchedData.from_document(json.loads((folder / RECORD).read_text(encoding="utf-8")), lenient=True)
+    except (OSError, ValueError, TypeError):
         return None
-    return found if isinstance(found, dict) and isinstance(found.get("sha256"), str) else None
 
 
 def _files(folder: Path) -> dict[str, str]:
@@ -219,29 +259,25 @@ def _files(folder: Path) -> dict[str, str]:
     return {n: "link" if p.is_symlink() else file_hash(p)[:16] for n, p in names.items() if n != RECORD}
 
 
-def _check_own(folder: Path, known: dict[str, Any]) -> None:
+def _check_own(folder: Path, known: FetchedData) -> None:
     """Refuse to replace a folder that holds more than an earlier run put there."""
-    there, names = _files(folder), known.get("names")
+    there, names = _files(folder), known.names
     hint = "Move them away, or name another folder with --out"
-    if isinstance(names, dict):
+    if names is not None:
         strange = [name for name, start in there.items() if names.get(name) != start]
         got = f"files added or changed since ({len(strange)}): {', '.join(strange[:5])}"
         got += ", ..." if len(strange) > 5 else ""
     else:  # a record of earlier versions: it only counts
-        strange = list(there) if len(there) != known.get("files") else []
-        got = f"{number_of(len(there), 'file')} where its record counts {known.get('files')}"
+        strange = list(there) if len(there) != known.files else []
+        got = f"{number_of(len(there), 'file')} where its record counts {known.files}"
     if strange:
         raise InputError(Fault(os.fspath(folder), "", got, "only what this command put there", hint))
 
 
 def get(
-    kind: str,
-    folder: Path,
-    source: str | Path | None = None,
-    url: str | None = None,
-    refresh: bool = False,
+    kind: str, folder: Path, source: str | Path | None = None, url: str | None = None, refresh: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
+) -> FetchedData:  # fmt: skip
     """Put a database into a folder."""
     from bemt.data.readers.uiuc import scan_folder
 
@@ -252,14 +288,13 @@ def get(
         hint = "Name an empty or new folder with --out"
         raise InputError(Fault(os.fspath(folder), "", "files that this command did not put there", "no folder", hint))
     if known and source is None and not refresh:
-        said = {key: value for key, value in known.items() if key != "names"}
-        return {**said, "folder": os.fspath(folder), "checksum": "as recorded", "fetched": False}
+        return replace(known, names=None, folder=os.fspath(folder), checksum="as recorded", fetched=False)
     if known:
         _check_own(folder, known)
     address = url or URLS[kind]
     if source is None:
         archive = folder.with_name(f".{folder.name}.zip")
-        digest = download(address, archive, known["sha256"] if known else None, progress)
+        digest = download(address, archive, known.sha256 if known else None, progress)
     else:
         archive = Path(source)
         if not archive.is_file():
@@ -272,40 +307,17 @@ def get(
                 expected = "tables such as volume-1/data/apce_10x5_geom.txt"
                 raise InputError(Fault(os.fspath(archive), "", "no propeller", expected, "Is this the archive?"))
             names = _files(fresh)
-            document: dict[str, Any] = {
-                "schema": SCHEMA, "kind": kind, "folder": os.fspath(folder),
-                "url": address if source is None else None, "archive": None if source is None else archive.name,
-                "sha256": digest, "bytes": archive.stat().st_size,
-                "files": len(names), "propellers": len(scan.propellers),
-                "refused": len(scan.faults), "cite": CITE[kind],
-            }  # fmt: skip
-            (fresh / RECORD).write_text(json_text({**document, "names": names}), encoding="utf-8")
+            found = FetchedData(
+                digest, kind, os.fspath(folder), address if source is None else None,
+                None if source is None else archive.name, archive.stat().st_size, len(names), len(scan.propellers),
+                len(scan.faults), CITE[kind],
+            )  # fmt: skip
+            (fresh / RECORD).write_text(json_text(replace(found, names=names).document()), encoding="utf-8")
     finally:
         if source is None:
             archive.unlink(missing_ok=True)
-    same = known is not None and known["sha256"] == digest
-    return {
-        **document,
-        "checksum": "as recorded" if same else "replaced" if known else "first use",
-        "fetched": source is None,
-    }
-
-
-def text(doc: dict[str, Any]) -> str:
-    """Tell where the data lie and where they came from."""
-    said = {
-        "first use": "first use: the publisher gives no hash, so this one is trusted and recorded",
-        "as recorded": "as recorded at its first use",
-        "replaced": "a different archive than before, as given by --source",
-    }
-    lines = [
-        f"{doc['kind']}: {doc['propellers']} propellers, {doc['files']} files in {doc['folder']}",
-        f"from {doc['url'] or doc['archive']}, {doc['bytes']} bytes",
-        f"sha256 {doc['sha256']} ({said[doc['checksum']]})",
-    ]
-    if doc["refused"]:
-        lines.append(f"{doc['refused']} faults in its files; bemt lab calibrate names them")
-    return "\n".join([*lines, f"please cite: {doc['cite']}"])
+    checksum = "first use" if known is None else "as recorded" if known.sha256 == digest else "replaced"
+    return replace(found, checksum=checksum, fetched=source is None)
 
 
 def folder_of(kind: str, given: str | None) -> Path:

@@ -22,7 +22,7 @@ import shlex
 import textwrap
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,9 @@ from bemt.data.readers.cfd_run import RunHead, RunToml
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
+    Choice,
     adapt,
+    averaged,
     damaged_export,
     findings,
     is_recording,
@@ -47,13 +49,13 @@ from bemt.data.recordings.adapt import (
     reduction_of,
 )
 from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
-from bemt.data.recordings.cfd_study import merged, of_table
-from bemt.data.recordings.choice import Choice, averaged
+from bemt.data.recordings.findings import Finding
+from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 
-__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "document", "exit_code", "import_file", "text"]
+__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "import_file", "import_files"]
 
 SCHEMA = "bemt.import/1"
 INTERNAL = "internal error of this program"
@@ -179,13 +181,13 @@ def _before(name: str, start: float) -> bool:
         return False
 
 
-def document(
+def import_files(
     paths: Iterable[str | os.PathLike[str]], format: str | None = None, choice: Choice | None = None,  # noqa: A002
     run: RunToml | None = None, insist: bool = False,
-) -> dict[str, Any]:  # fmt: skip
-    """Read files and give the document ``bemt.import/1``; with ``insist`` they must be the CFD run of ``run``."""
+) -> Imported:  # fmt: skip
+    """Read files; with ``insist`` they must be the CFD run of ``run``."""
     names = [os.fspath(path) for path in paths]
-    runs, to_do = _runs(names, run, insist)
+    runs, to_do = runs_of(names, run, insist)
     if runs or to_do:
         names = [name for name in names if not (Path(name).is_dir() and cfd_files(Path(name)))]
     records: dict[str, Dataset] = {}
@@ -195,16 +197,16 @@ def document(
             records[name] = import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
-    told = {r["name"] for r in runs}
-    runs += [cfd_run.document(d) for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told]
+    told = {d.provenance["file"] for d in runs}
+    runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told)]
     notes = _restart_notes(names, records)
     files = []
     for name in names:
         try:
-            files.append(_entry(name, records.get(name), format, notes.get(name, []), errors.get(name)))
+            files.append(_file(name, format, records.get(name), notes.get(name, []), errors.get(name)))
         except Exception as error:
-            files.append(_entry(name, None, format, [], _refusal(error)))
-    return {"schema": SCHEMA, "files": files, "runs": runs, "to_do": to_do}
+            files.append(ImportedFile(name, format, error=_refusal(error)))
+    return Imported(tuple(files), tuple(runs), to_do)
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
@@ -214,12 +216,6 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     from bemt.data.recordings.cfd_options import run_from
 
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
-
-
-def _runs(names: Sequence[str], run: RunToml | None, insist: bool) -> tuple[list[dict[str, Any]], str | None]:
-    """CFD runs among the paths, as plain values; what exports need to become one."""
-    found, to_do = runs_of(names, run, insist)
-    return [cfd_run.document(d) for d in found], to_do
 
 
 def runs_of(
@@ -281,23 +277,123 @@ def _refusal(error: Exception) -> str:
     return f"{INTERNAL} ({words}). The file may be damaged; please report it with the file"
 
 
-def _entry(
-    name: str, record: Dataset | None, format: str | None, notes: Sequence[str], error: str | None,  # noqa: A002
-) -> dict[str, Any]:  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class ImportedFile:
+    """One file as it was read, or why it was not."""
+
+    path: str
+    format: str | None
+    record: Dataset | None = None
+    reduced: Dataset | str | None = None  # Steady points of a recording, or why there are none
+    means: Mapping[str, Mean] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    warnings: tuple[str, ...] = ()
+    error: str | None = None
+
+    @property
+    def title(self) -> str:
+        """The file in a line."""
+        kind, rows = (self.record.kind, len(self.record)) if self.record else (None, 0)
+        return f"{self.path}: {self.format} ({kind}), {rows} rows"
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        record = self.record
+        return {
+            "path": self.path, "format": self.format, "kind": record.kind if record else None,
+            "rows": len(record) if record else 0,
+            "channels": {k: _shown(record.unit(k), self.means.get(k)) for k in record.values} if record else {},
+            "warnings": list(self.warnings), "error": self.error,
+            "findings": [asdict(finding) for finding in self.findings], "reduction": reduction_document(self.reduced),
+        }  # fmt: skip
+
+    @property
+    def text(self) -> str:
+        """What is in it, for a terminal."""
+        if self.error is not None or self.record is None:
+            if not os.path.exists(self.path):
+                return str(self.error)
+            return f"{self.path}: refused\n  " + str(self.error).replace("\n", "\n  ")
+        lines, rows, plain = [self.title], [], []
+        for name in self.record.values:
+            unit, found = self.record.unit(name), self.means.get(name)
+            if found is None or not math.isfinite(found.value):
+                plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
+                continue
+            drift = "-" if found.drift is None else f"{found.drift:+.2%}"
+            rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
+        if rows:
+            lines.append(
+                tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")
+            )
+        if plain:
+            lead = "  not averaged: " if rows else "  channels: "
+            lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
+        lines += points_text(self.reduced) if self.reduced is not None else []
+        lines += [f"  ! {text}" for text in self.warnings]
+        lines += [
+            f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+        ]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """Files as they were read, the CFD runs among them, and what would make the files one run."""
+
+    files: tuple[ImportedFile, ...]
+    runs: tuple[Dataset, ...]
+    to_do: str | None
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.import/1``."""
+        return {"schema": SCHEMA, "files": [f.document() for f in self.files],
+                "runs": [cfd_run.document(d) for d in self.runs], "to_do": self.to_do}  # fmt: skip
+
+    @property
+    def exit_code(self) -> int:
+        """Worst of all files: 3 when a reader failed, 2 when a file was refused, else 0."""
+        told = [f.error for f in self.files if f.error is not None]
+        return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
+
+    def text(self, wrote: str = "") -> str:
+        """For a terminal, with what to do next with recordings of a rotor."""
+        own = {name for run in self.runs for name in run.provenance["files"]}
+        shown = [f for f in self.files if f.format != RUN or f.error]
+        lines = [f.title if f.path in own else f.text + "\n" for f in shown]
+        lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
+        if self.to_do:
+            steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
+            lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
+        if wrote or self.runs:
+            name = "" if wrote else str(self.runs[0].provenance["file"])
+            study = bool(self.runs[0].provenance.get("studies"))
+            usable = Path(name).is_file() and name.endswith(".toml")
+            usable = usable or any(f.path == name and f.format == RUN for f in self.files)
+            file = wrote or ("study.toml" if study and not usable else name if usable else "run.toml")
+            lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
+            step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+            return "\n".join([*lines, step])
+        read = [(f.path, set(f.record.values)) for f in self.files if f.record]
+        loaded = [path for path, channels in read if "rpm" in channels and _LOADS & channels]
+        if loaded:
+            first, *others = (shlex.quote(path) for path in loaded)
+            lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")
+            if len(others) == 1:
+                lines[-1] += f"      bemt compare {first} {others[0]}\n"
+        return "\n".join(lines)
+
+
+def _file(
+    name: str, format: str | None, record: Dataset | None, notes: Sequence[str], error: str | None  # noqa: A002
+) -> ImportedFile:  # fmt: skip
+    if record is None:
+        return ImportedFile(name, format, warnings=tuple(notes), error=error)
     reduced = _reduced(record)
-    means = _means(record, reduced) if record else {}
-    channels = {k: _shown(record.unit(k), means.get(k)) for k in record.values} if record else {}
-    return {
-        "path": name,
-        "format": record.provenance["format"] if record else format,
-        "kind": record.kind if record else None,
-        "rows": len(record) if record else 0,
-        "channels": channels,
-        "warnings": [*(record.notes if record else ()), *notes],
-        "error": error,
-        "findings": [asdict(finding) for finding in findings(record)] if record else [],
-        "reduction": reduction_document(reduced),
-    }
+    found = ImportedFile(name, record.provenance["format"], record, reduced, _means(record, reduced), findings(record),
+                         (*record.notes, *notes), error)  # fmt: skip
+    found.document()  # what cannot be shown is refused with its file
+    return found
 
 
 def _reduced(record: Dataset | None) -> Dataset | str | None:
@@ -320,76 +416,6 @@ def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
     mean = found.value if found is not None and math.isfinite(found.value) else None
     over = found.over if found is not None and mean is not None else ""
     return {"unit": unit, "mean": mean, "averaged_over": over, "drift": found.drift if found is not None else None}
-
-
-def _file_text(file: Mapping[str, Any]) -> str:
-    if file["error"] is not None:
-        if not os.path.exists(file["path"]):
-            return str(file["error"])
-        return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
-    lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
-    rows, plain = [], []
-    for name, channel in file["channels"].items():
-        if channel["mean"] is None:
-            plain.append(f"{name} [{channel['unit']}]" if channel["unit"] not in ("", "-", "1") else name)
-            continue
-        drift = "-" if channel["drift"] is None else f"{channel['drift']:+.2%}"
-        mean = tables.number_text(channel["mean"], 6)
-        rows.append([name, channel["unit"] or "-", mean, drift, channel["averaged_over"]])
-    if rows:
-        lines.append(tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  "))
-    if plain:
-        lead = "  not averaged: " if rows else "  channels: "
-        lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
-    if file["reduction"] is not None:
-        lines += points_text(file["reduction"])
-    lines += [f"  ! {text}" for text in file["warnings"]]
-    for f in file["findings"]:
-        lines.append(
-            f"  ! {f['severity']}: {f['id']} in {f['channel']}: {f['evidence']}. Suggestion: {f['correction']}"
-        )
-    return "\n".join(lines)
-
-
-def text(found: Mapping[str, Any], wrote: str = "") -> str:
-    """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
-    own = {name for run in found["runs"] for name in run["files"]}
-    lines = [
-        f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"
-        if file["path"] in own
-        else _file_text(file) + "\n"
-        for file in found["files"]
-        if file["format"] != RUN or file["error"]
-    ]
-    lines += [cfd_run.run_text(run) + "\n" for run in found["runs"]]
-    if found["to_do"]:
-        steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
-        lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
-    if wrote or found["runs"]:
-        name = "" if wrote else str(found["runs"][0]["name"])
-        study = bool(found["runs"][0]["studies"])
-        usable = (
-            Path(name).is_file()
-            and name.endswith(".toml")
-            or any(f["path"] == name and f["format"] == RUN for f in found["files"])
-        )
-        file = wrote or ("study.toml" if study and not usable else name if usable else "run.toml")
-        lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
-        step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
-        return "\n".join([*lines, step])
-    loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
-    if loaded:
-        first, *others = (shlex.quote(path) for path in loaded)
-        lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")
-        if len(others) == 1:
-            lines[-1] += f"      bemt compare {first} {others[0]}\n"
-    return "\n".join(lines)
-
-
-def exit_code(found: Mapping[str, Any]) -> int:
-    """Give the worst of all files: 3 when a reader failed, 2 when a file was refused, else 0."""
-    told = [str(file["error"]) for file in found["files"] if file["error"] is not None]
-    return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
 
 def check_format(name: str | None) -> None:

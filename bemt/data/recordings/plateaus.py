@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.base.tables import number_of
 
 OUTLIER = 6.0
@@ -147,11 +147,8 @@ def _running_median(v: Array, half: int) -> Array:
 
 
 def find(
-    time_s: ArrayLike | None,
-    channels: Mapping[str, ArrayLike],
-    signal: str,
-    command: ArrayLike | None = None,
-) -> Plateaus:
+    time_s: ArrayLike | None, channels: Mapping[str, ArrayLike], signal: str, command: ArrayLike | None = None,
+) -> Plateaus:  # fmt: skip
     """Find the plateaus of a recording.
 
     >>> t = np.arange(60) * 0.1
@@ -161,8 +158,7 @@ def find(
     """
     data = {name: np.asarray(v, dtype=float) for name, v in channels.items()}
     t, faults = _checked(time_s, data, signal, command)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     n = len(t)
     notes: list[str] = []
     if back := _backwards(t):
@@ -340,14 +336,8 @@ def _outliers(v: Array) -> NDArray[np.intp]:
 
 
 def _reduce(
-    t: Array,
-    data: Mapping[str, Array],
-    signal: str,
-    command: ArrayLike | None,
-    start: int,
-    stop: int,
-    span: float,
-) -> tuple[Plateau | None, list[Dropped]]:
+    t: Array, data: Mapping[str, Array], signal: str, command: ArrayLike | None, start: int, stop: int, span: float,
+) -> tuple[Plateau | None, list[Dropped]]:  # fmt: skip
     rows = start + np.flatnonzero(np.isfinite(data[signal][start:stop]))
     if len(rows) < LEAST_SAMPLES:
         return None, [Dropped(start, stop, f"fewer than {LEAST_SAMPLES} samples")]

@@ -270,12 +270,9 @@ def _subtract(
 
 
 def _fill_scatter(
-    found: Found,
-    values: Mapping[str, Array],
-    u: dict[str, Array],
-    correlated: dict[str, dict[str, float]],
+    found: Found, values: Mapping[str, Array], u: dict[str, Array], correlated: dict[str, dict[str, float]],
     notes: list[str],
-) -> None:
+) -> None:  # fmt: skip
     """Uncertainty from repeats where a point has none, and the scatter between runs."""
     if "rpm" not in values:
         return
@@ -301,14 +298,9 @@ def _fill_scatter(
 
 
 def _series(
-    records: Sequence[Dataset],
-    found: Found,
-    rec: Dataset,
-    values: Mapping[str, Array],
-    u: Mapping[str, Array],
-    air: AirOfPoints,
-    diameter: float | None,
-) -> Dataset:
+    records: Sequence[Dataset], found: Found, rec: Dataset, values: Mapping[str, Array], u: Mapping[str, Array],
+    air: AirOfPoints, diameter: float | None,
+) -> Dataset:  # fmt: skip
     """Channels and derived ones, as a `Dataset`."""
     n = len(found.points)
     shown = {k: v for k, v in values.items() if k not in ("humidity", "electrical_rpm", "optical_rpm")}

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import shlex
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from bemt import __version__
+from bemt.base.document import Documented
 from bemt.base.tables import or_null
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
 from bemt.judge.compare.matched import LOADS
 from bemt.judge.compare.recordings import IN_WIND, RunChange
+from bemt.judge.compare.smooth_change import Ratio
 from bemt.physics.effects import catalogue
 
 PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
@@ -99,8 +103,8 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
     said = change.leading
     with_case = asked.command(case=asked.case or "CASE")
     checks = {k: check for k in said.effects if (check := _check(k))}
-    loads = [r for r in change.ratios.values() if r["kind"] in LOADS]
-    apart = max((abs(math.log(r["ratio"])) for r in loads), default=0.0)
+    loads = [r for r in change.ratios.values() if r.kind in LOADS]
+    apart = max((abs(math.log(r.ratio)) for r in loads), default=0.0)
     days = math.isnan(change.density_ratio) and apart < _DAY
     if said.verdict == "none" and days and apart > _SEEN:
         return {"text": DAYS, "command": asked.with_days()}
@@ -118,7 +122,7 @@ def next_step(change: RunChange, asked: Invocation) -> dict[str, str]:
         there = {f"air_{letter}": ",".join([*filter(None, [air]), "AIRSPEED"])}
         text = f"state the airspeed of {letter.upper()}, with its unit as in 18m/s"
         return {"text": text, "command": asked.command(**there)}
-    if loads and all(r["extrapolated"] for r in loads):
+    if loads and all(r.extrapolated for r in loads):
         where = "where A was measured"
         c = next(iter(change.loads_by_name.values()))
         if "rpm" in change.a.points:
@@ -164,36 +168,76 @@ def _unrepeatable(change: RunChange) -> str:
     return ""
 
 
-def document(change: RunChange) -> dict[str, Any]:
-    """The document ``bemt.comparison/1`` without a case."""
+class RankedCause(Documented):
+    """One explanation."""
+
+    effect: str
+    probability: float
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # Value, low, high and unit by name
+
+
+class SubVerdict(Documented):
+    """What is said of loads or drive."""
+
+    verdict: str
+    effects: tuple[str, ...]
+    rule: str
+    ranking: tuple[RankedCause, ...]
+
+
+class Densities(Documented):
+    """Recorded densities [kg/m3]; None where they are not told."""
+
+    A: float | None
+    B: float | None
+    ratio: float | None
+
+
+class ComparedRuns(Documented):
+    """``bemt.comparison/1``: what two recordings say, and what the diagnosis with a case says of them."""
+
+    verdict: str
+    effects: tuple[str, ...]
+    probability: float | None
+    diameter_m: float | None
+    density: Densities
+    rule: str = ""
+    sets: tuple[tuple[str, ...], ...] = ()
+    ranking: tuple[RankedCause, ...] = ()
+    subsystems: Mapping[str, SubVerdict] = field(default_factory=dict)
+    ratios: Mapping[str, Ratio] = field(default_factory=dict)
+    points: Mapping[str, int] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    recordings: tuple[str, ...] = ()
+    rows: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    next_measurement: Mapping[str, Any] = field(default_factory=dict)
+    case: str | None = None
+    diagnosis: Mapping[str, Any] | None = None
+    told: tuple[str, ...] | None = None  # Lines of the diagnosis
+
+    def document(self) -> dict[str, Any]:
+        """Plain values; verdict and ranking in the words of the diagnosis where there is one."""
+        said = {k: self.diagnosis[k] for k in DIAGNOSED} if self.diagnosis else {}
+        return {"schema": SCHEMA, "version": __version__, **super().document(), **said}
+
+
+DIAGNOSED = ("verdict", "effects", "probability", "ranking", "rule")
+"""What a diagnosis says in place of the ratios."""
+
+
+def document(change: RunChange) -> ComparedRuns:
+    """What is said without a case."""
     said = change.leading
-    return {
-        "schema": SCHEMA,
-        "verdict": said.verdict,
-        "effects": list(said.effects),
-        "probability": said.mass,
-        "rule": said.why,
-        "sets": [list(s) for s in said.sets],
-        "ranking": _ranking(said),
-        "subsystems": {
-            name: {"verdict": j.verdict, "effects": list(j.effects), "rule": j.why, "ranking": _ranking(j)}
-            for name, j in (("loads", change.loads), ("drive", change.drive))
-        },
-        "ratios": {k: dict(v) for k, v in change.ratios.items()},
-        "density": {
-            "A": or_null(change.a.density),
-            "B": or_null(change.b.density),
-            "ratio": or_null(change.density_ratio),
-        },
-        "diameter_m": or_null(change.diameter_m),
-        "points": {"A": len(change.a), "B": len(change.b)},
-        "assumed": list(change.assumed),
-        "notes": list(change.notes),
-    }
+    return ComparedRuns(
+        said.verdict, tuple(said.effects), said.mass, or_null(change.diameter_m),
+        Densities(*map(or_null, (change.a.density, change.b.density, change.density_ratio))), said.why, said.sets,
+        _ranking(said),
+        {name: SubVerdict(j.verdict, tuple(j.effects), j.why, _ranking(j))
+         for name, j in (("loads", change.loads), ("drive", change.drive))},
+        change.ratios, {"A": len(change.a), "B": len(change.b)}, change.assumed, change.notes,
+    )  # fmt: skip
 
 
-def _ranking(said: Judgement) -> list[dict[str, Any]]:
-    return [
-        {"effect": k, "probability": p, "parameters": {n: dict(v) for n, v in said.parameters.get(k, {}).items()}}
-        for k, p in list(said.probability.items())[:12]
-    ]
+def _ranking(said: Judgement) -> tuple[RankedCause, ...]:
+    return tuple(RankedCause(k, p, said.parameters.get(k, {})) for k, p in list(said.probability.items())[:12])

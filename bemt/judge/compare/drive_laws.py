@@ -116,16 +116,14 @@ LAWS: tuple[DriveLaw, ...] = (
         "motor",
         "different motor, controller or setting",
         (
-            (1.0, {"speed": {"all": 1.0}}),
-            (1.0, {"electrical": {"all": 1.0}}),
-            (0.5, {"speed": {"ramp": 1.0}}),
+            (1.0, {"speed": {"all": 1.0}}), (1.0, {"electrical": {"all": 1.0}}), (0.5, {"speed": {"ramp": 1.0}}),
             (0.5, {"electrical": {"ramp": 1.0}}),
         ),
         "speed at one command and electrical power change, loads at the measured speed are unchanged",
         "compare motor, controller and its settings",
         "shares of their own",
     ),
-)
+)  # fmt: skip
 """Causes behind the rotor."""
 
 

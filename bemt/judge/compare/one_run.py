@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 import os
 import textwrap
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
-from bemt.data.recordings.audit import combined
+from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.data.recordings.channels import named
@@ -34,6 +34,60 @@ _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
+
+
+class BothLoads(Documented):
+    """One load by the run and by the model, with standard uncertainties."""
+
+    cfd: float
+    u_cfd: float
+    bemt: float
+    u_bemt: float
+    u_bemt_by: Mapping[str, float]  # By origin
+    difference: float
+    u_both: float
+    verdict: str
+
+    @property
+    def times(self) -> float:
+        """Difference over both uncertainties together."""
+        return abs(self.difference) / self.u_both if self.u_both else math.nan
+
+    @property
+    def percent(self) -> str:
+        """Difference as a share of the run's value."""
+        return f"{100.0 * self.difference / self.cfd:+.0f} %" if self.cfd else "-"
+
+
+class PointOfRun(Documented):
+    """Loads at one point."""
+
+    label: str
+    rpm: float
+    airspeed_m_s: float
+    density_kg_m3: float
+    V_over_n_m: float
+    loads: Mapping[str, BothLoads]
+    flags: tuple[str, ...]
+
+
+class RunComparison(Documented):
+    """``bemt.run-comparison/1``: one run and the model of a case side by side."""
+
+    run: str
+    case: str
+    conditions: Mapping[str, str]
+    points: tuple[PointOfRun, ...]
+    audit: tuple[AuditLine, ...]
+    audit_u_relative_known: float
+    averaged: Mapping[str, str]
+    notes: tuple[str, ...]
+    sentence: str
+    next: str
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"schema": SCHEMA, "version": __version__, **super().document()}
 
 
 def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset]:
@@ -67,11 +121,10 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
 
 def compare_run(
     path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None
-) -> dict[str, Any]:
+) -> RunComparison:
     """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
-    ``bemt.run-comparison/1``: ``points`` (each with ``loads``: cfd, u_cfd, bemt, u_bemt by origin, difference, u_both),
-    ``audit``, ``notes``, ``sentence``, ``next``. A file that is no run, or of another rotor, is refused.
+    A file that is no run, or of another rotor, is refused.
     """
     given = path if isinstance(path, Dataset) else None
     name = os.fspath(path) if not isinstance(path, Dataset) else str(path.provenance.get("file", path.name))
@@ -96,8 +149,8 @@ def compare_run(
         made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
         angle_deg=_angle(full, rows, made, name), progress=step,
     ).points  # fmt: skip
-    out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
-    lines = []
+    out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
+    lines: list[AuditLine] = []
     if imported.kind == "cfd" or conditions_of(imported):
         at = int(rows[0])
         lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, _pitch(made), made.ducted,
@@ -106,16 +159,12 @@ def compare_run(
             flies = full["airspeed_m_s"][rows] > 0.5
             notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
     known = combined(lines)[1] if lines else math.nan
-    document = {
-        "schema": SCHEMA, "version": __version__, "run": name, "case": made.name,
-        "conditions": {k: ", ".join(v) for k, v in conditions_of(imported).items()}, "points": out,
-        "audit": [asdict(line) for line in faults_first(lines)], "audit_u_relative_known": known,
-        "averaged": dict(imported.provenance.get("averaged", {})), "notes": list(dict.fromkeys(notes)),
-    }  # fmt: skip
-    return document | {
-        "sentence": _sentence(out),
-        "next": _next(document, name, made.path.as_posix() if isinstance(case, Case) else os.fspath(case)),
-    }
+    asked = made.path.as_posix() if isinstance(case, Case) else os.fspath(case)
+    return RunComparison(
+        name, made.name, {k: ", ".join(v) for k, v in conditions_of(imported).items()}, out,
+        tuple(faults_first(lines)), known, dict(imported.provenance.get("averaged", {})), tuple(dict.fromkeys(notes)),
+        _sentence(out), _next(out, lines, name, asked),
+    )  # fmt: skip
 
 
 def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> NDArray[np.float64]:
@@ -143,32 +192,27 @@ def _pitch(case: Case) -> float:
     return float(prepare_case(case, oblique=True).pitch_m)
 
 
-def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> dict[str, Any]:
+def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
     """Loads at one point."""
-    loads: dict[str, Any] = {}
-    for name in ("thrust_N", "torque_Nm"):
-        if name in cfd and math.isfinite(cfd[name][i]):
-            loads[name] = _load(float(cfd[name][i]), float(cfd.u[name][i]), bemt, name, k)
+    loads = {
+        name: _load(float(cfd[name][i]), float(cfd.u[name][i]), bemt, name, k)
+        for name in ("thrust_N", "torque_Nm")
+        if name in cfd and math.isfinite(cfd[name][i])
+    }
     if "duct_thrust_N" in cfd and "thrust_N" in loads and "duct_share" in bemt:
-        T, part = loads["thrust_N"]["cfd"], float(cfd["duct_thrust_N"][i])
-        u = float(cfd.u["duct_thrust_N"][i]) / abs(
-            T
-        )  # the total is the rotor's and the duct's: their errors go together
-        loads["duct_share"] = _load(part / T, u, bemt, "duct_share", k)
-    state = {key: float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3")}
-    J = state["airspeed_m_s"] / (state["rpm"] / 60.0) if state["rpm"] > 0 else math.nan
-    label = cfd.labels[i] if cfd.labels else ""
-    return {"label": label, **state, "V_over_n_m": J, "loads": loads, "flags": list(bemt.flags[k])}
+        T = loads["thrust_N"].cfd  # the total is the rotor's and the duct's: their errors go together
+        share, u = float(cfd["duct_thrust_N"][i]) / T, float(cfd.u["duct_thrust_N"][i]) / abs(T)
+        loads["duct_share"] = _load(share, u, bemt, "duct_share", k)
+    rpm, V, rho = (float(cfd[key][i]) for key in ("rpm", "airspeed_m_s", "density_kg_m3"))
+    J = V / (rpm / 60.0) if rpm > 0 else math.nan
+    return PointOfRun(cfd.labels[i] if cfd.labels else "", rpm, V, rho, J, loads, tuple(bemt.flags[k]))
 
 
-def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> dict[str, Any]:
+def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads:
     ours, band = float(bemt[name][k]), float(bemt.u[name][k])
     both = math.hypot(u if math.isfinite(u) else 0.0, band)
     parts = {origin: float(part[name][k]) for origin, part in bemt.u_by.items() if name in part}
-    return {
-        "cfd": value, "u_cfd": u, "bemt": ours, "u_bemt": band, "u_bemt_by": parts, "difference": ours - value,
-        "u_both": both, "verdict": _verdict(ours - value, both),
-    }  # fmt: skip
+    return BothLoads(value, u, ours, band, parts, ours - value, both, _verdict(ours - value, both))
 
 
 def _verdict(E: float, u: float) -> str:
@@ -177,41 +221,32 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
-def _percent(load: Mapping[str, Any]) -> str:
-    return f"{100.0 * load['difference'] / load['cfd']:+.0f} %" if load["cfd"] else "-"
-
-
-def _sentence(points: list[dict[str, Any]]) -> str:
-    every = [(k, load) for p in points for k, load in p["loads"].items()]
-    off = [(k, load) for k, load in every if load["verdict"] == "differs"]
-    near = [(k, load) for k, load in every if load["verdict"] == "within 2 u"]
-    lost = sum(load["verdict"] == "no result" for _, load in every)
+def _sentence(points: Sequence[PointOfRun]) -> str:
+    every = [(k, load) for p in points for k, load in p.loads.items()]
+    off = [(k, load) for k, load in every if load.verdict == "differs"]
+    near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
+    lost = sum(load.verdict == "no result" for _, load in every)
     tail = f" No result for {number_of(lost, 'value')}." if lost else ""
     if off:
-        k, load = max(off, key=lambda x: abs(x[1]["difference"]) / x[1]["u_both"])
-        times = abs(load["difference"]) / load["u_both"]
+        k, load = max(off, key=lambda x: x[1].times)
         count = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        word = _LOADS[k].split(" [")[0]
-        ratio = abs(load["bemt"] / load["cfd"]) if load["cfd"] else math.inf
+        ratio = abs(load.bemt / load.cfd) if load.cfd else math.inf
         tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
-        size = f"{word} of BEMT is {_percent(load)}, {times:.1f} times both bands together"
+        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {load.percent}, {load.times:.1f} times both bands together"
         return f"CFD and BEMT differ{count}: {size}.{tail}"
     if near:
-        far = sorted(near, key=lambda item: abs(item[1]["difference"]) / item[1]["u_both"])
-        worst = dict(far)  # of each load the farthest
-        sizes = " and ".join(f"{_percent(load)} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
+        worst = dict(sorted(near, key=lambda item: item[1].times))  # of each load the farthest
+        sizes = " and ".join(f"{load.percent} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
         return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
     return f"CFD and BEMT agree within both bands.{tail}"
 
 
-def _next(document: Mapping[str, Any], name: str, case: str) -> str:
+def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, case: str) -> str:
     """What would tell more."""
-    topics = {line["topic"] for line in document["audit"] if line["status"] in ("fault", "not stated")}
     steps = []
-    if "grid study" in topics:
+    if any(line.topic == "grid study" and line.status in ("fault", "not stated") for line in audit):
         steps.append("the same point on a finer grid (cells x 2 or more): its change is the u of the grid")
-    readings = sum(len([k for k in p["loads"] if k != "duct_share"]) for p in document["points"])
-    if readings < 3:
+    if sum(len(p.loads.keys() - {"duct_share"}) for p in points) < 3:
         steps.append("two more speeds or airspeeds: one point fits any cause; then "
                      f"`bemt diagnose {name} OTHER_RUNS --case {case}`")  # fmt: skip
     else:
@@ -219,48 +254,42 @@ def _next(document: Mapping[str, Any], name: str, case: str) -> str:
     return "; ".join(steps)
 
 
-def text(document: Mapping[str, Any], details: bool = False) -> str:
-    """Lay the document of `compare_run` out on one screen; with `details` all points, notes and settings."""
-    told = document["conditions"]
+def text(found: RunComparison, details: bool = False) -> str:
+    """Lay it out on one screen; with `details` all points, notes and settings."""
+    told = found.conditions
     set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
     set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
-    lines = [
-        document["sentence"],
-        "",
-        f"{Path(document['run']).name} ({', '.join(set_up) or 'set-up not stated'}) and case {document['case']}",
-    ]
-    shown = document["points"] if details else document["points"][:_ROWS]
+    stated = ", ".join(set_up) or "set-up not stated"
+    lines = [found.sentence, "", f"{Path(found.run).name} ({stated}) and case {found.case}"]
+    shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:
-        head = [number_text(p["rpm"], 6), number_text(p["airspeed_m_s"], 4)]
-        for name, load in p["loads"].items():
-            times = abs(load["difference"]) / load["u_both"] if load["u_both"] else math.nan
+        head = [number_text(p.rpm, 6), number_text(p.airspeed_m_s, 4)]
+        for name, load in p.loads.items():
             rows.append([
-                *head, _LOADS[name], _pm(load["cfd"], load["u_cfd"]), _pm(load["bemt"], load["u_bemt"]),
-                f"{number_text(load['difference'], 3)} ({_percent(load)})", number_text(times, 2), load["verdict"],
+                *head, _LOADS[name], _pm(load.cfd, load.u_cfd), _pm(load.bemt, load.u_bemt),
+                f"{number_text(load.difference, 3)} ({load.percent})", number_text(load.times, 2), load.verdict,
             ])  # fmt: skip
             head = ["", ""]
     lines.append(text_table(["rev/min", "V [m/s]", "", "CFD", "BEMT", "BEMT - CFD", "in u", ""], rows, (2, 7), "  "))
-    if len(shown) < len(document["points"]):
-        lines.append(f"  ... {len(document['points']) - len(shown)} more points (--details)")
-    first = next(iter(document["points"][0]["loads"].values()))
-    parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first["u_bemt_by"].items())
+    if len(shown) < len(found.points):
+        lines.append(f"  ... {len(found.points) - len(shown)} more points (--details)")
+    first = next(iter(found.points[0].loads.values()))
+    parts = ", ".join(f"{k} {number_text(v, 2)}" for k, v in first.u_bemt_by.items())
     lines.append(f"  ±: one standard uncertainty; BEMT's in line 1: {parts}; in u: over both bands")
-    for over in dict.fromkeys(document["averaged"].values()):
-        lines.append(f"  averaged: {', '.join(k for k, v in document['averaged'].items() if v == over)}: {over}")
-    if document["audit"]:
-        lines += ["", "Audit of the CFD run"]
-        for line in document["audit"] if details else document["audit"][:7]:
-            rest = [line["finding"], line["consequence"]]
-            bare = rest[0].endswith("not stated") and rest[1] == "unknown"
-            words = f"{line['topic']}: {'not stated' if bare else ': '.join(filter(None, rest))}"
-            lead = f"  {line['status']:11s}"
-            lines.append(_filled(words, lead, " " * len(lead)))
-    notes = [n for n in document["notes"]] if details else document["notes"][:4]
-    flags = dict.fromkeys(f for p in document["points"] for f in p["flags"])
-    said = [*(f"! {n}" for n in notes), *(f"! BEMT: {f}" for f in (flags if details else list(flags)[:2]))]
-    said.append("No cause is named from one point." if len(document["points"]) == 1 else "No cause is named here.")
-    lines += ["", *map(_filled, [*said, f"Next: {document['next']}"])]
+    for over in dict.fromkeys(found.averaged.values()):
+        lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
+    lines += ["", "Audit of the CFD run"] if found.audit else []
+    for line in found.audit if details else found.audit[:7]:
+        bare = line.finding.endswith("not stated") and line.consequence == "unknown"
+        words = "not stated" if bare else ": ".join(filter(None, (line.finding, line.consequence)))
+        lead = f"  {line.status:11s}"
+        lines.append(_filled(f"{line.topic}: {words}", lead, " " * len(lead)))
+    flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
+    said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
+    said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]
+    said.append("No cause is named from one point." if len(found.points) == 1 else "No cause is named here.")
+    lines += ["", *map(_filled, [*said, f"Next: {found.next}"])]
     return "\n".join(lines)
 
 

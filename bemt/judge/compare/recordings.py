@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
 from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
-from bemt.judge.compare.smooth_change import Scatter
 from bemt.judge.compare.stand_run import StandRun
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
@@ -33,7 +31,7 @@ _TOLD_DENSITY, _SURE = 0.012, 2.0
 _BY_THRUST = 0.5
 NO_VERDICT = Judgement("insufficient", (), {}, {}, "not recorded in both")
 """Of what was not recorded in both."""
-_MOVED, _WIDE = 2.5, 1.4
+_WIDE = 1.4
 # Thrust of a propeller of 2.3 times the diameter at one speed: no stand takes both. [1]
 _FAR_OFF = 30.0
 # Share of misread speeds from which the sensor is doubtful, and from which the others are no good either.
@@ -56,8 +54,7 @@ class RunChange:
     b: StandRun
     diameter_m: float  # Of the rotor [m]; NaN: unknown
     channels: Mapping[str, MatchedChannel]  # What both recorded
-    # B over A by channel: of :func:`bemt.judge.compare.smooth_change.ratio_of`, and ``density_ratio``
-    ratios: Mapping[str, Mapping[str, Any]]
+    ratios: Mapping[str, fits.Ratio]  # B over A by channel
     rotor: fits.MatchedRuns
     behind: fits.MatchedRuns  # Motor, controller and battery
     judge: Callable[[RunChange], Judgement]  # Of the loads
@@ -91,18 +88,18 @@ class RunChange:
     @property
     def _by_volts(self) -> float:
         """Voltage of B over that of A at equal command where both tell and they differ, natural logarithm, else 0."""
-        change = next((math.log(r["ratio"]) for r in self.ratios.values() if r["kind"] == "voltage"), 0.0)
+        change = next((math.log(r.ratio) for r in self.ratios.values() if r.kind == "voltage"), 0.0)
         return change if "speed" in self.behind.channels and abs(change) >= TOLD_VOLTAGE else 0.0
 
     @property
     def _load(self) -> Load:
         """How the load of the drive changed; where torque is not recorded, thrust tells it by half."""
-        found = {r["kind"]: r for r in self.ratios.values() if r["kind"] in LOADS}
+        found = {r.kind: r for r in self.ratios.values() if r.kind in LOADS}
         r = found.get("torque", found.get("thrust"))
         if r is None:
             return Load()
-        change, unsure = math.log(r["ratio"]), math.log(r["high68"] / r["low68"]) / 2.0
-        along = np.log([point[2] for point in r["curve"]])
+        change, unsure = math.log(r.ratio), math.log(r.high68 / r.low68) / 2.0
+        along = np.log([point[2] for point in r.curve])
         varies = float(np.max(np.abs(along - change)))
         return Load(change, unsure if "torque" in found else math.hypot(unsure, _BY_THRUST * change), varies)
 
@@ -141,14 +138,14 @@ class RunChange:
     @property
     def apart(self) -> bool:
         """Whether every ratio of a load would be one of two extrapolations."""
-        loads = [r for r in self.ratios.values() if r["kind"] in LOADS]
-        wide = (r["extrapolated"] and (r["apart"] or r["high95"] / r["low95"] > _WIDE) for r in loads)
+        loads = [r for r in self.ratios.values() if r.kind in LOADS]
+        wide = (r.extrapolated and (r.apart or r.high95 / r.low95 > _WIDE) for r in loads)
         return bool(loads) and all(wide)
 
     @property
     def far_off(self) -> bool:
         """Whether loads differ by more than one stand can measure."""
-        loads = [abs(math.log(r["ratio"])) for r in self.ratios.values() if r["kind"] in LOADS]
+        loads = [abs(math.log(r.ratio)) for r in self.ratios.values() if r.kind in LOADS]
         return min(loads, default=0.0) >= math.log(_FAR_OFF)
 
     @property
@@ -211,7 +208,7 @@ def changed(
             )
         )
     scatter = {**rotor.likelier, **behind.likelier}
-    ratios = {c.channel: _ratio(c, scatter[n]) for n, c in channels.items()}
+    ratios = {c.channel: fits.ratio_of(c, scatter[n]) for n, c in channels.items()}
     assumed = tuple(_assumed(a, b, diameter, rotor.channels))
     notes = tuple(_notes(a, b, channels, {**rotor.strays, **behind.strays}))
     return RunChange(a, b, diameter, channels, ratios, rotor, behind, judge, assumed, notes)
@@ -233,16 +230,6 @@ def _told(run: StandRun) -> str:
         if k not in ("run", "command")
     ]
     return f"{', '.join(told) or 'nothing'} at {len(run)} point{'s' if len(run) != 1 else ''}"
-
-
-def _ratio(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
-    out = dict(fits.ratio_of(c, s))
-    out["kind"] = c.name
-    out["density_ratio"] = math.exp(c.log_density)
-    moved = abs(float(out.get("slope", 0.0))) / max(float(out.get("slope_error", math.inf)), 1e-9)
-    along = abs(float(out.get("advance_slope", 0.0))) / max(float(out.get("advance_slope_error", math.inf)), 1e-9)
-    out["depends_on"] = [n for n, z in (("speed", moved), ("advance", along)) if z > _MOVED]
-    return out
 
 
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
-from bemt.data.recordings.windmilling import zero_thrust_speed
+from bemt.data.recordings.findings import zero_thrust_speed
 from bemt.physics.air import Air
 from bemt.physics.dataset import Dataset
 
@@ -160,8 +160,7 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     wind = known.pop("airspeed_m_s", None)
     if set(known) == {"pressure_Pa"}:
         faults.append(Fault(where, "", repr(told), "a temperature too, or a density"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if known.keys() >= {"temperature_K", "pressure_Pa"}:
         known["density_kg_m3"] = Air.from_state(known["pressure_Pa"], known["temperature_K"] - ZERO_CELSIUS).rho
     gone = {*known, *(_AIR_RANGES if known else ()), *(("airspeed_m_s", "V_m_s", "J") if wind is not None else ())}
@@ -250,8 +249,7 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
     beside = Path(path).with_name("recording.toml")
     if faults and any("names this file" in note for note in imported.notes):
         faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def wind_of(imported: Dataset) -> float | None:

@@ -14,12 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.document import Documented
 from bemt.base.gaussian.kernels import alike, smooth
 from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
 from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
@@ -34,6 +34,7 @@ _FLOORS = (0.0, 0.0007, 0.002, 0.005, 0.012)
 _WIGGLES = (0.0, 0.004, 0.01, 0.02)
 _BENDS = (0.02, 0.1, 0.3, 1.0)
 _FAR, _LOCAL = 3.5, 3.0
+_MOVED = 2.5  # Errors from which a slope is said
 
 
 @dataclass(frozen=True)
@@ -113,11 +114,9 @@ def scatter_of(c: MatchedChannel, change: Array | None = None) -> tuple[Scatter,
     """Scatter and bend that make the readings likeliest with such a change, and the logarithm of that likelihood."""
     change, y = free_change(c) if change is None else change, c.y - c.y.mean()
     ways = {
-        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES),
-        "bend": _BENDS,
-        "wiggle": _WIGGLES,
+        "share": _SHARES if not c.u.any() else (0.0005, *_SHARES), "bend": _BENDS, "wiggle": _WIGGLES,
         "floor": _FLOORS if c.name in LOADS else (0.0,),
-    }
+    }  # fmt: skip
     best, score = Scatter(0.008, 0.0, 0.0, 0.1), -math.inf
     for _ in range(2):
         for name, values in ways.items():
@@ -146,7 +145,37 @@ def without_strays(c: MatchedChannel) -> tuple[MatchedChannel, int]:
     return c, n
 
 
-def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
+class Ratio(Documented):
+    """B over A of one channel at equal speed, or equal command for the drive."""
+
+    kind: str  # thrust, torque, speed, voltage or electrical
+    ratio: float
+    low68: float
+    high68: float
+    low95: float
+    high95: float
+    density_ratio: float  # Recorded density of B over A, by which loads as measured differ besides
+    curve: tuple[tuple[float, ...], ...]  # Both coordinates, ratio, its 95 % interval
+    apart: bool  # No common advance
+    extrapolated: bool
+    range: tuple[float, float]  # Of the first coordinate, ln(rev/min) or the command
+    advance_range: tuple[float, float]
+    scatter: float
+    points: tuple[int, int]
+    depends_on: tuple[str, ...] = ()  # speed, advance
+    # Per doubling of speed, or over the range of a command; over the range of advance
+    slope: float | None = None
+    slope_error: float | None = None
+    advance_slope: float | None = None
+    advance_slope_error: float | None = None
+
+    @property
+    def over_command(self) -> bool:
+        """Whether it is one at equal command."""
+        return self.kind in ("speed", "voltage")
+
+
+def ratio_of(c: MatchedChannel, s: Scatter) -> Ratio:
     """Ratio of B to A at equal speed."""
     y = c.y - c.y.mean()
     white = whitener(covariance(c, s) + free_change(c))
@@ -165,25 +194,25 @@ def ratio_of(c: MatchedChannel, s: Scatter) -> dict[str, Any]:
     n = at.size
     weight = np.full(n, 1.0 / n)
     mean, sd = float(weight @ d), math.sqrt(max(float(weight @ cov @ weight), 0.0))
-    out: dict[str, Any] = {"ratio": math.exp(mean)}
-    for name, q in (("68", 1.0), ("95", 1.96)):
-        out[f"low{name}"], out[f"high{name}"] = math.exp(mean - q * sd), math.exp(mean + q * sd)
-    out |= _slopes(c, at, d, cov)
+    slopes = _slopes(c, at, d, cov)
+    moved = [
+        abs(slopes.get(k, 0.0)) / max(slopes.get(f"{k}_error", math.inf), 1e-9) for k in ("slope", "advance_slope")
+    ]
     order = at[np.argsort(c.x[at, 0])]
     back = {int(i): k for k, i in enumerate(at)}
     keep = order[np.unique(np.linspace(0, n - 1, min(n, 25)).round().astype(int))]
     e = np.sqrt(np.maximum(np.diag(cov), 0.0))
     rows = [back[int(i)] for i in keep]
     ends = [np.exp(d[rows] + q * e[rows]) for q in (0.0, -1.96, 1.96)]
-    out["curve"] = np.column_stack([c.x[keep], *ends]).tolist()
     slow, fast = c.common_advance()
-    out["apart"] = bool(slow > fast + MARGIN * float(np.ptp(c.x[:, 1])))
-    out["extrapolated"] = apart or out["apart"]
-    out["range"] = [low, high]
-    out["advance_range"] = [slow, fast]
-    out["scatter"] = s.share
-    out["points"] = [int((~c.second).sum()), int(c.second.sum())]
-    return out
+    ratio, low68, high68, low95, high95 = (math.exp(mean + q * sd) for q in (0.0, -1.0, 1.0, -1.96, 1.96))
+    far = bool(slow > fast + MARGIN * float(np.ptp(c.x[:, 1])))
+    return Ratio(
+        c.name, ratio, low68, high68, low95, high95, math.exp(c.log_density),
+        tuple(map(tuple, np.column_stack([c.x[keep], *ends]).tolist())), far, apart or far, (low, high), (slow, fast),
+        s.share, (int((~c.second).sum()), int(c.second.sum())),
+        tuple(n for n, z in zip(("speed", "advance"), moved, strict=True) if z > _MOVED), **slopes,
+    )  # fmt: skip
 
 
 def _slopes(c: MatchedChannel, at: NDArray[np.intp], d: Array, cov: Array) -> dict[str, float]:

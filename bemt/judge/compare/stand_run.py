@@ -17,23 +17,9 @@ from bemt.judge.compare.selection import COLD, HOT, LOAD_CHANNELS, conditions_of
 from bemt.physics.dataset import DIMENSIONLESS, Dataset
 
 _WANTED = (
-    *LOAD_CHANNELS,
-    "rpm",
-    "airspeed_m_s",
-    "J",
-    "density_kg_m3",
-    "electrical_power_W",
-    "voltage_V",
-    "throttle",
-    "run",
-    "temperature_K",
-    "time_s",
-    "tip_gap_m",
-    "wall_distance_m",
-    "sideslip_rad",
-    "sideslip_deg",
-    "second_rotor_rad_s",
-)
+    *LOAD_CHANNELS, "rpm", "airspeed_m_s", "J", "density_kg_m3", "electrical_power_W", "voltage_V", "throttle", "run",
+    "temperature_K", "time_s", "tip_gap_m", "wall_distance_m", "sideslip_rad", "sideslip_deg", "second_rotor_rad_s",
+)  # fmt: skip
 # A ramp instead of plateaus: fewest points and rows, rows that must agree, ln of a misreading, 1/s of a slow ramp.
 _ENOUGH, _ROWS, _WINDOW, _JUMP, _RATE = 8, 20, 7, 0.03, 0.25
 # Load of a ramp over full scale that a lag of 0.2 s leaves when it takes ten seconds.

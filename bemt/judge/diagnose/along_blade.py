@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.physics.air import Air
 from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model, acts_on_points, acts_on_rotor
@@ -113,8 +113,7 @@ def read_blade_loads(path: Path) -> dict[str, BladeLoads]:
         raise InputError(Fault(path.as_posix(), "", got, ", ".join(needed)))
     faults = [Fault(path.as_posix(), f"{i}: {c}", repr(row[c]), "a number")
               for i, row in enumerate(rows, 2) for c in COLUMNS if number(row[c] or "") is None]  # fmt: skip
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     runs = dict.fromkeys(str(row["run"]) for row in rows)
     table = {run: np.array([[number(row[c]) for c in COLUMNS] for row in rows if row["run"] == run], float).T
              for run in runs}  # fmt: skip

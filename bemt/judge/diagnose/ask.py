@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.action import Told
-from bemt.base.errors import Fault, InputError, system_fault
-from bemt.base.face import as_html
+from bemt.base.action import Told, as_html
+from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.given import number, path_text
-from bemt.data.recordings.cfd_study import together
+from bemt.data.recordings.grid_study import together
 from bemt.data.recordings.load import as_stated, import_file
 from bemt.judge.compare import one_run
 from bemt.judge.diagnose import figures as pictures
@@ -111,7 +110,7 @@ class Answer:
     @property
     def improved(self) -> Propeller | None:
         """The propeller with the named effects switched on; None if nothing was named that can be simulated."""
-        from bemt.judge.diagnose.improve import improved_case
+        from bemt.judge.diagnose.folder import improved_case
 
         text = improved_case(self.diagnosis, self.propeller.case, self.propeller.text)
         return Propeller(case_of(text, self.propeller.case.folder), text) if text else None
@@ -199,9 +198,10 @@ def diagnosed(
             raise
         # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
-        found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []} | beside
+        found = one_run.compare_run(seen, cases[0], progress)
         words = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
-        return OnePoint(found, "\n\n".join([words, *(c.text() for c in blade.values())]))
+        told = found.document() | {"verdict": "insufficient", "effects": []} | beside
+        return OnePoint(told, "\n\n".join([words, *(c.text() for c in blade.values())]))
     names = [one if isinstance(one, str) else "recording" for one in files]
     told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
@@ -218,8 +218,7 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
     if percent is not None and not 0.0 < percent <= REPEATABILITY_MAX:
         expected = f"a percentage above 0 and up to {REPEATABILITY_MAX:g}"
         faults.append(Fault("--repeatability-pct", "", f"{percent:g}", expected))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _asked(

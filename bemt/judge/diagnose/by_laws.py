@@ -140,7 +140,7 @@ def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
     """
     if candidate.id == "air_density" and density_change(pair.a, pair.b)[1]:
         return None
-    r = next((r for r in pair.ratios.values() if r["kind"] == "speed"), None)
+    r = next((r for r in pair.ratios.values() if r.kind == "speed"), None)
     if r is None or candidate.id not in ("rpm_scale", "unit_slip"):
         return candidate
 
@@ -148,8 +148,8 @@ def _as_counted(candidate: Candidate, pair: RunChange) -> Candidate | None:
         if setting.get("channel", "rpm") != "rpm":
             return True
         ratio = abs(setting["factor"]) * (1.0 + setting.get("eps", 0.0))
-        unsure = _SAME_DRIVE + math.log(r["high95"] / r["ratio"])
-        return abs(math.log(r["ratio"] / ratio)) < unsure
+        unsure = _SAME_DRIVE + math.log(r.high95 / r.ratio)
+        return abs(math.log(r.ratio / ratio)) < unsure
 
     return candidate.only(np.array([fits(s) for s in candidate.settings]))
 

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.gaussian.evidence import shares
+from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
 from bemt.judge.diagnose import (
-    blocks,
     by_laws,
     confusion,
     interval_scales,
     knowledge,
+    noise,
     other_rotor,
     posterior,
     signatures,
@@ -26,16 +28,21 @@ from bemt.judge.diagnose import locate as location
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.assemble import build
+from bemt.judge.diagnose.fit import fit, form_covariance
 from bemt.judge.diagnose.nuisance import following
+from bemt.judge.diagnose.prior import ALWAYS
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.diagnose.shared_physics import ask_reference
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.compare.drive_laws import Judgement
     from bemt.judge.compare.recordings import RunChange
+    from bemt.judge.diagnose.posterior import Evidence
+    from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
+    from bemt.judge.diagnose.signatures import Candidate
+    from bemt.judge.explanation import Explanation
     from bemt.rotors.case import Case
 
 __all__ = ["MOTOR", "Diagnosis", "diagnose"]
@@ -48,15 +55,10 @@ _MOST_RIVALS = 5
 
 
 def diagnose(
-    records: Sequence[Record],
-    cases: Sequence[Case],
-    only: Sequence[str] | None = None,
-    progress: Callable[[str], None] | None = None,
-    baseline: str = "bemt",
-    given: suggestion.Given | None = None,
-    channels: Sequence[str] | None = None,
-    change: RunChange | None = None,
-) -> Diagnosis:
+    records: Sequence[Record], cases: Sequence[Case], only: Sequence[str] | None = None,
+    progress: Callable[[str], None] | None = None, baseline: str = "bemt", given: suggestion.Given | None = None,
+    channels: Sequence[str] | None = None, change: RunChange | None = None,
+) -> Diagnosis:  # fmt: skip
     """Say what was left out; ``change`` from the reference to the recording, where it was compared already."""
     say = progress or (lambda _: None)
     speed = CHANNELS[2]
@@ -98,15 +100,10 @@ def diagnose(
 
 
 def _diagnose(
-    records: Sequence[Record],
-    cases: Sequence[Case],
-    only: Sequence[str] | None,
-    say: Callable[[str], None],
-    baseline: str,
-    given: suggestion.Given,
-    ratios: Callable[[Collection[str]], RunChange | None],
+    records: Sequence[Record], cases: Sequence[Case], only: Sequence[str] | None, say: Callable[[str], None],
+    baseline: str, given: suggestion.Given, ratios: Callable[[Collection[str]], RunChange | None],
     rotor: Diagnosis | None,
-) -> Diagnosis:
+) -> Diagnosis:  # fmt: skip
     say("baseline and nuisances")
     problem = build(records, cases, baseline)
     if question := other_rotor.finding(problem):
@@ -129,7 +126,7 @@ def _diagnose(
     best, parameters = fitting.refined(found, fitting.fit(found, shown))
     parameters = interval_scales.widened(parameters)
     say("held-out blocks")
-    words, held, gp_only = blocks.held_out(found, shown if decision.verdict != "unknown" else NONE)
+    words, held, gp_only = held_out(found, shown if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
         held = gp_only
     smooth = fitting.smooth(found, best)
@@ -262,3 +259,117 @@ def _settling(found: posterior.Evidence, decision: loss.Decision, best: fitting.
     order = [lead, rivals[0], *sorted(rivals[1:], key=lambda i: -weight[i])][:_MOST_RIVALS]
     open_ = decision.verdict in ("class", "unknown", "insufficient")
     return suggestion.suggest(found, rivals_of(order), found.probability[UNKNOWN], reference=open_)
+
+
+# Physics that the case leaves out and a reference shows as well: what every rotor has is in both runs.
+#
+# The runs do not differ in it, yet it is why the case fits neither. The reference alone is asked whether it shows it:
+# the recording may have another cause, which must not answer for it.
+def ask_reference(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Problem, tuple[Candidate, ...]]:
+    """Problem that knows what its runs share; candidates were solved in both.
+
+    Of what a reference clearly lacks (a code that can switch it off made it) only the recording's part stays.
+    """
+    asked = [c for c in candidates if c.id in problem.missing]
+    if not asked:
+        return replace(problem, shared=frozenset()), tuple(candidates)
+    rows = ~problem.free
+    shows = posterior.log_odds(problem.of(rows), [c.seen_as(c.signatures[rows]) for c in asked])
+    both = frozenset(i for i, odds in shows.items() if odds + np.log(ALWAYS) > 0.0)
+    alone = problem.missing - both
+    kept = (c.seen_as(np.where(rows[:, None], 0.0, c.signatures)) if c.id in alone else c for c in candidates)
+    return replace(problem, shared=both, predicted={}), tuple(kept)
+
+
+# Blocks of readings that are left out in turn, and what an explanation predicts of them.
+REFERENCE = -1
+"""Block of points that are always given: readings without the cause."""
+
+
+def partitions(problem: Problem, most: int = 6) -> list[tuple[str, NDArray[np.intp]]]:
+    """All ways to leave out whole blocks, never random rows: recordings, lines of rpm or J; else intervals."""
+    P = problem.covariates["rpm"].size
+    mine = np.zeros(P, dtype=bool)
+    mine[problem.point[problem.free]] = True
+    X = {k: v[mine] for k, v in problem.covariates.items()}
+    count = int(mine.sum())
+    run = X["run"].astype(int)
+    out: list[tuple[str, NDArray[np.intp]]] = []
+
+    def whole(block: NDArray[np.intp]) -> NDArray[np.intp]:
+        every = np.full(P, REFERENCE, dtype=np.intp)
+        every[mine] = block
+        return every
+
+    if len(problem.parts) > 1 and 3 <= np.unique(run).size <= most:
+        out.append(("recordings", whole(np.unique(run, return_inverse=True)[1])))
+    for name in ("rpm", "J"):
+        x = np.log(X[name]) if name == "rpm" else X[name]
+        gap = 0.03 if name == "rpm" else 0.02
+        order = np.argsort(x, kind="stable")
+        line = np.empty(count, dtype=np.intp)
+        line[order] = np.cumsum(np.r_[0, np.diff(x[order]) > gap])
+        lines = int(line.max()) + 1
+        if 3 <= lines <= max(count // 2, 3):
+            few = np.minimum(line * most // max(lines, most), most - 1) if lines > most else line
+            out.append((f"all readings at one {name}", whole(few)))
+    if out:
+        return out
+    spread = {
+        k: float(np.ptp(v)) / max(float(np.max(np.abs(v))), 1e-12) for k, v in X.items() if k in ("rpm", "J", "time_s")
+    }
+    name = max(spread, key=lambda k: spread[k])
+    rank = np.argsort(np.argsort(X[name], kind="stable"))
+    return [(f"intervals of {name}", whole(rank * min(4, count) // count))]
+
+
+def held_out(
+    found: Evidence, what: Explanation, split: tuple[str, NDArray[np.intp]] | None = None
+) -> tuple[str, Array, Array]:
+    """Predict every block from the others, with and without an explanation."""
+    problem = found.problem
+    words, block = split or partitions(problem)[0]
+    member = block[problem.point]
+    hyper = found.states[0].hyper
+    C = noise.covariance(problem, hyper)
+    K = next((k.covariance for k in found.rivals if k.name == found.states[0].best_rival), np.zeros_like(C))
+    S, log_w = _columns(found, what)
+    r = problem.residual
+    after, smooth_part = np.array(problem.centre), np.array(problem.centre)
+    systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
+    own = form_covariance(found, fit(found, what))
+    for b in np.unique(member[member != REFERENCE]):
+        test, train = member == b, member != b
+        if not train.any():
+            continue
+        white = whitener((C + own)[np.ix_(train, train)], problem.u[train])
+        w = white(np.column_stack([r[train], S[train]]))
+        gain = w[:, 1:].T @ w[:, 0] - 0.5 * np.sum(w[:, 1:] ** 2, axis=0) + log_w
+        p = shares(gain) if gain.size else np.zeros(0)
+        expected = S @ p if gain.size else np.zeros_like(r)
+        cross = (systematic + own)[np.ix_(test, train)]
+        after[test] += expected[test] + cross @ white.solve((r - expected)[train])
+        white = whitener((C + K)[np.ix_(train, train)], problem.u[train])
+        smooth_part[test] += (systematic + K)[np.ix_(test, train)] @ white.solve(r[train])
+    return words, after, smooth_part
+
+
+def _columns(found: Evidence, what: Explanation) -> tuple[Array, Array]:
+    """Signatures of an explanation; of a pair the settings near the best one."""
+    M = found.problem.y.size
+    ids = tuple(what)
+    if not ids:
+        return np.zeros((M, 0)), np.zeros(0)
+    if len(ids) == 1:
+        c = found.of(ids[0])
+        return c.signatures, np.log(c.weight)
+    best = fit(found, what)
+    a, b = (found.of(i) for i in ids)
+    i, j = (col - found.spans[k].start for col, k in zip(best.columns, ids, strict=True))
+    interaction = best.signature - a.signatures[:, i] - b.signatures[:, j]
+    rows, weight = [], []
+    for k in range(a.weight.size):
+        for m in range(b.weight.size):
+            rows.append(a.signatures[:, k] + b.signatures[:, m] + interaction)
+            weight.append(np.log(a.weight[k] * b.weight[m]))
+    return np.stack(rows, axis=1), np.array(weight)

@@ -17,8 +17,8 @@ from bemt.base.arrays import Array
 from bemt.judge.diagnose.form import Form, LawError, columns, form_modes
 
 if TYPE_CHECKING:
+    from bemt.judge.diagnose.form import State
     from bemt.judge.diagnose.posterior import Evidence
-    from bemt.judge.diagnose.state import State
 
 ALIKE = 3.0
 """Distance below which two effects are one class [1]."""

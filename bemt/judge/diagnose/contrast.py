@@ -12,11 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bemt import __version__
-from bemt.base.action import Told
-from bemt.base.errors import Fault, InputError
-from bemt.base.face import as_html
-from bemt.judge.compare.change_document import Invocation, document, next_step
+from bemt.base.action import Told, as_html
+from bemt.base.document import rows_of
+from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, Invocation, RankedCause, document, next_step
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
 from bemt.judge.compare.selection import conditions_of, selected, with_air
 from bemt.judge.compare.stand_run import stand_run
@@ -47,36 +46,41 @@ class Contrast:
     ----------
     change : RunChange
         Ratios and scaling.
-    document : dict
-        ``bemt.comparison/1``.
+    said : ComparedRuns
+        What is said of them.
     """
 
     change: RunChange
-    document: dict[str, Any]
+    said: ComparedRuns
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """``bemt.comparison/1``."""
+        return self.said.document()
 
     @property
     def verdict(self) -> str:
         """none, named, sensor, class, unknown or insufficient."""
-        return str(self.document["verdict"])
+        return self.said.verdict
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects of the verdict; of a class all members."""
-        return tuple(self.document["effects"])
+        return self.said.effects
 
     @property
     def text(self) -> str:
         """The answer on one screen."""
         from bemt.judge.compare.contrast_text import text
 
-        return text(self.document)
+        return text(self.said)
 
     @property
     def details(self) -> str:
         """The answer with its ranking, sub-systems and all notes."""
         from bemt.judge.compare.contrast_text import text
 
-        return text(self.document, details=True)
+        return text(self.said, details=True)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.comparison/1``."""
@@ -84,9 +88,9 @@ class Contrast:
 
     def picture(self) -> bytes:
         """The two recordings and what changed, as PNG."""
-        from bemt.judge.compare.contrast_figure import picture
+        from bemt.judge.compare.first_picture import picture
 
-        return picture(self.change, self.document)
+        return picture(self.change, self.said)
 
     def __str__(self) -> str:
         """The answer on one screen."""
@@ -141,45 +145,38 @@ def compare(
     if (a is b or Path(names[0]).resolve() == Path(names[1]).resolve()) and sorted(rows_a) == sorted(rows_b):
         raise InputError(
             Fault(
-                names[0],
-                "",
-                "the same recording twice",
-                "two recordings, or two choices of rows",
+                names[0], "", "the same recording twice", "two recordings, or two choices of rows",
                 _two_choices(names[0]),
             )
-        )
+        )  # fmt: skip
     read: list[Dataset] = []
     faults: list[Fault] = []
     for given, name, rows, air, option in zip(
         (a, b), names, conditions, (air_a, air_b), ("--air-a", "--air-b"), strict=True
     ):
-        try:
+        with gathered(faults):
             made = from_pandas(given, name=name) if hasattr(given, "columns") else given
             whole = made if is_table(given) else import_file(name)
             read.append(with_air(selected(whole, rows, name), air, option))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     D = case.diameter_m if case is not None and diameter_m is None else diameter_m
     findings = [_findings(imported, D, case is not None and case.ducted) for imported in read]
     read = [_sound(imported, found) for imported, found in zip(read, findings, strict=True)]
     runs = []
     for name, rows, imported in zip(names, conditions, read, strict=True):
-        try:
+        with gathered(faults):
             runs.append(stand_run(imported, f"{name} ({', '.join(rows)})" if rows else name, D))
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     found = changed(runs[0], runs[1], math.nan if D is None else D)
-    doc = document(found) | {"version": __version__, "recordings": names, "rows": {"A": rows_a, "B": rows_b}}
-    doc["notes"] = [*_errors(findings), *doc["notes"]]
+    said = document(found)
     if case is not None and not found.wind:
-        doc |= _diagnosed(asked, read, case, found, progress)
-    step = _after(doc) if "diagnosis" in doc else next_step(found, asked)
-    doc["next_measurement"] = step | {"command": ""} if step["command"] == asked.command() else step
-    return Contrast(found, doc)
+        said = _diagnosed(said, asked, read, case, found, progress)
+    step = next_step(found, asked) if said.diagnosis is None else _after(said.diagnosis)
+    step = step | {"command": ""} if step["command"] == asked.command() else step
+    return Contrast(found, replace(
+        said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
+        notes=(*_errors(findings), *said.notes), next_measurement=step,
+    ))  # fmt: skip
 
 
 def compared(
@@ -189,7 +186,7 @@ def compared(
 ) -> Contrast | Told:  # fmt: skip
     """One CFD run beside a case, two grids of a run, two CFD runs, or two recordings; written if a folder is given."""
     from bemt.data.recordings.load import as_stated
-    from bemt.judge.compare import one_run, two_grids, two_runs
+    from bemt.judge.compare import one_run, two_runs
     from bemt.judge.diagnose.load import is_table
 
     two = partial(compare, a, b, case, label=label, diameter_m=diameter_m, rows_a=rows_a, rows_b=rows_b, air_a=air_a,
@@ -199,14 +196,12 @@ def compared(
         if case is None:
             hint = "Two recordings, A B, need none"
             raise InputError(Fault("--case", "", "one recording and no case", "the case to compare it with", hint))
-        document = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
-        found = Told(document, one_run.text(document), one_run.text(document, details=True))
+        one = one_run.compare_run(as_stated([a], run or {})[0], case, progress)
+        found = Told(one.document(), one_run.text(one), one_run.text(one, details=True))
     elif is_table(a) or is_table(b):
         found = two()
-    elif (grids := two_grids.compare_grids(a, b, rows_a, rows_b)) is not None:
-        found = Told(grids, two_grids.text(grids))
     elif (runs := two_runs.compare_runs(a, b, rows_a, rows_b)) is not None:
-        found = Told(runs, two_runs.text(runs))
+        found = Told(runs.document(), runs.text)
     else:
         found = two()
     if out is not None:
@@ -219,7 +214,7 @@ def _write(out: Path, found: Contrast | Told, figures: bool, files: Sequence[str
     """Write comparison.json, its text, a picture, and the recordings inside the prediction band of the case."""
     from bemt.base.page import FIRST
     from bemt.base.tables import json_text, write_atomic
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     out.mkdir(parents=True, exist_ok=True)
@@ -279,9 +274,10 @@ def _two_choices(name: str) -> str:
 
 
 def _diagnosed(
-    asked: Invocation, read: Sequence[Dataset], case: Case, found: RunChange, progress: Callable[[str], None] | None
-) -> dict[str, Any]:
-    """Verdict of the diagnosis of B with A as reference."""
+    said: ComparedRuns, asked: Invocation, read: Sequence[Dataset], case: Case, found: RunChange,
+    progress: Callable[[str], None] | None,
+) -> ComparedRuns:  # fmt: skip
+    """The same with the verdict of the diagnosis of B with A as reference."""
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document as diagnosis
     from bemt.judge.diagnose.document import explanation
@@ -293,11 +289,13 @@ def _diagnosed(
         for name, imported in zip((asked.a, asked.b), read, strict=True)
     )
     answer = diagnose([b, replace(a, reference=True)], [case], None, progress, given=_given(asked), change=found)
-    said = diagnosis(answer)
-    keys = ("verdict", "effects", "probability", "ranking", "rule")
+    by_case = diagnosis(answer)
     told = [line for line in explanation(answer) if not line.startswith(_REMARK)]
     told = [f"The case {case.name}, with A as reference:", *told] if told else []
-    return {k: said[k] for k in keys} | {"diagnosis": said, "case": case.name, "told": told}
+    verdict, effects, probability, ranking, rule = (by_case[k] for k in DIAGNOSED)
+    return replace(said, verdict=verdict, effects=tuple(effects), probability=probability, rule=rule,
+                   ranking=rows_of(RankedCause, ranking), diagnosis=by_case, case=case.name,
+                   told=tuple(told))  # fmt: skip
 
 
 def _given(asked: Invocation) -> Given:
@@ -320,9 +318,9 @@ def _given(asked: Invocation) -> Given:
     return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
 
 
-def _after(doc: dict[str, Any]) -> dict[str, Any]:
+def _after(diagnosis: Mapping[str, Any]) -> dict[str, Any]:
     """Run that the diagnosis recommends, and the command that takes it in."""
-    told = dict(doc["diagnosis"].get("next_measurement") or {})
+    told = dict(diagnosis.get("next_measurement") or {})
     commands = told.get("commands") or [""]
     return {**told, "command": commands[0]}
 

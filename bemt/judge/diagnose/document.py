@@ -340,7 +340,7 @@ def _ratios(d: Diagnosis) -> list[tuple[str, float]]:
     """Loads of the recording over those of the reference at equal speed, less 1; none where they were not compared."""
     if d.change is None:
         return []
-    return [(c.name, d.change.ratios[c.channel]["ratio"] - 1.0) for c in d.change.loads_by_name.values()]
+    return [(c.name, d.change.ratios[c.channel].ratio - 1.0) for c in d.change.loads_by_name.values()]
 
 
 def _from_reference(d: Diagnosis) -> str:

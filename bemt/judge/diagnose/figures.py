@@ -15,16 +15,17 @@ from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
 from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
+from bemt.judge.compare.first_picture import PredictionView, against_band
 from bemt.judge.diagnose import figures_effects, figures_posterior
 from bemt.judge.diagnose.document import headline
-from bemt.judge.diagnose.figures_recording import first_picture
 from bemt.judge.diagnose.record import CHANNELS
+from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from bemt.judge.compare.first_picture import PredictionView
     from bemt.judge.diagnose.answer import Diagnosis
+    from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
 Index = NDArray[np.intp]
@@ -401,3 +402,24 @@ def _curve(x: Array, y: Array) -> tuple[Array, Array]:
     group = np.cumsum(np.r_[0, step])
     count = np.bincount(group)
     return np.bincount(group, x[order]) / count, np.bincount(group, y[order]) / count
+
+
+# The first picture of a diagnosis: what was recorded, inside the prediction band of its case.
+def points_of(record: Record) -> Dataset:
+    """Give the points of a record, with their loads and what these are uncertain by."""
+    loads = [c for c in ("thrust_N", "torque_Nm") if c in record.measured]
+    rho = np.broadcast_to(np.asarray(record.air.rho, dtype=float), record.rpm.shape)
+    state = {"rpm": record.rpm, "airspeed_m_s": record.V, "density_kg_m3": rho}
+    values = state | {c: record.measured[c] for c in loads}
+    first, *more = record.name.split(", ")  # a legend has no room for several
+    name = f"{first} and {len(more)} more" if more else first
+    return Dataset("points", name, values, {c: record.u[c] for c in loads})
+
+
+def first_picture(records: Sequence[Record], cases: Sequence[Case]) -> list[PredictionView]:
+    """Put records beside their cases, one view a case; ``cases`` are one for all records, or one for each."""
+    each = list(cases) * len(records) if len(cases) == 1 else list(cases)
+    groups: dict[str, tuple[Case, list[Dataset]]] = {}
+    for record, case in zip(records, each, strict=True):
+        groups.setdefault(str(case.path.resolve()), (case, []))[1].append(points_of(record))
+    return [against_band(case, points) for case, points in groups.values()]

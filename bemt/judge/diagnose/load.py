@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.headings import surely_shaft_speed
 from bemt.data.recordings.channels import file_name, named, stated
@@ -203,8 +203,7 @@ def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
         if ratio.size and abs(float(np.median(ratio)) - 1.0) > _SAME:
             faults.append(Fault(path, "J", f"airspeed over n D is {np.median(ratio):.3g} times it", "the same number",
                                 "Wrong diameter in the case, or wrong unit of the airspeed?"))  # fmt: skip
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _unused(imported: Dataset, rows: Dataset, case: Case) -> list[str]:
@@ -277,7 +276,7 @@ _File = tuple[Any, "Case", float | None, float | None]
 def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, float | None, Dataset | None]]:
     """Files with the CFD run that each is; runs of one condition on several grids are one study, no repeats."""
     from bemt.data.recordings.cfd_run import run_at
-    from bemt.data.recordings.cfd_study import are_grids, together
+    from bemt.data.recordings.grid_study import are_grids, together
 
     runs: dict[int, Dataset] = {}
     for i, (path, _, rpm, wind) in enumerate(files if len(files) > 1 else ()):
@@ -310,12 +309,9 @@ def _together(*steps: Callable[[], Any]) -> list[Any]:
     out: list[Any] = []
     faults: list[Fault] = []
     for step in steps:
-        try:
+        with gathered(faults):
             out.append(step())
-        except InputError as error:
-            faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return out
 
 
@@ -350,8 +346,7 @@ def _told_twice(given: Sequence[Any], only: Sequence[str], ruled_out: Sequence[s
     faults = [Fault(p, "", "a recording given twice", "each once", "Its points would count twice")
               for k, p in enumerate(paths) if files[k] in files[:k]]  # fmt: skip
     faults += [*_unknown(only), *_unknown(ruled_out, "--ruled-out")]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _unknown(only: Sequence[str], option: str = "--only") -> list[Fault]:

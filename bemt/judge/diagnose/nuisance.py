@@ -7,7 +7,7 @@ fitting them first would absorb the physics.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -47,40 +47,59 @@ PULSE_POWERS = 6
 _FORM_FLOOR = 0.005
 
 
+Add = Callable[..., None]
+"""Takes the name of a nuisance and its column."""
+
+
 def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool_], Array]:
     """Tangents of everything that may differ without being a cause."""
     columns: list[Array] = []
     names: list[str] = []
     solver: list[bool] = []
-    y, f0, channel = problem.y, problem.f0, problem.channel
-
-    stretch = problem.stretch
 
     def add(name: str, column: Array, of_reading: bool = False, own: bool = False) -> None:
-        column = column if of_reading else column * stretch
+        column = column if of_reading else column * problem.stretch
         if np.isfinite(column).all() and np.any(column != 0.0):
             columns.append(column)
             names.append(name)
             solver.append(own)
 
-    def everywhere(extra: Effect, where_on: bool = False) -> Array:
-        """Readings with an effect that reference recordings have too, or only in the parts whose case has it."""
-        full = []
-        for p in problem.parts:
-            others = [e for e in p.baseline if e.id != extra.id]
-            off = where_on and len(others) == len(p.baseline)
-            full.append(p.predict(p.baseline if off else (*others, extra)))
-        return np.concatenate(full)[problem.kept]
+    offset = _of_blade(problem, add)
+    _of_stand(problem, add)
+    _of_flow_and_level(problem, add)
+    _of_drives(problem, add)
+    _of_model(problem, add)
+    matrix = np.stack(columns, axis=1) if columns else np.zeros((problem.y.size, 0))
+    return matrix, tuple(names), np.array(solver, dtype=bool), offset
 
-    blade, offset = problem.blade, np.zeros_like(y)
-    tangents = np.zeros((y.size, blade.at.size))
+
+def _everywhere(problem: Problem, extra: Effect, where_on: bool = False) -> Array:
+    """Readings with an effect that reference recordings have too, or only in the parts whose case has it."""
+    full = []
+    for p in problem.parts:
+        others = [e for e in p.baseline if e.id != extra.id]
+        off = where_on and len(others) == len(p.baseline)
+        full.append(p.predict(p.baseline if off else (*others, extra)))
+    return np.concatenate(full)[problem.kept]
+
+
+def _of_blade(problem: Problem, add: Add) -> Array:
+    """What is open of the blade; gives the offset of the readings from its mean."""
+    blade, offset = problem.blade, np.zeros_like(problem.y)
+    tangents = np.zeros((problem.y.size, blade.at.size))
     for k in blade.used:
-        up, down = (everywhere(blade.changed(int(k), s * blade.steps[k])) for s in (1.0, -1.0))
-        tangents[:, k] = (up - down) / (2.0 * blade.steps[k]) * stretch
+        up, down = (_everywhere(problem, blade.changed(int(k), s * blade.steps[k])) for s in (1.0, -1.0))
+        tangents[:, k] = (up - down) / (2.0 * blade.steps[k]) * problem.stretch
     if np.isfinite(tangents).all():
         offset = tangents @ (blade.at - blade.mean)
         for j in range(blade.root.shape[1]):
             add(f"blade {NAMES[j]}", tangents @ blade.root[:, j], of_reading=True)
+    return offset
+
+
+def _of_stand(problem: Problem, add: Add) -> None:
+    """Gains and zeros."""
+    y, channel = problem.y, problem.channel
     rows = [(i, p) for i, p in enumerate(problem.parts)]
     for c, name in ((0, "thrust"), (1, "torque")):
         here, key = channel == c, CHANNELS[c]
@@ -94,6 +113,11 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             if c == 1 and p.record.electrical:
                 mine = here & (problem.part == i)
                 add(f"losses of the motor{tag}", np.where(mine, BY_POWER * y, 0.0), of_reading=True)
+
+
+def _of_flow_and_level(problem: Problem, add: Add) -> None:
+    """Speed, air, and the level of the model over the advance ratio."""
+    f0, channel = problem.f0, problem.channel
     load = channel < 2
     slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
@@ -117,6 +141,10 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
     recorded = all(p.record.air_recorded for p in problem.parts)
     add("density", np.where(load, PRIORS["density" if recorded else "density not recorded"] * f0, 0.0))
     add("airspeed", np.where(load, PRIORS["airspeed"] * V * slope_V, 0.0))
+
+
+def _of_drives(problem: Problem, add: Add) -> None:
+    y, f0, channel = problem.y, problem.f0, problem.channel
     for tag, drives in _drives(problem):
         pulse = np.concatenate([drives[i].record.extra["pwm_s"] for i in drives])
         middle, span = pulse.mean(), max(float(np.ptp(pulse)), 1e-12)
@@ -139,9 +167,14 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
                     [_by_volts(p) if p is part else np.zeros(len(p.record)) for p in problem.parts]
                 )
                 add(f"voltage as recorded{tag}", np.where(mine, follows[problem.point] * f0, 0.0))
+
+
+def _of_model(problem: Problem, add: Add) -> None:
+    """Parameters and forms of the effects that are on."""
+    f0 = problem.f0
     for wake in {p.model.duct.wake_ratio for p in problem.parts if p.model.duct is not None}:
         wider = DuctEffect(wake_ratio=(1.0 + PRIORS["jet area of a duct"]) * wake)
-        add("jet area of a duct", everywhere(wider) - f0, own=True)
+        add("jet area of a duct", _everywhere(problem, wider) - f0, own=True)
     for e in problem.baseline:
         for parameter in e.parameters:
             if not e.diagnosed:
@@ -149,10 +182,10 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             step = PRIORS["parameter of the model"] * (parameter.high - parameter.low)
             value = float(getattr(e, parameter.name))
             value = value + step if value + step <= parameter.high else value - step
-            changed = everywhere(replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
+            changed = _everywhere(problem, replace(e, **{parameter.name: value}), where_on=True) - f0  # type: ignore[type-var]
             add(f"{e.id} {parameter.name}", changed, own=True)
         for form in _other_forms(e):
-            changed = everywhere(replace(e, form=form), where_on=True) - f0  # type: ignore[call-arg]
+            changed = _everywhere(problem, replace(e, form=form), where_on=True) - f0  # type: ignore[call-arg, type-var]
             add(f"{e.id} as {form}", changed, own=True)
     for e in (e for e in problem.baseline if e.id != AsBuilt.id):
         without = [p.predict([b for b in p.baseline if b.id != e.id]) for p in problem.parts]
@@ -164,8 +197,6 @@ def nuisances(problem: Problem) -> tuple[Array, tuple[str, ...], NDArray[np.bool
             modes = spread * smooth_modes(problem, e.along, law_of(e))
             for k in range(modes.shape[1]):
                 add(f"form of {e.id}", share * modes[:, k], own=not alone)
-    matrix = np.stack(columns, axis=1) if columns else np.zeros((y.size, 0))
-    return matrix, tuple(names), np.array(solver, dtype=bool), offset
 
 
 def _other_forms(e: Effect) -> list[str]:

@@ -141,11 +141,9 @@ def _slips(problem: Problem, found: dict[str, float]) -> Iterator[_Slip]:
         if 1 in (miscount.true, miscount.set):
             off = -2.0 * math.log(miscount.ratio)
             yield (
-                "poles" if miscount.set == 1 else "divided twice",
-                miscount.words,
-                dict.fromkeys(found, off),
+                "poles" if miscount.set == 1 else "divided twice", miscount.words, dict.fromkeys(found, off),
                 0.5 + miscount.rarity,
-            )
+            )  # fmt: skip
     for error in unit_errors.errors("rotation"):
         yield "speed", f"rpm: {error.words}", dict.fromkeys(found, -2.0 * math.log(error.factor)), 1.0 + error.rarity
     for channel, kind in ((T, "force"), (Q, "torque")):

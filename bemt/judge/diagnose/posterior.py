@@ -20,7 +20,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum, shares
 from bemt.base.gaussian.whitening import conditional
 from bemt.judge.diagnose import form, noise, prior
-from bemt.judge.diagnose.state import State
+from bemt.judge.diagnose.form import State
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base

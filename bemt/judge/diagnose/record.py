@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.diagnose.repeats import conditions, spread_sizes
 from bemt.physics.air import Air
@@ -270,8 +270,7 @@ def _plausible(values: Mapping[str, Array], file: str) -> None:
         if bad.size and v is not None:
             rows = ", ".join(str(i + 1) for i in bad[:5]) + (" ..." if bad.size > 5 else "")
             faults.append(Fault(file, f"{key}, point {rows}", f"{v[bad[0]]:.4g}", f"{low:g} to {high:g}", hint))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def thinned(record: Record, most: int = MAX_POINTS) -> Record:

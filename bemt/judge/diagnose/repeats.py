@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.gaussian.reml import Restricted
+from bemt.base.gaussian.whitening import Restricted
 
 FEWEST = 10
 """Repeats, less what is projected out, from which on they give the noise [1]."""

@@ -20,7 +20,7 @@ from bemt.base.action import in_words_of_the_library
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.judge.diagnose.improve import beside, elsewhere
+from bemt.judge.diagnose.folder import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.judge.diagnose.other_rotor import FACTOR
 from bemt.physics.air import Air
@@ -30,11 +30,11 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.as_built import posterior_document
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.reading import SETTLED
+from bemt.rotors.conditioning import SESSION
 from bemt.rotors.latents import NAMES, UNITS
 from bemt.rotors.model import air_fields, air_of_points
 from bemt.rotors.propeller import Propeller
 from bemt.rotors.propeller import load as load_rotor
-from bemt.rotors.reference import SESSION
 
 SCHEMA = "bemt.rotor_calibration/1"
 POSTERIOR = "as_built.json"
@@ -91,56 +91,6 @@ def _this_rotor(case: Case, paths: Sequence[str], y: Sequence[Any], rpm: Any, V:
         hint = "Look at units, diameter, pitch and speed; `bemt diagnose` ranks what explains it"
         raise InputError(Fault(", ".join(paths), "", f"{told} what the case gives",
                                f"loads of this rotor, within a factor of {FACTOR:g}", hint))  # fmt: skip
-
-
-def document(case: Case, found: AsMeasured, paths: Sequence[str]) -> dict[str, Any]:
-    """Plain values of schema ``bemt.rotor_calibration/1``."""
-    numbers = {
-        name: {"unit": UNITS[name], "before": float(found.prior.mean[k]), "u_before": float(found.prior.sd[k]),
-               "after": float(found.posterior.mean[k]), "u_after": float(found.posterior.sd[k])}
-        for k, name in enumerate(NAMES)
-    }  # fmt: skip
-    size = float(found.found.weights @ found.prior.sizes)
-    airspeed = flight_point(case, found)
-    out: dict[str, Any] = plain({
-        "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in paths], "points": found.points,
-        "converged": found.found.converged, "steps": found.found.steps, "log_evidence": found.found.log_evidence,
-        "size": size, "excess": found.found.excess, "known_from": found.prior.known_from, "numbers": numbers,
-        "recommended_airspeed_m_s": airspeed, "rpm": case.rpm,
-        "recommended_J": None if airspeed is None else airspeed / (case.rpm / 60.0 * case.diameter_m),
-    })  # fmt: skip
-    return out
-
-
-def text(doc: dict[str, Any]) -> str:
-    """Document for people."""
-    words = {
-        "angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
-        "camber_deg": "zero-lift angle lower by",
-    }  # fmt: skip
-    state = f"{'converged' if doc['converged'] else 'NOT CONVERGED'} after {doc['steps']} iterations"
-    lines = [f"{doc['case']}: {doc['points']} points of {', '.join(doc['reference'])}; {state}"]
-    lines.append(
-        f"{'rotor as built, beyond its ' + doc['known_from']:42} {'before':>8} {'u':>7}   {'after':>8} {'u':>7}"
-    )
-    for name, n in doc["numbers"].items():
-        unit = "" if n["unit"] == "1" else f" [{n['unit']}]"
-        cells = f"{n['before']:+8.3f} {n['u_before']:7.3f}   {n['after']:+8.3f} {n['u_after']:7.3f}"
-        lines.append(f"{words[name] + unit:42} {cells}")
-    if doc["size"] > 2.0:
-        lines.append(f"This rotor is {doc['size']:.1f} times as far from its description as usual: check the case.")
-    if doc["excess"] > 1.0:
-        times = number_text(math.sqrt(doc["excess"]), 2)
-        lines.append(
-            f"No rotor of this kind gives these readings: noise taken as {times} times larger. Check the recording."
-        )
-    if doc["recommended_airspeed_m_s"] is not None:
-        lines.append(
-            "All points are at rest, which leaves flight uncertain. Recommended: one flight point too, at an advance\n"
-            f"ratio near {doc['recommended_J']:.2f}, such as {doc['recommended_airspeed_m_s']:.0f} m/s at "
-            f"{doc['rpm']:g} rev/min; name both recordings as REFERENCE."
-        )
-    return "\n".join(lines)
 
 
 def write(
@@ -204,6 +154,41 @@ def flight_point(case: Case, found: AsMeasured) -> float | None:
     return 0.5 * ZERO_THRUST_MEASURED * pitch * case.rpm / 60.0
 
 
+_WORDS = {"angle_deg": "blade angle", "lift": "lift (ln)", "drag": "drag (ln)",
+          "camber_deg": "zero-lift angle lower by"}  # fmt: skip
+
+
+def _size(found: AsMeasured) -> float:
+    """Distance of the rotor from its description, in those of usual rotors [1]."""
+    return float(found.found.weights @ found.prior.sizes)
+
+
+def lines_of(case: Case, one: AsMeasured, paths: Sequence[str], advice: bool = True) -> list[str]:
+    """What the runs say, for people; with ``advice`` also the point that would say more."""
+    state = f"{'converged' if one.found.converged else 'NOT CONVERGED'} after {one.found.steps} iterations"
+    head = f"rotor as built, beyond its {one.prior.known_from}"
+    lines = [f"{case.name}: {one.points} points of {', '.join(Path(p).name for p in paths)}; {state}",
+             f"{head:42} {'before':>8} {'u':>7}   {'after':>8} {'u':>7}"]  # fmt: skip
+    for k, name in enumerate(NAMES):
+        word = _WORDS[name] + ("" if UNITS[name] == "1" else f" [{UNITS[name]}]")
+        (m0, u0), (m1, u1) = ((d.mean[k], d.sd[k]) for d in (one.prior, one.posterior))
+        lines.append(f"{word:42} {m0:+8.3f} {u0:7.3f}   {m1:+8.3f} {u1:7.3f}")
+    if (size := _size(one)) > 2.0:
+        lines.append(f"This rotor is {size:.1f} times as far from its description as usual: check the case.")
+    if one.found.excess > 1.0:
+        times = number_text(math.sqrt(one.found.excess), 2)
+        lines.append(
+            f"No rotor of this kind gives these readings: noise taken as {times} times larger. Check the recording."
+        )
+    if advice and (V := flight_point(case, one)) is not None:
+        lines.append(
+            "All points are at rest, which leaves flight uncertain. Recommended: one flight point too, at an advance\n"
+            f"ratio near {V / (case.rpm / 60.0 * case.diameter_m):.2f}, such as {V:.0f} m/s at {case.rpm:g} rev/min; "
+            "name both recordings as REFERENCE."
+        )
+    return lines
+
+
 @dataclass(frozen=True, eq=False)
 class CalibratedRotor:
     """A rotor as its own runs show it, returned by :func:`bemt.calibrate_rotor`.
@@ -245,7 +230,7 @@ class CalibratedRotor:
     @property
     def text(self) -> str:
         """What the runs say, and the next command."""
-        lines = [text(self.to_dict())]
+        lines = lines_of(self.source.case, self.found, self.recordings)
         if self.folder is None:
             return "\n".join([*lines, "nothing written; --out DIR writes the case with this rotor"])
         typed = shlex.quote(Path(self.folder).as_posix())
@@ -254,8 +239,23 @@ class CalibratedRotor:
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert to plain values of schema ``bemt.rotor_calibration/1``."""
-        return document(self.source.case, self.found, self.recordings)
+        """Plain values of schema ``bemt.rotor_calibration/1``."""
+        case, one = self.source.case, self.found
+        numbers = {
+            name: {"unit": UNITS[name], "before": float(one.prior.mean[k]), "u_before": float(one.prior.sd[k]),
+                   "after": float(one.posterior.mean[k]), "u_after": float(one.posterior.sd[k])}
+            for k, name in enumerate(NAMES)
+        }  # fmt: skip
+        airspeed = flight_point(case, one)
+        out: dict[str, Any] = plain({
+            "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in self.recordings],
+            "points": one.points, "converged": one.found.converged, "steps": one.found.steps,
+            "log_evidence": one.found.log_evidence, "size": _size(one), "excess": one.found.excess,
+            "known_from": one.prior.known_from, "numbers": numbers, "recommended_airspeed_m_s": airspeed,
+            "rpm": case.rpm,
+            "recommended_J": None if airspeed is None else airspeed / (case.rpm / 60.0 * case.diameter_m),
+        })  # fmt: skip
+        return out
 
     def write(self, folder: str | os.PathLike[str]) -> Propeller:
         """Write the case of the rotor as measured, and load it.

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.folders import data_roots
+from bemt.base.given import data_roots
 from bemt.judge.proof.items import Item, recording_text
 from bemt.judge.proof.rows import Entry
 

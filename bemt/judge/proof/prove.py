@@ -23,8 +23,13 @@ from bemt import __version__
 from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.proof import draw, items, proof_text, real, resolve, score, seal
-from bemt.judge.proof.rows import Key, Miss, Proof, ToldAnswer
+from bemt.judge.proof import draw, items, proof_text, real, score, seal
+from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof.items import Bench
+from bemt.judge.proof.rigs import extended
+from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ToldAnswer
+from bemt.judge.proof.separation import yardstick
+from bemt.judge.proof.stand import Stand
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -169,7 +174,7 @@ def proof(out: Path, digest: str | None = None) -> Proof:
         if made and asks(stored.answer) and (out / ASKED / entry.folder).exists():
             again.append(score.judge(entry, seal.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
         if made and stored.answer:
-            settles = resolve.resolves(found[entry.rig, entry.plan], entry, stored.answer)
+            settles = resolves(found[entry.rig, entry.plan], entry, stored.answer)
             settled += [] if settles is None else [settles]
         seconds.append(stored.seconds)
         if not stored.answer:
@@ -234,3 +239,30 @@ def prove(
             write_atomic(folder / "proof.txt", proof_text.text(found) + "\n")
             write_atomic(folder / "proof.html", proof_text.html(found))
     return found
+
+
+# Whether the run that a diagnosis recommends would settle the tie, measured on the truth.
+_ENOUGH = 3.0
+
+
+def resolves(bench: Bench, entry: Entry, answer: ToldAnswer) -> bool | None:
+    """Whether the recommended points separate the concealed cause from what it was confused with."""
+    points = answer.step.points
+    if len(entry.causes) != 1 or not points or answer.verdict not in ("class", "insufficient"):
+        return None
+    name = entry.causes[0]
+    named = [*answer.effects, *answer.step.separates]
+    more = Bench(bench.rig, bench.plan, extended(bench.rows, points))
+    able = {c.id: c for c in more.allowed()}
+    rivals = [i for i in dict.fromkeys(named) if i != name and i in able]
+    if not rivals or name not in CAUSES:
+        return None
+    cause = CAUSES[name]
+    change = cause.make(entry.strengths[0], bench.rig, bench.rows, np.random.default_rng(entry.seed))
+    plain, columns = more.measure(more.plain(), Stand())
+    electric = {str(n): columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in columns}
+    rule = yardstick(plain, more.rows.run, Stand(**entry.stand), more.tangents(), electric)
+    rng = np.random.default_rng(0)
+    others = {i: rule.stack(more.signature(able[i].make(1.0, more.rig, more.rows, rng), able[i])) for i in rivals}
+    own = rule.stack(more.signature(change, cause))
+    return rule.separation(own)[1] >= _ENOUGH and not rule.alike(own, others, _ENOUGH)

@@ -17,7 +17,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import data_roots, find_data
+from bemt.base.given import data_roots, find_data
 from bemt.data.readers.uiuc_names import class_of
 from bemt.judge.proof.items import Item, recording_text
 from bemt.judge.proof.pairs import draw_pairs

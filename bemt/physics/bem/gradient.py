@@ -55,14 +55,9 @@ class Gradient:
 
 
 def gradient(
-    model: Model,
-    effects: Sequence[Effect],
-    rpm: float,
-    airspeed_m_s: float,
-    air: Air,
-    stations: Stations | None = None,
-    step: float = STEP,
-) -> Gradient:
+    model: Model, effects: Sequence[Effect], rpm: float, airspeed_m_s: float, air: Air,
+    stations: Stations | None = None, step: float = STEP,
+) -> Gradient:  # fmt: skip
     """Differentiate the rotor's thrust and torque at one point.
 
     Notes

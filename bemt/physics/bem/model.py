@@ -222,17 +222,10 @@ class Model:
 
 
 def solve(
-    rotor: Rotor,
-    polars: Polar | Sequence[tuple[float, Polar]] | None = None,
-    effects: Sequence[Effect] | None = None,
-    duct: Duct | DuctFlow | None = None,
-    *,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    air: Air | None = None,
-    n_stations: int = 40,
-    threads: int = 1,
-) -> Dataset:
+    rotor: Rotor, polars: Polar | Sequence[tuple[float, Polar]] | None = None,
+    effects: Sequence[Effect] | None = None, duct: Duct | DuctFlow | None = None, *, rpm: ArrayLike,
+    V: ArrayLike = 0.0, air: Air | None = None, n_stations: int = 40, threads: int = 1,
+) -> Dataset:  # fmt: skip
     """Solve a rotor at operating points.
 
     Examples

@@ -144,17 +144,10 @@ class Solution:
 
 
 def prepare(
-    rotor: Rotor,
-    polars: Sequence[tuple[float, Polar]],
-    effects: Iterable[Effect] | None = None,
-    duct: DuctFlow | None = None,
-    n_stations: int = 40,
-    stations: Stations | None = None,
-    mach_max: float = 1.25,
-    *,
-    level: float = 1.0,
-    re_range: tuple[float, float] | None = None,
-) -> Prepared:
+    rotor: Rotor, polars: Sequence[tuple[float, Polar]], effects: Iterable[Effect] | None = None,
+    duct: DuctFlow | None = None, n_stations: int = 40, stations: Stations | None = None, mach_max: float = 1.25, *,
+    level: float = 1.0, re_range: tuple[float, float] | None = None,
+) -> Prepared:  # fmt: skip
     """Bake a rotor, its section tables and its effects (default: the standard ones) for the kernel.
 
     A blade without sections counts as 12 % thick (wave drag). Section tables at r/R blend linearly between them and are
@@ -270,15 +263,9 @@ def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, 
 
 
 def solve(
-    prep: Prepared,
-    rpm: ArrayLike,
-    V: ArrayLike = 0.0,
-    air: Air | None = None,
-    *,
-    radial: bool = False,
-    threads: int = 1,
-    side: ArrayLike = 0.0,
-) -> Solution:
+    prep: Prepared, rpm: ArrayLike, V: ArrayLike = 0.0, air: Air | None = None, *, radial: bool = False,
+    threads: int = 1, side: ArrayLike = 0.0,
+) -> Solution:  # fmt: skip
     """Solve operating points.
 
     Parameters

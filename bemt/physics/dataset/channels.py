@@ -17,24 +17,10 @@ model's own error on real rotors, discretisation."""
 
 DIMENSIONLESS = frozenset(
     {
-        "CT",
-        "CP",
-        "CQ",
-        "J",
-        "eta",
-        "FM",
-        "Re",
-        "Re75",
-        "M_tip",
-        "M_tip_helical",
-        "throttle",
-        "duct_share",
-        "run",
-        "thrust_ratio",
-        "upper_thrust_ratio",
-        "lower_thrust_ratio",
+        "CT", "CP", "CQ", "J", "eta", "FM", "Re", "Re75", "M_tip", "M_tip_helical", "throttle", "duct_share", "run",
+        "thrust_ratio", "upper_thrust_ratio", "lower_thrust_ratio",
     }
-)
+)  # fmt: skip
 """Channel names without a unit."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.physics.dataset.channels import DIMENSIONLESS, ORIGINS, channel_fault
 from bemt.physics.dataset.points import Dataset
 
@@ -133,8 +133,7 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
             u_by.setdefault(origin, {})[channel] = numbers * scale
         else:
             u[channel] = numbers * scale
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     flags = tuple(tuple(w for w in str(words).split("; ") if w) for words in frame["flags"]) if "flags" in frame else ()
     counted = isinstance(frame.index, pd.RangeIndex)
     labels = () if counted else tuple(map(str, frame.index))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of
 from bemt.physics import coefficients as co
 from bemt.physics.dataset import tables
@@ -277,11 +277,9 @@ class Dataset:
         0.03101
         """
         factors = {
-            "CT_rotor": ("CT", co.CT_PER_ROTOR),
-            "CP_rotor": ("CP", co.CP_PER_ROTOR),
-            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR),
-            "mu_axial": ("J", math.pi),
-        }
+            "CT_rotor": ("CT", co.CT_PER_ROTOR), "CP_rotor": ("CP", co.CP_PER_ROTOR),
+            "CQ_rotor": ("CQ", co.CQ_PER_ROTOR), "mu_axial": ("J", math.pi),
+        }  # fmt: skip
 
         def convert(channels: Mapping[str, ArrayLike]) -> dict[str, Array]:
             pairs = ((*factors.get(key, (key, 1.0)), array) for key, array in channels.items())
@@ -323,8 +321,7 @@ class Dataset:
             faults.append(Fault(self.name, "diameter_m", f"{diameter_m:g}", "a positive number", ""))
         if rho is not None and np.any(rho <= 0):
             faults.append(Fault(self.name, "density_kg_m3", "a density that is not positive", "positive numbers", ""))
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
         values, u = dict(self.values), dict(self.u)
         n = values["rpm"] / 60.0 if "rpm" in values else None
 

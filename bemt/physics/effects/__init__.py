@@ -21,17 +21,9 @@ from functools import lru_cache
 from bemt.physics.effects.base import Effect, Parameter, RotorBuild
 
 __all__ = [
-    "RotorBuild",
-    "Effect",
-    "Parameter",
-    "catalogue",
-    "from_text",
-    "places",
-    "source_of",
-    "standard",
-    "to_text",
+    "RotorBuild", "Effect", "Parameter", "catalogue", "from_text", "places", "source_of", "standard", "to_text",
     "without",
-]
+]  # fmt: skip
 
 
 @lru_cache(maxsize=1)

@@ -188,19 +188,10 @@ def _by_rule(airfoil: Airfoil, n_crit: float, drag_level: float) -> Polar:
 
 
 def tunnel_polar(
-    airfoil: Airfoil,
-    *,
-    re: Array = DEFAULT_RE,
-    n_crit: float = 9.0,
-    xtr_upper: float = 1.0,
-    xtr_lower: float = 1.0,
-    model: str = "xlarge",
-    ar: float = 10.0,
-    cd_max: float | None = None,
-    method: str = "viterna",
-    past_stall: float = np.pi,
-    lift_floor: float = 0.5,
-) -> Polar:
+    airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0, xtr_lower: float = 1.0,
+    model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None, method: str = "viterna",
+    past_stall: float = np.pi, lift_floor: float = 0.5,
+) -> Polar:  # fmt: skip
     """Incompressible polar of a smooth section in a wind tunnel, continued to +-180 deg, cached on disk by content. [0]
 
     Two bounds keep low Reynolds numbers sane. NeuralFoil mirrors XFOIL, whose steady laminar separation without

@@ -249,17 +249,9 @@ def _viterna(a: Array, a_s: float, cl_s: float, cd_s: float, cd_max: float, meth
 
 
 def extend(
-    alpha: Array,
-    cl: Array,
-    cd: Array,
-    *,
-    lo: float,
-    hi: float,
-    cd_max: float,
-    out: Array = ALPHA_GRID,
-    half: float = 0.0,
-    method: str = "viterna",
-) -> tuple[Array, Array]:
+    alpha: Array, cl: Array, cd: Array, *, lo: float, hi: float, cd_max: float, out: Array = ALPHA_GRID,
+    half: float = 0.0, method: str = "viterna",
+) -> tuple[Array, Array]:  # fmt: skip
     """One section's cl and cd continued to +-pi: data between lo and hi, Viterna-Corrigan and reversed flow outside.
     [-]
 
@@ -308,13 +300,9 @@ class ExtrapolatedTable:
 
 
 def from_tables(
-    tables: Sequence[ExtrapolatedTable],
-    *,
-    name: str = "",
-    source: str = "",
-    cd_max: float | None = None,
+    tables: Sequence[ExtrapolatedTable], *, name: str = "", source: str = "", cd_max: float | None = None,
     notes: Sequence[str] = (),
-) -> Polar:
+) -> Polar:  # fmt: skip
     """Polar from single-Re tables, each continued to +-180 deg where its data stop."""
     top = viterna_cd_max(10.0) if cd_max is None else float(cd_max)
     re, mach = (np.unique([getattr(t, k) for t in tables]) for k in ("Re", "M"))

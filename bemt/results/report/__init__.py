@@ -72,12 +72,9 @@ def book_html(book: Book) -> str:
 
 
 def write(
-    paths: Sequence[str | Path],
-    out: str | Path,
-    progress: Callable[[str], None],
-    about: Mapping[str, str] | None = None,
-    recordings: Sequence[str] = (),
-) -> tuple[Book, tuple[Path, Path]]:
+    paths: Sequence[str | Path], out: str | Path, progress: Callable[[str], None],
+    about: Mapping[str, str] | None = None, recordings: Sequence[str] = (),
+) -> tuple[Book, tuple[Path, Path]]:  # fmt: skip
     """Sweep the cases into a folder and write the report beside; returns what it shows, and its two files.
 
     ``about`` holds title, author, date and revision for the head of the page, each as far as wanted.

@@ -14,13 +14,10 @@ from bemt.results.report.diagnosis_block import answer, diagnosis_verdict, headl
 from bemt.results.report.plot import Mark, Plot, figure, points
 
 SOURCES = {
-    "bemt": ("BEMT", "circle", 0.28),
-    "cfd": ("CFD, recorded", "diamond", 0.06),
-    "bench": ("bench", "cross", 0.06),
-    "vendor": ("vendor", "triangle", 0.06),
-    "openfoam": ("CFD, own", "star", -0.14),
+    "bemt": ("BEMT", "circle", 0.28), "cfd": ("CFD, recorded", "diamond", 0.06), "bench": ("bench", "cross", 0.06),
+    "vendor": ("vendor", "triangle", 0.06), "openfoam": ("CFD, own", "star", -0.14),
     "k1k2": ("K1/K2", "square", -0.34),
-}
+}  # fmt: skip
 """Name, marker, and lane in the row of a case, so that no bar lies under another source's mark."""
 SHOWN = (0.4, 2.0)
 """Ratios that the chart holds; others stand at its edge with their value."""
@@ -109,11 +106,9 @@ def front_parts(book: Book, ids: Sequence[str]) -> list[Part]:
     badges = [page_verdict(page)[1] for page in book.cases]
     told = [text for lead, text in NEEDS.items() if any(badge.startswith(lead) for badge in badges)]
     return [
-        ("words", " ".join(told) if plot else ""),
-        ("figures", [plot] if plot else []),
-        ("words", OF_TABLE),
+        ("words", " ".join(told) if plot else ""), ("figures", [plot] if plot else []), ("words", OF_TABLE),
         ("table", _comparison_table(book, ids)),
-    ]
+    ]  # fmt: skip
 
 
 def plain_markdown(value: Any, limit: int = 500) -> str:

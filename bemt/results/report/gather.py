@@ -252,7 +252,7 @@ def diagnose_into(
     from bemt.judge.diagnose import folder
     from bemt.judge.diagnose.chain import diagnose
     from bemt.judge.diagnose.document import document
-    from bemt.judge.diagnose.figures_recording import first_picture
+    from bemt.judge.diagnose.figures import first_picture
     from bemt.judge.diagnose.load import load_all
 
     cases = find_cases(paths)
@@ -269,9 +269,9 @@ def diagnose_into(
     except InputError as error:
         if len(recordings) > 1 or any(f.where != "readings" for f in error.faults):
             raise
-        told = compare_run(recordings[0], found[0], progress) | about
-        few = f"One point cannot name a cause. {told['sentence']} Next: {told['next']}."
-        told |= {"verdict": "insufficient", "effects": [], "explanation": few}
+        one = compare_run(recordings[0], found[0], progress)
+        few = f"One point cannot name a cause. {one.sentence} Next: {one.next}."
+        told = one.document() | about | {"verdict": "insufficient", "effects": [], "explanation": few}
         write_atomic(Path(target) / "diagnosis.json", json_text(told))
         write_atomic(Path(target) / f"{FIRST}.png", first_picture(records, found)[0].png())
         return

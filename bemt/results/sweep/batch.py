@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bemt
-from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, refuse, system_fault
 from bemt.base.tables import plain, remove_stale
 from bemt.base.toml_text import Collector
 from bemt.results.sweep import store
@@ -74,13 +74,9 @@ def _failed(path: Path, error: BaseException, name: str = "") -> Result:
 
 
 def run_case(
-    ready: Ready,
-    out: Path | None,
-    resume: bool,
-    threads: int,
-    progress: Callable[[float, str], None] | None = None,
+    ready: Ready, out: Path | None, resume: bool, threads: int, progress: Callable[[float, str], None] | None = None,
     engine: Engine | None = None,
-) -> Result:
+) -> Result:  # fmt: skip
     """Do everything for one case; never raises but for an interrupt."""
     tell = progress or (lambda share, what: None)
     case, mark = ready
@@ -136,13 +132,8 @@ def _follow_parent() -> None:
 
 
 def _results(
-    cases: Sequence[Ready],
-    out: Path | None,
-    resume: bool,
-    jobs: int | None,
-    bar: Progress,
-    engine: Engine | None,
-) -> Iterator[tuple[int, Result]]:
+    cases: Sequence[Ready], out: Path | None, resume: bool, jobs: int | None, bar: Progress, engine: Engine | None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Results in the order in which they come."""
     if engine is not None or jobs is None or jobs == 1 or len(cases) == 1:  # one process; its grid may use all cores
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -246,8 +237,7 @@ def _check_options(engine: str, scheduler: str | None, jobs: int | None) -> None
     if scheduler is not None and jobs is not None:
         expected = "nothing with --scheduler, whose cluster has its workers"
         faults.append(Fault("", "--jobs", str(jobs), expected, "Leave it out"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if engine == "dask":
         require_extra("--engine dask", "dask", "distributed")
 

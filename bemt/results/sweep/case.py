@@ -57,7 +57,7 @@ def _runs(case: Case) -> list[tuple[str, Dataset]]:
     """CFD runs of a case; those of one condition on several grids as one study."""
     if not case.run_paths:
         return []
-    from bemt.data.recordings.cfd_study import merged
+    from bemt.data.recordings.grid_study import merged
     from bemt.data.recordings.load import import_file
 
     return [(str(d.provenance["file"]), d) for d in merged([import_file(path) for path in case.run_paths])]
@@ -198,12 +198,8 @@ Recorded = tuple[Row, int, dict[str, float]]
 
 
 def _recorded_rows(
-    case: Case,
-    refs: list[Reference],
-    diameter: float,
-    points: list[tuple[float, float, float]],
-    nominal: Dataset,
-) -> list[Recorded]:
+    case: Case, refs: list[Reference], diameter: float, points: list[tuple[float, float, float]], nominal: Dataset,
+) -> list[Recorded]:  # fmt: skip
     """Rows of all recorded values, coefficients derived."""
     if not refs:
         return []

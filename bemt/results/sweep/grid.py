@@ -250,14 +250,9 @@ def _merge(statistics: list[Statistics]) -> Statistics:
 
 
 def run_grid(
-    case: Case,
-    folder: Path | None,
-    fingerprint: str,
-    threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-    resume: bool = True,
-    engine: Engine | None = None,
-) -> GridResult | None:
+    case: Case, folder: Path | None, fingerprint: str, threads: int = 1,
+    progress: Callable[[int, int], None] | None = None, resume: bool = True, engine: Engine | None = None,
+) -> GridResult | None:  # fmt: skip
     """Solve the grid of a case."""
     grid = Grid.of(case)
     if grid is None:

@@ -205,12 +205,9 @@ def case_text(result: Result) -> str:
     if result.drive:
         lines += ["", _wrap(result.drive.text, "  "), ""]
     lines += [
-        _main_table(result),
-        *_fan_lines(result.fan),
-        *_pair_lines(result.pair),
-        *_comparison_lines(result),
+        _main_table(result), *_fan_lines(result.fan), *_pair_lines(result.pair), *_comparison_lines(result),
         *_audit_lines(result),
-    ]
+    ]  # fmt: skip
     if result.assumptions:
         bemt = result.rows[0]
         low, high = bemt.thrust_N_range or (math.nan, math.nan)

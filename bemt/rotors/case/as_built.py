@@ -14,10 +14,10 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
+from bemt.rotors.conditioning import ReferenceRun
 from bemt.rotors.latents import NAMES, Prior
 from bemt.rotors.measured import records
 from bemt.rotors.population import label_angle_deg, population
-from bemt.rotors.reference import ReferenceRun
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -118,12 +118,7 @@ def _posterior(path: Path) -> CaseAsBuilt:
 def posterior_document(prior: Prior, reference: ReferenceRun, provenance: dict[str, object]) -> dict[str, object]:
     """Document that `blade.as_built.file` names."""
     return {
-        "schema": _SCHEMA,
-        "latents": list(NAMES),
-        "mean": prior.mean.tolist(),
-        "cov": prior.cov.tolist(),
-        "sizes": prior.sizes.tolist(),
-        "weights": prior.weights.tolist(),
-        "reference": reference.document(),
+        "schema": _SCHEMA, "latents": list(NAMES), "mean": prior.mean.tolist(), "cov": prior.cov.tolist(),
+        "sizes": prior.sizes.tolist(), "weights": prior.weights.tolist(), "reference": reference.document(),
         "provenance": provenance,
-    }
+    }  # fmt: skip

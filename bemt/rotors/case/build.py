@@ -81,14 +81,10 @@ def _blade(case: CaseFile, path: Path) -> Blade:
         chord = {"max_chord": blade.max_chord_over_R, "taper": blade.taper}
         laws = {"pitch": blade.pitch_m(case.rotor.diameter_m), "relief": blade.tip_relief}
         made = from_laws(
-            case.rotor.diameter_m,
-            blade.chord_law,
-            blade.pitch_law,
-            hub,
-            anchors=anchors,
+            case.rotor.diameter_m, blade.chord_law, blade.pitch_law, hub, anchors=anchors,
             chord={k: v for k, v in chord.items() if v is not None},
             pitch={k: v for k, v in laws.items() if v is not None},
-        )
+        )  # fmt: skip
         return _bent(
             case, from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
         )

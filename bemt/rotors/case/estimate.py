@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from bemt.base.action import in_words
-from bemt.base.errors import Fault, InputError
+from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError, gathered
 from bemt.base.given import numbers
-from bemt.base.tables import number_text, text_table
+from bemt.base.tables import number_text, or_null, text_table
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import find_family
 from bemt.physics.dataset import Dataset
@@ -54,14 +55,9 @@ def length_fault(option: str, value: float, unit: str, diameter_m: float, limits
 
 
 def case_of_label(
-    label: str,
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    reading: str | None = None,
-) -> Case:
+    label: str, blades: int | None = None, chord_mm: float | None = None, measured_pitch_in: float | None = None,
+    series: str | None = None, density: float | None = None, reading: str | None = None,
+) -> Case:  # fmt: skip
     """Case of a label with what else was measured of the propeller; a measured value is no unknown any more.
 
     A chord at 0.75 R scales the chord law; a pitch measured there replaces that of the label, which the population of
@@ -88,25 +84,34 @@ def case_of_label(
     return with_changes(case, changes | {"assumptions": left}) if changes else case
 
 
-def document(
-    label: str,
-    speeds: Sequence[float],
-    airspeeds: Sequence[float] = (),
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    angles: Sequence[float] = (),
-    reading: str | None = None,
-) -> dict[str, Any]:
+def of_label(
+    label: str, rpm: Any, airspeed_m_s: Any = 0.0, blades: int | None = None, chord_mm: float | None = None,
+    measured_pitch_in: float | None = None, series: str | None = None, density: float | None = None,
+    angle_deg: Any = 0.0, reading: str | Mapping[str, float] | None = None,
+) -> RotorEstimate:  # fmt: skip
     """Estimate every speed [rev/min] with every airspeed [m/s] at every angle between wind and shaft [deg].
 
-    ``bemt.estimate/2``; unknown numbers are null. ``u_...`` is the rotor's own, ``u_reading_...`` what a stand shows
+    ``u_...`` is the rotor's own, ``u_reading_...`` what a stand shows
     (`bemt.rotors.case.propagate.Propagated.u_reading`). ``reading`` as `bemt.rotors.case.reading` takes it.
 
     An unreadable label, impossible numbers and an unknown series are refused, all at once.
     """
+    asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
+    axes = [np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked]
+    try:
+        told = None if reading is None else reading_text(reading)
+        return _of_label(label, axes, blades, chord_mm, measured_pitch_in, series, density, told)
+    except InputError as error:
+        if not isinstance(label, str) or not Path(label).exists():
+            raise
+        hint = f"A case? bemt sweep {label} solves it"
+        raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
+
+
+def _of_label(
+    label: str, axes: Sequence[Sequence[float]], blades: int | None, chord_mm: float | None,
+    measured_pitch_in: float | None, series: str | None, density: float | None, reading: str | None,
+) -> RotorEstimate:  # fmt: skip
     told, faults = _label(label, blades)
     D = told.diameter_in * INCH if told else math.nan
     lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
@@ -119,9 +124,9 @@ def document(
         hint = "In g/m3? Divide by 1000" if 10.0 < density < 2000.0 else ""
         faults.append(Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
     rows: tuple[tuple[str, Sequence[float], float, float, str], ...] = (
-        ("--rpm", speeds, RPM.low, RPM.high, "rev/min"),
-        ("--airspeed-m-s", airspeeds, AIRSPEED.low, AIRSPEED.high, "m/s"),
-        ("--angle-deg", angles, ANGLE.low, ANGLE.high, "deg"),
+        ("--rpm", axes[0], RPM.low, RPM.high, "rev/min"),
+        ("--airspeed-m-s", axes[1], AIRSPEED.low, AIRSPEED.high, "m/s"),
+        ("--angle-deg", axes[2], ANGLE.low, ANGLE.high, "deg"),
     )  # fmt: skip
     faults += [
         Fault(option, "", f"{value:g}", f"{low:g} to {high:g} {unit}")
@@ -130,19 +135,14 @@ def document(
         if not low <= value <= high
     ]
     if series is not None:
-        try:
+        with gathered(faults):
             find_family(series)
-        except InputError as error:
-            faults += error.faults
     if reading is not None:
-        try:
+        with gathered(faults):
             parse_reading(reading)
-        except InputError as error:
-            faults += error.faults
     if faults or told is None:
         raise InputError(faults)
     case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density, reading)
-    axes = (speeds, list(airspeeds) or [0.0], list(angles) or [0.0])
     rpm, V, angle = (v.ravel() for v in np.meshgrid(*axes, indexing="ij"))
     found = propagate(case, rpm, V, angle_deg=angle)
     points, simple = found.points, k1k2_case(case, None, rpm, V, case.air(), angle)
@@ -159,10 +159,11 @@ def document(
              "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,
              "series": case.file.blade.family, "density_kg_m3": float(case.air().rho), "reading": reading,
              "known_from": case.as_built().prior.known_from, "source": measured_source(case)}  # fmt: skip
-    return {"schema": SCHEMA, "case": case.name, "given": given, "rows": [
-        {name: float(column[i]) if math.isfinite(column[i]) else None for name, column in columns.items()}
-        | {"flags": list(points.flags[i])} for i in range(rpm.size)
-    ]}  # fmt: skip
+    u = {"thrust_N": columns["u_thrust_N"], "power_W": columns["u_power_W"]}
+    values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
+    if (sideslip := np.radians(values.pop("angle_deg"))).any():
+        values["sideslip_rad"] = sideslip
+    return RotorEstimate("bemt", case.name, values, u, flags=points.flags, given=given, columns=columns)
 
 
 def measured_source(case: Case) -> str | None:
@@ -178,34 +179,6 @@ def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fau
         return None, list(error.faults)
 
 
-def text(doc: dict[str, Any]) -> str:
-    """Give the rows as a table, with what not to trust below."""
-
-    def shown(value: float | None, digits: int = 4) -> str:
-        return number_text(math.nan if value is None else value, digits)
-
-    head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "on a stand", "P [W]", "± 68 %", "± 95 %", "on a stand",
-            "K1/K2 [N]", "J", "M tip"]  # fmt: skip
-    keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "u_reading_thrust_N",
-                             "power_W", "u_power_W", "u95_power_W", "u_reading_power_W", "k1k2_thrust_N", "J",
-                             "M_tip")  # fmt: skip
-    if any(row["angle_deg"] for row in doc["rows"]):
-        head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
-    table = [
-        [shown(row[key], 2 if key.startswith("u") else 6 if key == "rpm" else 4) for key in keys] for row in doc["rows"]
-    ]
-    notes = [f"! {flag}" for flag in counted([row["flags"] for row in doc["rows"]])]
-    if doc["given"]["source"]:
-        notes.insert(0, f"as measured: {doc['given']['source']}")
-    notes.insert(0, "± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %")
-    more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
-    if doc["given"]["reading"] is None:
-        more.append("--reading rpm=...,thrust_g=...")
-    if more and doc["given"]["known_from"] == "label":
-        notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
-    return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class RotorEstimate(Dataset):
     """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
@@ -217,49 +190,37 @@ class RotorEstimate(Dataset):
     for narrower bands give --chord-mm, --measured-pitch-in, --reading rpm=...,thrust_g=... (chord and pitch at 0.75 R)
     """
 
-    found: dict[str, Any] = field(default_factory=dict)
+    given: Mapping[str, Any] = field(default_factory=dict)
+    columns: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
         """The rows as a table, with what not to trust below."""
-        return text(self.found)
+        head = ["rpm", "V [m/s]", "T [N]", "± 68 %", "± 95 %", "on a stand", "P [W]", "± 68 %", "± 95 %", "on a stand",
+                "K1/K2 [N]", "J", "M tip"]  # fmt: skip
+        keys: tuple[str, ...] = ("rpm", "airspeed_m_s", "thrust_N", "u_thrust_N", "u95_thrust_N", "u_reading_thrust_N",
+                                 "power_W", "u_power_W", "u95_power_W", "u_reading_power_W", "k1k2_thrust_N", "J",
+                                 "M_tip")  # fmt: skip
+        if self.columns["angle_deg"].any():
+            head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
+        digits = {key: 2 if key.startswith("u") else 6 if key == "rpm" else 4 for key in keys}
+        cells = zip(*([number_text(x, digits[key]) for x in self.columns[key]] for key in keys), strict=True)
+        notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
+        if self.given["source"]:
+            notes.append(f"as measured: {self.given['source']}")
+        notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
+        more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if self.given[key] is None]
+        if self.given["reading"] is None:
+            more.append("--reading rpm=...,thrust_g=...")
+        if more and self.given["known_from"] == "label":
+            notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
+        return "\n".join([text_table(head, map(list, cells), left=()), *notes]) + "\n"
 
     def __str__(self) -> str:
         return in_words(self.text)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values of schema ``bemt.estimate/2``."""
-        return self.found
-
-
-def of_label(
-    label: str,
-    rpm: Any,
-    airspeed_m_s: Any = 0.0,
-    blades: int | None = None,
-    chord_mm: float | None = None,
-    measured_pitch_in: float | None = None,
-    series: str | None = None,
-    density: float | None = None,
-    angle_deg: Any = 0.0,
-    reading: str | Mapping[str, float] | None = None,
-) -> RotorEstimate:
-    """`document` as a Dataset, standard uncertainties in ``u``."""
-    told = None if reading is None else reading_text(reading)
-    asked = (("rpm", rpm), ("airspeed_m_s", airspeed_m_s), ("angle_deg", angle_deg))
-    n, V, angle = (np.atleast_1d(numbers(*pair, finite=False)).ravel().tolist() for pair in asked)
-    try:
-        found = document(label, n, V, blades, chord_mm, measured_pitch_in, series, density, angle, told)
-    except InputError as error:
-        if not isinstance(label, str) or not Path(label).exists():
-            raise
-        hint = f"A case? bemt sweep {label} solves it"
-        raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
-    rows = found["rows"]
-    columns = {k: np.array([np.nan if r[k] is None else r[k] for r in rows], float) for k in rows[0] if k != "flags"}
-    u = {k[2:]: v for k, v in columns.items() if k[2:] in columns and k.startswith("u_")}
-    values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
-    if (sideslip := np.radians(values.pop("angle_deg"))).any():
-        values["sideslip_rad"] = sideslip
-    flags = tuple(tuple(r["flags"]) for r in rows)
-    return RotorEstimate("bemt", found["case"], values, u, flags=flags, found=found)
+        """Plain values of schema ``bemt.estimate/2``; unknown numbers are None."""
+        rows = [{name: or_null(column[i]) for name, column in self.columns.items()} | {"flags": list(self.flags[i])}
+                for i in range(len(self))]  # fmt: skip
+        return {"schema": SCHEMA, "case": self.name, "given": dict(self.given), "rows": rows}

@@ -149,15 +149,10 @@ def _tail(
 
 
 def label_text(
-    label: str,
-    blades: int | None = None,
-    rpm: float | None = None,
-    airspeed_m_s: float = 0.0,
-    family: str | None = None,
-    motor: tuple[float, int] | None = None,
-    measured: bool = True,
+    label: str, blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0,
+    family: str | None = None, motor: tuple[float, int] | None = None, measured: bool = True,
     reading: str | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """Write the case of a label such as ``10x5``, with its maker's series and K_v and cells of a motor if known.
 
     A label that names a measured propeller is that propeller, unless ``measured`` is False. A ``reading``
@@ -237,18 +232,10 @@ def _series(told: Designation | None, family: str | None) -> str:
 
 
 def stations_text(
-    file: str,
-    diameter_m: float,
-    blades: int,
-    rpm: float | None = None,
-    airspeed_m_s: float = 0.0,
-    hub_ratio: float = 0.15,
-    key: str = "stations",
-    label: Designation | None = None,
-    family: str | None = None,
-    motor: tuple[float, int] | None = None,
-    name: str = "",
-) -> str:
+    file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
+    hub_ratio: float = 0.15, key: str = "stations", label: Designation | None = None, family: str | None = None,
+    motor: tuple[float, int] | None = None, name: str = "",
+) -> str:  # fmt: skip
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
     The population of measured rotors weighs the pitch of the label against the angles of the stations.
@@ -286,14 +273,9 @@ def fan_text(
     P = pitch_in or 1.45 * D
     mm = 1e3 * diameter_m
     ranges = FAN_RANGES.format(
-        blades=B,
-        blades_low=max(B - 2, 2),
-        blades_high=B + 2,
-        pitch_low=0.85 * P,
-        pitch_high=1.15 * P,
-        gap_low=3e-3 * mm,
-        gap_high=1e-2 * mm,
-    )
+        blades=B, blades_low=max(B - 2, 2), blades_high=B + 2, pitch_low=0.85 * P, pitch_high=1.15 * P,
+        gap_low=3e-3 * mm, gap_high=1e-2 * mm,
+    )  # fmt: skip
     if blades:  # counted: no assumption
         ranges = "\n[[assumptions]]" + ranges.split("[[assumptions]]", 2)[2]
     drive, more = ("", ()) if motor is None else (drive_text(*motor), DRIVE)

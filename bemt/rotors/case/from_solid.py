@@ -118,14 +118,9 @@ def _csv(header: str, rows: list[list[str]]) -> str:
 
 
 def case_files(
-    found: FoundRotor,
-    scale: float,
-    name: str,
-    source: str,
-    known_from: str | None = None,
-    rpm: float | None = None,
+    found: FoundRotor, scale: float, name: str, source: str, known_from: str | None = None, rpm: float | None = None,
     airspeed_m_s: float = 0.0,
-) -> dict[str, str]:
+) -> dict[str, str]:  # fmt: skip
     """Write the found rotor as a case."""
     x = found.r / found.R
     files: dict[str, str] = {}

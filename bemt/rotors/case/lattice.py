@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.given import numbers
 from bemt.base.tables import number_of
 from bemt.rotors.case.load import Case
@@ -39,10 +39,8 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     for name, value in given.items():
         if value is None:
             continue
-        try:
+        with gathered(faults):
             found[name] = numbers(name, value)
-        except InputError as error:
-            faults += error.faults
     if "rpm" in found and np.any(found["rpm"] <= 0.0):
         faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
     elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
@@ -61,8 +59,7 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
     if (fast := np.max(np.abs(V))) > AIRSPEED_MAX:
         name, hint = ("J", "V = J n D") if "J" in found else ("airspeed_m_s", "km/h? Divide by 3.6")
         faults.append(Fault("", name, f"{fast:g} m/s", f"up to {AIRSPEED_MAX:g} m/s", hint))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     n, V = np.broadcast_arrays(n, V)
     return np.atleast_1d(n).astype(float).ravel(), np.atleast_1d(V).astype(float).ravel()
 

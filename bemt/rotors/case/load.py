@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.toml import validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of
@@ -454,8 +454,7 @@ def _check_build(case: Case, ends: bool) -> None:
         for i, item in enumerate(case.assumptions):
             for option in item.values:
                 attempt({item.key: option}, f"assumptions[{i}] at {option}")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
@@ -490,8 +489,7 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
             faults.append(
                 Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
             )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return list(dict.fromkeys(found))
 
 

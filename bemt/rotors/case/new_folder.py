@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import write_atomic
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import find_family
@@ -66,8 +66,7 @@ level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 
 def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
     """Write a new case that can be solved; nothing is written unless all of it is sound. Gives folder and files."""
     faults = _faults(wanted)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     files = _files(wanted)
     try:
         case = checked(files)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from bemt.base import cache
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.physics import effects, k1k2
 from bemt.physics.bem.coaxial import PairModel
 from bemt.physics.bem.duct import (
@@ -60,8 +60,7 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                 except ValueError as error:
                     got, _, expected = str(error).partition("; expected ")
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     gap_loss = case.get("duct.gap_loss") if case.ducted else None
     if gap_loss is not None:
         on.setdefault("tip_gap", TipGap(loss=float(gap_loss)))
@@ -99,8 +98,7 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
         else:
             got = f"a different type of file ({type(read).__name__})"
             faults.append(Fault(paths[0].as_posix(), "", got, "a polar: CSV, XFOIL or C81"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return out
 
 

@@ -24,11 +24,11 @@ from bemt.physics.air import air_arrays
 from bemt.physics.bem.coaxial import LOADS, RATIOS, PairModel
 from bemt.physics.bem.model import HUB_LOADS
 from bemt.rotors.case.pair_error import PairError
+from bemt.rotors.conditioning import CAMPAIGN, SESSION, STAND, gains_at
 from bemt.rotors.model import RealRotor, coefficients
 from bemt.rotors.population import population
 from bemt.rotors.predict import LEVELS, zero_thrust
-from bemt.rotors.reference import CAMPAIGN, SESSION, STAND, gains_at
-from bemt.rotors.validity import Validity, aside
+from bemt.rotors.validity import Validity, aside, swept_words
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
@@ -43,8 +43,6 @@ Progress = Callable[[int, int, str], None]
 BANDED = ("thrust_N", "torque_Nm", "power_W", "CT", "CP", "eta", "exhaust_speed_m_s", "duct_share")
 """Channels that get a band; of a coaxial pair also its `LOADS` and `RATIOS`."""
 
-SWEPT_DEG = 15.0
-"""Sweep or rake of the outer half of the blade from which its loads are doubted, declared [deg]."""
 _THRUSTS = ("thrust_N", "CT", "upper_thrust_N", "lower_thrust_N", *RATIOS)
 _TORQUES = ("torque_Nm", "power_W", "CP", "upper_torque_Nm", "lower_torque_Nm", "reaction_torque_Nm")
 _CAMPAIGNS = {"measured": 1.0, "reference": 2.0}  # differences between campaigns that a band holds, as variances
@@ -156,7 +154,7 @@ class Propagated:
     def u_reading(self, channel: str) -> Array:
         """Standard uncertainty of what a stand shows, (P,); the bands of the points are those of the rotor itself.
 
-        A stand that nobody calibrated has `bemt.rotors.reference.STAND` besides, a rotor that others measured their
+        A stand that nobody calibrated has `bemt.rotors.conditioning.STAND` besides, a rotor that others measured their
         campaign; a rotor that its own run calibrated is met again on that stand.
         """
         return self._on_stand(channel, self.points.u[channel], 1.0)
@@ -311,28 +309,32 @@ def propagate(
     if isinstance(model, PairModel):
         narrow, wide = error.widths()
     else:
-        widths = model_error(case, model, beside, points.conditions(case)[2])
-        more = _aside(case, model, found, beside)
-        narrow, wide = (
-            loads_of(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
-            for u, times in zip(widths, (1.0, 2.0), strict=True)
-        )
-        if model.duct is not None:
-            narrow, wide = (
-                one | {"duct_share": share_error(model.duct, found, one["thrust_N"], k)}
-                for k, one in ((1.0, narrow), (2.0, wide))
-            )
-    parts = {
-        "input": {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal},
-        "model": narrow,
-        "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()},
-    }
+        narrow, wide = _widths(case, model, found, beside, points.conditions(case)[2], factor)
+    given = {key: np.sqrt(sum((one.u[key] ** 2 for one in moved), np.zeros(len(found)))) for key in nominal}
+    parts = {"input": given, "model": narrow, "numerics": {key: np.abs(refined[key] - v) for key, v in nominal.items()}}
     answer = replace(found, u={}, u_by=parts)
     stand = _of_stand(case, found, model.upper.diameter_m if isinstance(model, PairModel) else model.diameter_m)
     lost = found.converged & np.isnan(answer.u["thrust_N"])
     why = ("unconverged somewhere in the range of the assumptions: u unknown",)
     flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
     return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide, stand)
+
+
+def _widths(
+    case: Case, model: Model, found: Dataset, beside: Dataset, air: Air, factor: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The model's own error of loads at 68 and 95 %."""
+    widths, more = model_error(case, model, beside, air), _aside(case, model, found, beside)
+    narrow, wide = (
+        loads_of(found, model.diameter_m, np.hypot(factor * u, times * more), beside.J)
+        for u, times in zip(widths, (1.0, 2.0), strict=True)
+    )
+    if model.duct is not None:
+        narrow, wide = (
+            one | {"duct_share": share_error(model.duct, found, one["thrust_N"], k)}
+            for k, one in ((1.0, narrow), (2.0, wide))
+        )
+    return narrow, wide
 
 
 def model_error(case: Case, model: Model, points: Dataset, air: Air) -> tuple[Array, Array]:
@@ -398,25 +400,8 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
             known = Validity.of_rotors((known, own))
         factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
-    swept = swept_words(case)
+    swept = swept_words(case.rotor().blade)
     return factor, tuple((*a, *b, *swept) for a, b in zip(words, tip, strict=True))
-
-
-def swept_words(case: Case) -> tuple[str, ...]:
-    """What is said of a blade whose sweep or rake is too large to be left out of the loads.
-
-    By simple sweep theory, lift goes with the square of the cosine of the angle of sweep, whatever its direction; the
-    solver leaves it out. 15 deg are 7 % of the tip's lift, about what the band of a usual blade holds.
-    """
-    blade = case.rotor().blade
-    if blade.sweep is None or blade.rake is None:
-        return ()
-    out = blade.r > 0.5 * blade.R
-    slope = np.hypot(np.gradient(blade.sweep, blade.r), np.gradient(blade.rake, blade.r))
-    angle = math.degrees(math.atan(float(np.max(slope[out], initial=0.0))))
-    if angle < SWEPT_DEG:
-        return ()
-    return (f"swept blade: by up to {angle:.0f} deg, loads are those of the straight one",)
 
 
 SHARE = 0.02

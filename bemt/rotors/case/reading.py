@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import UNITS, split_suffix
 from bemt.physics.air import Air
 from bemt.rotors.as_measured import as_measured
 from bemt.rotors.case.as_built import MOVED, CaseAsBuilt, as_built_of
+from bemt.rotors.conditioning import SESSION, apart
 from bemt.rotors.measured import records
-from bemt.rotors.reference import SESSION, apart
 
 if TYPE_CHECKING:
     from bemt.rotors.case.load import Case
@@ -92,8 +92,7 @@ def parse_reading(text: str, where: str = "--reading") -> tuple[RotorReading, ..
                            found.get("density", DENSITY)))  # fmt: skip
     if not out and not faults:
         faults.append(Fault(where, "", repr(text), _EXPECTED))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return tuple(out)
 
 

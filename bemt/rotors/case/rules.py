@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.errors import InputError
-from bemt.base.folders import inside
+from bemt.base.given import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.rotors.case.reading import parse_reading
@@ -285,11 +285,9 @@ def _check_sweep(out: Collector, case: CaseFile) -> None:
         out.add("sweep.density_kg_m3", f"an axis together with {other}", f"density_kg_m3 or {other}, not both")
     if "temperature_C" in sweep and case.air.density_kg_m3 is not None and "altitude_m" not in sweep:
         out.add(
-            "sweep.temperature_C",
-            "an axis with air.density_kg_m3",
-            "air.altitude_m or air.pressure_hPa",
+            "sweep.temperature_C", "an axis with air.density_kg_m3", "air.altitude_m or air.pressure_hPa",
             "Temperature changes nothing when the density is fixed",
-        )
+        )  # fmt: skip
     if "pitch_in" in sweep and case.blade.chord_law is None:
         out.add("sweep.pitch_in", "an axis", "nothing, because the blade comes from stations")
     if "tip_gap_mm" in sweep and case.duct is None:

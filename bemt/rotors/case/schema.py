@@ -394,17 +394,11 @@ class CaseFile(Table):
 
 
 AXES = {
-    "rpm": "operating.rpm",
-    "airspeed_m_s": "operating.airspeed_m_s",
-    "angle_deg": "operating.angle_deg",
-    "altitude_m": "air.altitude_m",
-    "density_kg_m3": "air.density_kg_m3",
-    "temperature_C": "air.temperature_C",
-    "pitch_in": "blade.pitch_in",
-    "diameter_in": "rotor.diameter_in",
-    "tip_gap_mm": "duct.tip_gap_mm",
+    "rpm": "operating.rpm", "airspeed_m_s": "operating.airspeed_m_s", "angle_deg": "operating.angle_deg",
+    "altitude_m": "air.altitude_m", "density_kg_m3": "air.density_kg_m3", "temperature_C": "air.temperature_C",
+    "pitch_in": "blade.pitch_in", "diameter_in": "rotor.diameter_in", "tip_gap_mm": "duct.tip_gap_mm",
     "z_over_D": "second_rotor.z_over_D",
-}
+}  # fmt: skip
 """Sweep axis to the dotted key that it changes."""
 
 GROUPS: tuple[tuple[str, tuple[str, ...], bool], ...] = (

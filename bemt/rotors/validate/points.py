@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics.sections import rule as section_rule
+from bemt.rotors.conditioning import ReferenceRun
 from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.population import Population, label_angle_deg
 from bemt.rotors.predict import LEVELS, half_width, inside, predict, sense
-from bemt.rotors.reference import ReferenceRun
 
 if TYPE_CHECKING:
     from bemt.data.readers.uiuc import UiucPropeller
@@ -136,11 +137,9 @@ class Solver:
 
 
 def compare(
-    propeller: UiucPropeller,
-    effects: Sequence[Effect],
-    fixed_re: float | None = None,
+    propeller: UiucPropeller, effects: Sequence[Effect], fixed_re: float | None = None,
     stations: Stations | None = None,
-) -> Rows:
+) -> Rows:  # fmt: skip
     """Solve every measured point of one propeller."""
     return rows(propeller, Solver(propeller, effects, fixed_re, stations))
 
@@ -180,16 +179,45 @@ def errors(rows: Rows) -> dict[str, dict[str, Array]]:
     }
 
 
-def statistics(error: Array) -> dict[str, float | None]:
-    """Median and 90th percentile of the absolute error and median error."""
+class ErrorStatistics(Documented):
+    """Median and 90th percentile of the absolute error, and median error; NaN where nothing is known [1]."""
+
+    median_abs: float
+    p90_abs: float
+    bias: float
+    # Share of points inside the 68 and 95 % intervals, median half width of the first, mean log density
+    coverage: Mapping[str, float] | None = None
+    width68: float | None = None
+    log_score: float | None = None
+
+
+def statistics(error: Array) -> ErrorStatistics:
+    """Statistics of errors; one that is not finite counts as infinite."""
     if error.size == 0:
-        return {"median_abs": None, "p90_abs": None, "bias": None}
+        return ErrorStatistics(math.nan, math.nan, math.nan)
     size = np.where(np.isfinite(error), np.abs(error), np.inf)
-    return {
-        "median_abs": float(np.median(size)),
-        "p90_abs": float(np.quantile(size, 0.9, method="higher")),
-        "bias": float(np.nanmedian(error)) if np.any(np.isfinite(error)) else None,
-    }
+    bias = float(np.nanmedian(error)) if np.any(np.isfinite(error)) else math.nan
+    return ErrorStatistics(float(np.median(size)), float(np.quantile(size, 0.9, method="higher")), bias)
+
+
+class KindErrors(Documented):
+    """Errors at rest, or in flight."""
+
+    points: int
+    CT: ErrorStatistics
+    CP: ErrorStatistics
+    propellers: int | None = None
+
+
+class ErrorTotals(Documented):
+    """Errors at rest and in flight."""
+
+    static: KindErrors
+    forward: KindErrors
+
+    def each(self) -> tuple[ErrorStatistics, ...]:
+        """CT and CP at rest, CT and CP in flight."""
+        return self.static.CT, self.static.CP, self.forward.CT, self.forward.CP
 
 
 # UIUC family of an APC blade series, by the suffix of the PE0 file's designation.
@@ -373,7 +401,7 @@ class Pool:
     def __init__(self) -> None:
         self._found: dict[tuple[str, str, str], list[Array]] = {}
 
-    def add(self, rows: Rows, expected: Expected | None = None) -> dict[str, Any]:
+    def add(self, rows: Rows, expected: Expected | None = None) -> ErrorTotals:
         """Take the points of one propeller; returns its own statistics."""
         own = Pool()
         for kind, found in errors(rows).items():
@@ -385,10 +413,8 @@ class Pool:
                     own._found[kind, q, "log_density"] = [expected.log_density[kind][q]]
         for key, values in own._found.items():
             self._found.setdefault(key, []).extend(values)
-        out = own.total()
-        for kind in KINDS:
-            out[kind].pop("propellers")
-        return out
+        sums = own.total()
+        return ErrorTotals(replace(sums.static, propellers=None), replace(sums.forward, propellers=None))
 
     def add_kind(self, expected: Expected, kind: str) -> None:
         """Take the points of one kind only."""
@@ -398,30 +424,26 @@ class Pool:
             if key[0] == kind:
                 self._found.setdefault(key, []).extend(values)
 
-    def total(self) -> dict[str, Any]:
+    def total(self) -> ErrorTotals:
         """Statistics over all points; ``log_score`` is a mean over propellers of the mean log density of their
         points.
         """
-        out: dict[str, Any] = {}
-        for kind in KINDS:
-            sizes = [e.size for e in self._found.get((kind, "CT", "error"), [])]
-            out[kind] = {"propellers": sum(size > 0 for size in sizes), "points": sum(sizes)}
-            for q in ("CT", "CP"):
-                e, probability, width = (
-                    np.concatenate([*self._found.get((kind, q, what), []), np.empty(0)])
-                    for what in ("error", "probability", "width")
-                )
-                out[kind][q] = statistics(e)
-                if (kind, q, "probability") in self._found:
-                    out[kind][q] |= coverage(probability, width)
-                    means = [float(np.mean(v)) for v in self._found[kind, q, "log_density"] if v.size]
-                    out[kind][q]["log_score"] = float(np.mean(means)) if means else None
-        return out
+        static, forward = (self._of(kind) for kind in KINDS)
+        return ErrorTotals(static, forward)
 
-
-def coverage(probability: Array, width: Array) -> dict[str, Any]:
-    """Share of points inside the 68 and 95 % intervals, and the median half width of the first [1]."""
-    if probability.size == 0:
-        return {"coverage": {"68": None, "95": None}, "width68": None}
-    held = {name: float(np.mean(probability <= level)) for name, level in zip(("68", "95"), LEVELS, strict=True)}
-    return {"coverage": held, "width68": float(np.median(width))}
+    def _of(self, kind: str) -> KindErrors:
+        sizes = [e.size for e in self._found.get((kind, "CT", "error"), [])]
+        found = {}
+        for q in ("CT", "CP"):
+            e, probability, width = (
+                np.concatenate([*self._found.get((kind, q, what), []), np.empty(0)])
+                for what in ("error", "probability", "width")
+            )
+            found[q] = statistics(e)
+            if (kind, q, "probability") in self._found:
+                means = [float(np.mean(v)) for v in self._found[kind, q, "log_density"] if v.size]
+                held = {name: float(np.mean(probability <= level)) if probability.size else math.nan
+                        for name, level in zip(("68", "95"), LEVELS, strict=True)}  # fmt: skip
+                found[q] = replace(found[q], coverage=held, width68=float(np.median(width)) if width.size else math.nan,
+                                   log_score=float(np.mean(means)) if means else math.nan)  # fmt: skip
+        return KindErrors(sum(sizes), found["CT"], found["CP"], sum(size > 0 for size in sizes))

@@ -6,18 +6,22 @@ sections and transition come from the declared rule of :mod:`bemt.physics.sectio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
-from bemt.base.folders import find_data
-from bemt.base.tables import json_text, or_null, write_atomic
+from bemt.base.given import find_data
+from bemt.base.tables import json_text, write_atomic
 from bemt.rotors.population import population
 from bemt.rotors.validate.points import (
     J_SHARE,
+    ErrorStatistics,
+    ErrorTotals,
     Pool,
     Rows,
     Stations,
@@ -69,35 +73,105 @@ def matched(
     return (shift, at(shift)) if np.isfinite(shift) else None
 
 
-def _percent(s: dict[str, float | None]) -> str:
-    if s["median_abs"] is None or s["p90_abs"] is None:
-        return f"{'-':>6} {'-':>6} {'-':>6}"
-    bias = s["bias"]
-    shown = "-" if bias is None else f"{100 * bias:+6.1f}"
-    return f"{100 * s['median_abs']:6.1f} {100 * s['p90_abs']:6.1f} {shown:>6}"
+class ShiftedErrors(ErrorTotals):
+    """Errors of one propeller with its blades turned."""
+
+    shift_deg: float
 
 
-def _totals(name: str, doc: dict[str, Any]) -> str:
-    cells = "".join(f" | {_percent(doc[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
-    return f"{name:38}{cells}"
+class ValidatedRotor(ErrorTotals):
+    """One propeller; zero-thrust advance ratios are NaN where there are none."""
+
+    name: str
+    family: str
+    diameter_in: float
+    pitch_in: float | None
+    blades: int
+    stations: str
+    J0: float
+    J0_bemt: float
+    as_drawn: ErrorTotals | None = None
+    matched_J0: ShiftedErrors | None = None
 
 
-def _coverage_lines(doc: dict[str, Any]) -> list[str]:
+class ZeroThrustErrors(ErrorStatistics):
+    """Errors of the zero-thrust advance ratio."""
+
+    propellers: int = 0
+
+
+class TurnedErrors(ErrorTotals):
+    """Errors of all propellers whose blades were turned to the measured zero-thrust advance ratio."""
+
+    propellers: int
+    shift_deg_p10_p50_p90: tuple[float, ...] | None
+
+
+class SectionRule(Documented):
+    """How sections were made."""
+
+    n_crit: float
+    drag_level: float
+    fixed_re: float | None
+    rule: str = "bemt.physics.sections.rule"
+    calibrated_on: str = "UIUC volume 1"
+
+
+class Skipped(Documented):
+    """A propeller that cannot be compared."""
+
+    name: str
+    reason: str
+
+
+class Validation(ErrorTotals):
+    """``bemt.validation/1``."""
+
+    folder: str
+    J_share: float
+    zero_thrust_J: ZeroThrustErrors
+    unconverged: int
+    effects: tuple[Mapping[str, Any], ...]
+    polar: SectionRule
+    propellers: tuple[ValidatedRotor, ...]
+    skipped: tuple[Skipped, ...]
+    faults: tuple[str, ...]
+    as_drawn: ErrorTotals | None = None
+    population: Mapping[str, Any] | None = None
+    matched_J0: TurnedErrors | None = None
+
+    def document(self) -> dict[str, Any]:
+        """Plain values; a propeller whose blades could not be turned has None there."""
+        own = {"schema": SCHEMA, **super().document()}
+        for row in own["propellers"] if self.matched_J0 else ():
+            row.setdefault("matched_J0", None)
+        return own
+
+
+def _percents(found: ErrorTotals) -> str:
+    cells = []
+    for s in found.each():
+        if math.isnan(s.median_abs):
+            cells.append(f" | {'-':>6} {'-':>6} {'-':>6}")
+        else:
+            bias = "-" if math.isnan(s.bias) else f"{100 * s.bias:+6.1f}"
+            cells.append(f" | {100 * s.median_abs:6.1f} {100 * s.p90_abs:6.1f} {bias:>6}")
+    return "".join(cells)
+
+
+def _coverage_lines(doc: Validation) -> list[str]:
     """Coverage and width of the intervals."""
     out = ["Rotors as built: expectation and intervals of the population (bemt.rotors), stations and labels combined."]
-    for kind in ("static", "forward"):
-        for q in ("CT", "CP"):
-            s = doc[kind][q]
-            held = s["coverage"]
-            if held["68"] is not None:
-                out.append(
-                    f"  {kind} {q}: 68 % interval contains {100 * held['68']:.0f} %, 95 % one {100 * held['95']:.0f} %;"
-                    f" median half width {100 * s['width68']:.1f} %"
-                )
+    for word, s in zip(("static CT", "static CP", "forward CT", "forward CP"), doc.each(), strict=True):
+        if s.coverage and s.width68 is not None and not math.isnan(s.coverage["68"]):
+            out.append(
+                f"  {word}: 68 % interval contains {100 * s.coverage['68']:.0f} %, 95 % one "
+                f"{100 * s.coverage['95']:.0f} %; median half width {100 * s.width68:.1f} %"
+            )
     return out
 
 
-def text(doc: dict[str, Any]) -> str:
+def text(doc: Validation) -> str:
     """Table for people."""
     head = f"{'':24} {'J0':>6} {'bemt':>6}"
     for kind in ("static", "forward"):
@@ -105,62 +179,48 @@ def text(doc: dict[str, Any]) -> str:
             head += f" | {kind} {q:<2}{'':>{19 - len(kind) - 3}}"
     sub = f"{'propeller':24} {'':>6} {'':>6}" + " | median    p90   bias" * 4
     lines = [head, sub, "-" * len(sub)]
-    for r in doc["propellers"]:
-        j = [f"{r[k]:6.3f}" if r[k] is not None else f"{'-':>6}" for k in ("J0", "J0_bemt")]
-        lines.append(
-            f"{r['name'][:24]:24} {j[0]} {j[1]}"
-            + "".join(f" | {_percent(r[kind][q])}" for kind in ("static", "forward") for q in ("CT", "CP"))
-        )
-    lines.append("-" * len(sub))
-    lines.append(_totals("all points", doc))
-    drawn = doc.get("as_drawn")
-    if drawn:
-        lines.append(_totals("stations as given", drawn))
-    turned = doc.get("matched_J0")
-    if turned and turned["propellers"]:
-        lines.append(_totals(f"turned to measured J0, {turned['propellers']}", turned))
-    if drawn:
-        lines += ["", *_coverage_lines(doc)]
-    z = doc["zero_thrust_J"]
+    for r in doc.propellers:
+        j = [f"{J:6.3f}" if math.isfinite(J) else f"{'-':>6}" for J in (r.J0, r.J0_bemt)]
+        lines.append(f"{r.name[:24]:24} {j[0]} {j[1]}{_percents(r)}")
+    totals: list[tuple[str, ErrorTotals]] = [("all points", doc)]
+    drawn, turned, z, p = doc.as_drawn, doc.matched_J0, doc.zero_thrust_J, doc.polar
+    totals += [("stations as given", drawn)] if drawn else []
+    totals += [(f"turned to measured J0, {turned.propellers}", turned)] if turned and turned.propellers else []
+    lines += ["-" * len(sub), *(f"{name:38}{_percents(found)}" for name, found in totals)]
+    lines += ["", *_coverage_lines(doc)] if drawn else []
     lines += [
         "",
-        f"Errors of BEMT in percent of the measured value. Static: {doc['static']['points']} points of "
-        f"{doc['static']['propellers']} propellers; forward: {doc['forward']['points']} points of "
-        f"{doc['forward']['propellers']}, J up to {doc['J_share']:g} J0.",
+        f"Errors of BEMT in percent of the measured value. Static: {doc.static.points} points of "
+        f"{doc.static.propellers} propellers; forward: {doc.forward.points} points of "
+        f"{doc.forward.propellers}, J up to {doc.J_share:g} J0.",
     ]
-    if z["median_abs"] is not None:
-        lines.append(f"Zero-thrust J: median error {100 * z['median_abs']:.1f} %, bias {100 * z['bias']:+.1f} %.")
-    if turned and turned["propellers"]:
-        low, mid, high = turned["shift_deg_p10_p50_p90"]
+    if not math.isnan(z.median_abs):
+        lines.append(f"Zero-thrust J: median error {100 * z.median_abs:.1f} %, bias {100 * z.bias:+.1f} %.")
+    if turned and turned.shift_deg_p10_p50_p90:
+        low, mid, high = turned.shift_deg_p10_p50_p90
         lines.append(
-            f"Turned: blades of {turned['propellers']} propellers by {mid:+.1f} deg (median; {low:+.1f} to "
+            f"Turned: blades of {turned.propellers} propellers by {mid:+.1f} deg (median; {low:+.1f} to "
             f"{high:+.1f} for 80 %) to the measured zero-thrust J; an experiment that uses the measurement."
         )
-    p = doc["polar"]
     lines.append(
-        f"Sections: declared rule, calibrated on {p['calibrated_on']}: n_crit {p['n_crit']:g}, "
-        f"drag x{p['drag_level']:g}" + (f", Reynolds number fixed at {p['fixed_re']:g}." if p["fixed_re"] else ".")
+        f"Sections: declared rule, calibrated on {p.calibrated_on}: n_crit {p.n_crit:g}, drag x{p.drag_level:g}"
+        + (f", Reynolds number fixed at {p.fixed_re:g}." if p.fixed_re else ".")
     )
-    lines.append("Effects on: " + ", ".join(e["id"] for e in doc["effects"]) + ".")
-    if doc["unconverged"]:
-        lines.append(f"NOT CONVERGED: {doc['unconverged']} points (counted as infinite error).")
-    if doc["skipped"]:
-        lines.append(f"Skipped: {len(doc['skipped'])} propellers without stations or without measurements.")
-    lines += [f"fault: {f}" for f in doc["faults"]]
-    return "\n".join(lines)
+    lines.append("Effects on: " + ", ".join(e["id"] for e in doc.effects) + ".")
+    if doc.unconverged:
+        lines.append(f"NOT CONVERGED: {doc.unconverged} points (counted as infinite error).")
+    if doc.skipped:
+        lines.append(f"Skipped: {len(doc.skipped)} propellers without stations or without measurements.")
+    return "\n".join([*lines, *(f"fault: {f}" for f in doc.faults)])
 
 
 SCHEMA = "bemt.validation/1"
 
 
 def validate(
-    folder: Path | Sequence[Path],
-    effects: Sequence[Effect] | None = None,
-    fixed_re: float | None = None,
-    progress: Callable[[str], None] | None = None,
-    match_J0: bool = False,
-    as_drawn: bool = False,
-) -> dict[str, Any]:
+    folder: Path | Sequence[Path], effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
+    progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
+) -> Validation:  # fmt: skip
     """Compare a folder."""
     from bemt.physics import effects as registry
     from bemt.physics.sections import rule as section_rule
@@ -169,54 +229,45 @@ def validate(
     found = read_folders(folders)
     eff = registry.standard() if effects is None else tuple(effects)
     built = not as_drawn and fixed_re is None and {e.id for e in eff} == {e.id for e in registry.standard()}
-    rows: list[dict[str, Any]] = []
+    rows: list[ValidatedRotor] = []
     pool, drawn, turned = Pool(), Pool(), Pool()
     shifts: list[float] = []
     unconverged = 0
     for i, (p, stations) in enumerate(found.propellers):
         if progress:
             progress(f"{i + 1}/{len(found.propellers)} {p.name}")
+        as_given = None
         if built:
             seen = observe(p, eff, stations)
             expected = expect(seen, population())
-            points, statistic = seen.drawn, pool.add(expected.rows, expected) | {"as_drawn": drawn.add(seen.drawn)}
+            points, own, as_given = seen.drawn, pool.add(expected.rows, expected), drawn.add(seen.drawn)
         else:
             points = compare(p, eff, fixed_re, stations)
-            statistic = pool.add(points)
+            own = pool.add(points)
         unconverged += int(np.count_nonzero(~np.isfinite(points.CT_bemt)))
-        row: dict[str, Any] = {
-            "name": p.name, "family": p.family, "diameter_in": p.diameter_in, "pitch_in": p.pitch_in,
-            "blades": p.blades, "stations": p.geometry.origin if p.geometry is not None else "apc_pe0",
-            "J0": or_null(points.J0), "J0_bemt": or_null(points.J0_bemt), **statistic,
-        }  # fmt: skip
-        if match_J0:
-            fit = matched(p, eff, fixed_re, stations, points.J0)
-            row["matched_J0"] = None if fit is None else {"shift_deg": fit[0], **turned.add(fit[1])}
-            shifts.extend([] if fit is None else [fit[0]])
-        rows.append(row)
-    j0 = np.array([r["J0_bemt"] / r["J0"] - 1.0 for r in rows if r["J0"] and r["J0_bemt"]])
-    names = " ".join(f.name for f in folders)
-    doc: dict[str, Any] = {"schema": SCHEMA, "folder": names, "J_share": J_SHARE, **pool.total()}
-    if built:
-        doc["as_drawn"] = drawn.total()
-        doc["population"] = dict(population().provenance)
-    doc["zero_thrust_J"] = {"propellers": int(j0.size), **statistics(j0)}
-    if match_J0:
-        spread = np.quantile(shifts, (0.1, 0.5, 0.9)).tolist() if shifts else None
-        doc["matched_J0"] = {"propellers": len(shifts), "shift_deg_p10_p50_p90": spread, **turned.total()}
-    doc["unconverged"] = unconverged
-    doc["effects"] = [e.describe() for e in eff]
-    doc["polar"] = {
-        "rule": "bemt.physics.sections.rule",
-        "n_crit": section_rule.N_CRIT,
-        "drag_level": section_rule.DRAG_LEVEL,
-        "fixed_re": fixed_re,
-        "calibrated_on": "UIUC volume 1",
-    }
-    doc["propellers"] = rows
-    doc["skipped"] = [{"name": name, "reason": why} for name, why in found.skipped]
-    doc["faults"] = list(found.faults)
-    return doc
+        fit = matched(p, eff, fixed_re, stations, points.J0) if match_J0 else None
+        shifted = None
+        if fit is not None:
+            at = turned.add(fit[1])
+            shifted = ShiftedErrors(at.static, at.forward, fit[0])
+            shifts.append(fit[0])
+        rows.append(ValidatedRotor(
+            own.static, own.forward, p.name, p.family, p.diameter_in, p.pitch_in, p.blades,
+            p.geometry.origin if p.geometry is not None else "apc_pe0", points.J0, points.J0_bemt, as_given, shifted,
+        ))  # fmt: skip
+    J0 = np.array([[r.J0, r.J0_bemt] for r in rows]).reshape(-1, 2)
+    J0 = J0[np.isfinite(J0).all(axis=1) & (J0 != 0.0).all(axis=1)]
+    zero = statistics(J0[:, 1] / J0[:, 0] - 1.0)
+    spread = tuple(np.quantile(shifts, (0.1, 0.5, 0.9)).tolist()) if shifts else None
+    whole, again = pool.total(), turned.total()
+    return Validation(
+        whole.static, whole.forward, " ".join(f.name for f in folders), J_SHARE,
+        ZeroThrustErrors(zero.median_abs, zero.p90_abs, zero.bias, propellers=len(J0)), unconverged,
+        tuple(e.describe() for e in eff), SectionRule(section_rule.N_CRIT, section_rule.DRAG_LEVEL, fixed_re),
+        tuple(rows), tuple(Skipped(name, why) for name, why in found.skipped), tuple(found.faults),
+        drawn.total() if built else None, dict(population().provenance) if built else None,
+        TurnedErrors(again.static, again.forward, len(shifts), spread) if match_J0 else None,
+    )  # fmt: skip
 
 
 def effects_without(off: Sequence[str]) -> tuple[Effect, ...]:
@@ -240,7 +291,7 @@ def where(name: str) -> Path:
     return found or Path(name)
 
 
-def write(document: dict[str, Any], folder: str | Path) -> None:
+def write(found: Validation, folder: str | Path) -> None:
     """Write validation.json and validation.txt."""
-    write_atomic(Path(folder) / "validation.json", json_text(document))
-    write_atomic(Path(folder) / "validation.txt", text(document) + "\n")
+    write_atomic(Path(folder) / "validation.json", json_text(found.document()))
+    write_atomic(Path(folder) / "validation.txt", text(found) + "\n")

@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.tools.cfd.openfoam import Settings
 from bemt.tools.cfd.openfoam.run import OPEN, SIDES, through
 
@@ -142,8 +142,7 @@ def balance_of(run: Path, settings: Settings) -> Balance:
     rho = 1.0 if s.compressible else s.rho
     written = folder / "mass_inlet" / "0" / "surfaceFieldValue.dat"
     times = _table(written, 2, faults)[:, 0]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     patches = {}
     for name in through(s):
         mine: list[Fault] = []
@@ -155,8 +154,7 @@ def balance_of(run: Path, settings: Settings) -> Balance:
     on_walls = [on_rotor, *(_load(folder, name, times, faults) for name in others)]
     on_open = _load(folder, "open", times, faults)
     on_sides = _load(folder, "sides", times, faults) if s.sectors > 1 else (0.0, 0.0)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
     ends = [patches[name] for name in OPEN]
     sides = [patches[name] for name in SIDES if name in patches]
@@ -169,14 +167,9 @@ def balance_of(run: Path, settings: Settings) -> Balance:
 
 
 def _relative(
-    s: Settings,
-    on_rotor: tuple[float, float],
-    mass: tuple[float, float],
-    axial: tuple[float, float],
-    angular: float,
-    swirl: float,
-    place: str,
-) -> Balance:
+    s: Settings, on_rotor: tuple[float, float], mass: tuple[float, float], axial: tuple[float, float], angular: float,
+    swirl: float, place: str,
+) -> Balance:  # fmt: skip
     """Residuals of one sector over the measures of one sector; (residual, made by the sides) of mass and momentum."""
     n, D, area = s.rpm / 60, 2 * s.R, math.pi * s.R**2
     thrust = max(s.sectors * abs(on_rotor[0]), LEAST_CT * s.rho * n**2 * D**4)

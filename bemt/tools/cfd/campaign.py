@@ -19,7 +19,7 @@ from filelock import FileLock, Timeout
 
 from bemt.base.cache import cache_dir
 from bemt.base.document import Documented
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text, remove_stale, text_table
 from bemt.data.recordings.cfd_setup import audit_of, faults_first, floor_note
 from bemt.physics.bem import solver
@@ -249,13 +249,9 @@ def _radial_text(found: Summary) -> list[str]:
 
 
 def run_campaign(
-    campaign: Campaign,
-    work: Path,
-    only: int | None = None,
-    ranks: int = 2,
-    tell: Callable[[str], None] | None = None,
-    keep: bool = True,
-) -> CampaignRecord:
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
+    tell: Callable[[str], None] | None = None, keep: bool = True,
+) -> CampaignRecord:  # fmt: skip
     """Run the points of a campaign that are not recorded yet."""
     keys: list[tuple[str, str, Settings]] = []
     faults: list[Fault] = []
@@ -271,8 +267,7 @@ def run_campaign(
     if not faults and len(set(order)) < len(order):
         twice = sorted({str(order.index(name) + 1) for name in order if order.count(name) > 1})
         faults.append(Fault(campaign.path.as_posix(), f"points {', '.join(twice)}", "the same run twice", "each once"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     remove_stale(campaign.path.parent)
     record = CampaignRecord(campaign)
     record.borrow(order if only is None else [])

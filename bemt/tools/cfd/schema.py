@@ -14,7 +14,7 @@ from pydantic import create_model
 from pydantic.fields import FieldInfo
 
 from bemt.base.document import Documented
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.toml import Table, entry, limits_of, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import number
@@ -108,16 +108,13 @@ def load_campaign(path: str | Path) -> Campaign:
     check_name(out, document.get("name"))  # the default work folder bears it
     case = None
     if isinstance(document.get("case"), str) and document["case"].strip():
-        try:
+        with gathered(out.faults):
             case = load_case(path.parent / document["case"])
-        except InputError as error:
-            out.faults += error.faults
     rows = [] if file is None else _rows(out, file)
     if case is None or file is None or out.faults:
         raise InputError(out.faults)
     points = [p for where, row in rows for p in _point(out, where, row, case, file.duct)]
-    if out.faults:
-        raise InputError(out.faults)
+    refuse(out.faults)
     study = None if file.grid_study is None else path.parent / file.grid_study
     return Campaign(path, file.name, file.title or file.name, case, tuple(points), study)
 

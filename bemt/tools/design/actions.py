@@ -194,7 +194,7 @@ def design(
     from numbers import Real
     from pathlib import Path as File
 
-    from bemt.base.errors import Fault, InputError
+    from bemt.base.errors import Fault, refuse
     from bemt.base.given import path_text
     from bemt.base.units import INCH
     from bemt.rotors.case import load_case, new_folder
@@ -219,8 +219,7 @@ def design(
             faults.append(Fault("", f"points[{i}]", repr(point), expected))
         else:
             asked.append(DesignPoint(*point))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     folder = None if out is None else File(path_text("out", out))
     if folder is not None:
         new_folder.free_folder(folder)

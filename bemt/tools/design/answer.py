@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bemt.base import canvas
+from bemt.base.action import as_html
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
-from bemt.base.face import as_html
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
 from bemt.tools.design.search import Target
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from bemt.base import cache
 from bemt.base.arrays import Array
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, gathered, refuse
 from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, new_folder
@@ -37,15 +37,8 @@ HUB_RATIO = 0.15
 THIN_FROM = 0.5
 """r/R from which the thickness is the outer one [1]."""
 FAMILY = (
-    (0.12, 0.09),
-    (0.15, 0.09),
-    (0.18, 0.12),
-    (0.21, 0.12),
-    (0.24, 0.15),
-    (0.28, 0.15),
-    (0.28, 0.18),
-    (0.30, 0.21),
-)
+    (0.12, 0.09), (0.15, 0.09), (0.18, 0.12), (0.21, 0.12), (0.24, 0.15), (0.28, 0.15), (0.28, 0.18), (0.30, 0.21),
+)  # fmt: skip
 """Thickness at the hub and on the outer half that are tried, while stress limits the blade; the first is tabulated
 without NeuralFoil [1]."""
 FAR = 0.8  # Share of the thrust below which the next but one is tried [1]
@@ -187,11 +180,9 @@ def design_blade(
     """Design a blade; parameters as `bemt.design`."""
     faults: list[Fault] = []
     base: Case | None = None
-    try:
+    with gathered(faults):
         base = _open_case(diameter_m, blades, section, hub_ratio, density_kg_m3) if duct is None else _in_duct(
             duct, diameter_m, blades, section, hub_ratio, density_kg_m3)  # fmt: skip
-    except InputError as error:
-        faults += error.faults
     if base is None:  # the rest of the request is judged on a size that can be
         try:
             required(points, 10.0 * INCH, HUB_RATIO, 2, Air.from_density(), **limits)
@@ -314,8 +305,7 @@ def _check_chords(problem: BladeProblem) -> None:
             room = 1e3 * value * float((most / least).min())
             widest = f"The largest chord is {1e3 * most.max():.3g} mm"
             faults.append(Fault(name, "", f"{1e3 * value:g}", f"up to {room:.3g} mm", widest))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _breaks(label: Label, need: Requirement) -> tuple[str, ...]:
@@ -449,8 +439,7 @@ def _in_duct(
     ]  # fmt: skip
     if not case.ducted:
         faults.append(Fault(case.path.as_posix(), "duct", "nothing", "a case with a duct", "Leave --duct out"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     changes: dict[str, Any] = {}
     if blades is not None:
         changes["rotor.blades"] = blades

@@ -54,19 +54,9 @@ class MinimumLoss:
 
 
 def minimum_loss(
-    target: float,
-    airspeed_m_s: float,
-    rpm: float,
-    blades: int,
-    R: float,
-    Rhub: float,
-    section: Section,
-    rho: float = 1.225,
-    mu: float = 1.79e-5,
-    *,
-    power: bool = False,
-    n: int = 200,
-) -> MinimumLoss | None:
+    target: float, airspeed_m_s: float, rpm: float, blades: int, R: float, Rhub: float, section: Section,
+    rho: float = 1.225, mu: float = 1.79e-5, *, power: bool = False, n: int = 200,
+) -> MinimumLoss | None:  # fmt: skip
     """Blade of minimum induced loss for a thrust [N] or a power [W]; None if no blade on this disk reaches it.
 
     Examples

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, system_fault
+from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.tables import number_of
 
 # What a rotor's motor, propeller, controller and arm weigh: declared laws with their spread.
@@ -173,6 +173,5 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
             values[key] = value
         motor = found["name"] or f"line {line}"
         out.append(KnownMotor(motor, values["kv"], 1e-3 * values["resistance_mohm"], values["no_load_A"]))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return tuple(out)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
@@ -218,8 +218,7 @@ def point_of(text: str) -> DesignPoint:
             )
     if "thrust_N" not in found and not faults:
         faults.append(Fault("--points", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return DesignPoint(**found)
 
 
@@ -243,13 +242,9 @@ def required(
     for p in points:
         check("--thrust-N", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
         check(
-            "--airspeed-m-s",
-            p.airspeed_m_s,
-            0.0,
-            FAST,
-            "m/s",
+            "--airspeed-m-s", p.airspeed_m_s, 0.0, FAST, "m/s",
             "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "",
-        )
+        )  # fmt: skip
         check("--points", p.weight, 0.0, 1e6, "", "weight is a share of time")
         if p.rpm is not None:
             check("--rpm", p.rpm, 100.0, 3e5, "rev/min", "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError
 from bemt.base.units import INCH
 from bemt.physics.air import Air
 from bemt.rotors.case import Case, case_of, fresh
@@ -170,3 +172,31 @@ def size_in(label: str) -> float:
     if label.startswith(FAN):
         return float(label.split()[1]) / 25.4
     return float(fresh.read_label(label).diameter_in)
+
+
+SCATTERS = 4  # labels whose bands are computed; others take the nearest
+
+
+def scatters(
+    loads: Sequence[RotorLoads], thrust_N: float, airspeed_m_s: float, fluid: str, coaxial: bool
+) -> list[LoadScatter]:
+    """Bands of a few labels spread over the sizes that reach the target."""
+    good = [one for one in loads if np.isfinite(one.speed_for(np.array([thrust_N]))[0])] or list(loads)
+    order = sorted(good, key=lambda one: (one.diameter_m, one.pitch_m))
+    picked = {round(i) for i in np.linspace(0, len(order) - 1, min(SCATTERS, len(order)))}
+    out = []
+    for i in sorted(picked):
+        rpm = float(order[i].speed_for(np.array([thrust_N]))[0])
+        found = scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]),
+                                    airspeed_m_s, fluid, coaxial)  # fmt: skip
+        if np.isfinite([found.u_thrust, found.u_torque]).all():
+            out.append(found)
+    if not out:
+        raise InputError(Fault("", "--labels", "no band converges", "sizes that the solver can judge at this thrust"))
+    return out
+
+
+def nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
+    """Band of the label that is nearest in size."""
+    x, p = math.log(one.diameter_m / INCH), one.pitch_m / one.diameter_m
+    return min(spreads, key=lambda s: math.hypot(s.log_diameter - x, s.pitch_ratio - p))

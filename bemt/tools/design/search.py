@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import G0, INCH
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
@@ -76,7 +76,6 @@ DRAWS = 256
 LATTICE = 235
 """Of the odd generators the one with the least centred discrepancy in six dimensions: 5.8e-4, Sobol's points 5.5e-4.
 The seventh coordinate, of the masses, hardly moves any result."""
-SCATTERS = 4  # labels whose bands are computed; others take the nearest
 
 
 @dataclass(frozen=True)
@@ -120,27 +119,14 @@ class Target:
 
 
 def choose(
-    thrust_N: float | None = None,
-    cells: int | None = None,
-    *,
-    kv: float | Sequence[float] = (80.0, 8000.0),
+    thrust_N: float | None = None, cells: int | None = None, *, kv: float | Sequence[float] = (80.0, 8000.0),
     motors: str | os.PathLike[str] | Sequence[str | os.PathLike[str] | KnownMotor] = (),
     labels: str | Sequence[str] = (),
-    blades: int | Sequence[int] = (2,),
-    mass_kg: float | None = None,
-    rest_kg: float | None = None,
-    rotors: int = 1,
-    airspeed_m_s: float = 0.0,
-    max_diameter_in: float | None = None,
-    arm_mm: float | None = None,
-    max_tip_mach: float = 0.8,
-    capacity_Ah: float | None = None,
-    minutes: float | None = None,
-    fan: bool = False,
-    fluid: str = "air",
-    coaxial: bool = False,
-    sure: float = 0.9,
-) -> pd.DataFrame:
+    blades: int | Sequence[int] = (2,), mass_kg: float | None = None, rest_kg: float | None = None, rotors: int = 1,
+    airspeed_m_s: float = 0.0, max_diameter_in: float | None = None, arm_mm: float | None = None,
+    max_tip_mach: float = 0.8, capacity_Ah: float | None = None, minutes: float | None = None, fan: bool = False,
+    fluid: str = "air", coaxial: bool = False, sure: float = 0.9,
+) -> pd.DataFrame:  # fmt: skip
     """Rank propellers and motors for a thrust or a mass; arguments as those of :func:`bemt.choose`.
 
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
@@ -170,8 +156,8 @@ def choose(
     loads = [found for name in names if (found := _loads(name, target, machines)) is not None]
     if not loads:
         raise InputError(Fault("", "--labels", "none that can be solved", "a propeller that can reach the speed"))
-    spreads = _scatters(loads, target)
-    rows = [row for one in loads for row in _rows(one, _nearest(one, spreads), machines, target)]
+    spreads = rotor_loads.scatters(loads, target.thrust_N, target.airspeed_m_s, target.fluid, target.coaxial)
+    rows = [row for one in loads for row in _rows(one, rotor_loads.nearest(one, spreads), machines, target)]
     table = _ranked(pd.DataFrame(rows), sure)
     table["why"] = _reasons(table, target, sure)
     table.attrs |= {"target": target, "sure": sure}
@@ -216,8 +202,7 @@ def _target(
         faults.append(
             Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
         )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
                if v is not None and v % 1 != 0]  # fmt: skip
     mAh = "In mAh? Divide by 1000" if capacity_Ah is not None and capacity_Ah > 200.0 else ""
@@ -234,8 +219,7 @@ def _target(
     ):  # fmt: skip
         if value is not None and not low <= value <= high:
             faults.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     hover = None if mass_kg is None else mass_kg * G0 / rotors
     most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
     if hover is not None and most < hover:
@@ -258,8 +242,7 @@ def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blad
         hint = "In percent? Divide by 100" if 1.0 < sure < 100.0 else ""
         faults.append(Fault("", "--sure", f"{sure:g}", "a probability between 0 and 1", hint))
     faults += [Fault("", "--blades", f"{b}", "2 to 8") for b in blades if b not in range(2, 9)]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
@@ -303,28 +286,6 @@ def _loads(label: str, target: Target, machines: Sequence[KnownMotor]) -> RotorL
     fastest = 1.05 * max(m.kv for m in machines) * target.voc
     return rotor_loads.rotor_loads(label, min(60.0 * tip / (math.pi * D), fastest), target.airspeed_m_s,
                                    fluid=target.fluid, coaxial=target.coaxial)  # fmt: skip
-
-
-def _scatters(loads: Sequence[RotorLoads], target: Target) -> list[LoadScatter]:
-    """Bands of a few labels spread over the sizes that reach the target."""
-    good = [one for one in loads if np.isfinite(one.speed_for(np.array([target.thrust_N]))[0])] or list(loads)
-    order = sorted(good, key=lambda one: (one.diameter_m, one.pitch_m))
-    picked = {round(i) for i in np.linspace(0, len(order) - 1, min(SCATTERS, len(order)))}
-    out = []
-    for i in sorted(picked):
-        rpm = float(order[i].speed_for(np.array([target.thrust_N]))[0])
-        found = rotor_loads.scatter(order[i].label, rpm if math.isfinite(rpm) else float(order[i].rpm[-1]),
-                                    target.airspeed_m_s, target.fluid, target.coaxial)  # fmt: skip
-        if np.isfinite([found.u_thrust, found.u_torque]).all():
-            out.append(found)
-    if not out:
-        raise InputError(Fault("", "--labels", "no band converges", "sizes that the solver can judge at this thrust"))
-    return out
-
-
-def _nearest(one: RotorLoads, spreads: Sequence[LoadScatter]) -> LoadScatter:
-    x, p = math.log(one.diameter_m / INCH), one.pitch_m / one.diameter_m
-    return min(spreads, key=lambda s: math.hypot(s.log_diameter - x, s.pitch_ratio - p))
 
 
 @cache

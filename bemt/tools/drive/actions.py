@@ -139,7 +139,8 @@ def map(  # noqa: A001
 
     where = None if out is None else os.fspath(out)
     found = map_result.fit(paths_text("files", files, 1), int(sign), nodes, name, thrust_N, voltage_V, where)
-    return Told(found.document, map_result.text(found), exit_code=EXIT_OK if found.reached else EXIT_UNCONVERGED)
+    code = EXIT_OK if found.reached else EXIT_UNCONVERGED
+    return Told(found.document(), map_result.text(found), exit_code=code)
 
 
 @action("Drive", "motor motor.toml", words=("file",))
@@ -172,8 +173,9 @@ def motor(file: Path, *, out: Path | None = None) -> Told:
     """
     from bemt.tools.drive import motor_result
 
-    trials, found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
-    return Told(found, motor_result.text(trials, found), exit_code=EXIT_OK if found["agree"] else EXIT_UNCONVERGED)
+    found = motor_result.judge(os.fspath(file), None if out is None else os.fspath(out))
+    code = EXIT_OK if found.agree else EXIT_UNCONVERGED
+    return Told(found.document(), motor_result.text(found), exit_code=code)
 
 
 @action("Drive", "thrusters thrusters.toml --force-N 40", words=("file",))

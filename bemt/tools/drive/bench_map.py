@@ -298,11 +298,8 @@ def _own_voltage(pulse: Array, voltage: Array, current: Array, sag: Curve, ramp:
 
 
 def fit(
-    points: Dataset,
-    smoothness: float | None = None,
-    nodes: int = NODES,
-    quantities: Iterable[str] = tuple(CHANNELS),
-) -> BenchMap:
+    points: Dataset, smoothness: float | None = None, nodes: int = NODES, quantities: Iterable[str] = tuple(CHANNELS),
+) -> BenchMap:  # fmt: skip
     """Fit the map of one drive."""
     if len(points) < 4:
         raise InputError(Fault("", "points", f"{len(points)}", "4 or more"))

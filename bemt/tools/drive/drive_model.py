@@ -88,13 +88,9 @@ class RotorMap:
 
 
 def quadratic(
-    kT: float,
-    kQ: float,
-    diameter_m: float,
-    rho: float = 1.225,
-    inertia_kg_m2: float = 0.0,
+    kT: float, kQ: float, diameter_m: float, rho: float = 1.225, inertia_kg_m2: float = 0.0,
     solidity: float | None = None,
-) -> RotorMap:
+) -> RotorMap:  # fmt: skip
     """Rotor whose loads go with the square of the speed.
 
     With a lift slope a of 5.7 per radian, dT/dw = -rho sigma a A Omega R / 4 (blade element, uniform inflow; J. G.
@@ -113,14 +109,9 @@ def points(diameter_m: float, rpm_max: float, airspeed_m_s: float) -> tuple[Arra
 
 
 def from_loads(
-    case: Case,
-    rpm: Array,
-    airspeed_m_s: Array,
-    thrust_N: Array,
-    torque_Nm: Array,
-    rho: float,
+    case: Case, rpm: Array, airspeed_m_s: Array, thrust_N: Array, torque_Nm: Array, rho: float,
     inertia_kg_m2: float = 0.0,
-) -> RotorMap:
+) -> RotorMap:  # fmt: skip
     """Rotor of a case from its loads at `points`; loads that are NaN are dropped."""
     from scipy.interpolate import PchipInterpolator
 

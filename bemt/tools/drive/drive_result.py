@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from bemt.base.action import as_html
 from bemt.base.arrays import Array
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
-from bemt.base.face import as_html
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, refuse
 from bemt.base.tables import csv_text, json_text, number_text, plain, write_atomic
 from bemt.base.units import INCH, KGF
 from bemt.rotors.case import Case
@@ -171,8 +171,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
         hint = "" if not AIRSPEED.high < airspeed_m_s < 3.6 * AIRSPEED.high else "km/h? Divide by 3.6"
         expected = f"a number from {AIRSPEED.low:g} to {AIRSPEED.high:g} m/s"
         wrong.append(Fault("", "--airspeed-m-s", f"{airspeed_m_s:g}", expected, hint))
-    if wrong:
-        raise InputError(wrong)
+    refuse(wrong)
     drive, bands, u = _carried(case, airspeed_m_s, off, _answers)
     table = drive_model.drive_table(case)
     steady = drive.steady(_pulses(drive), table.soc)
@@ -234,12 +233,8 @@ Ask = Callable[[Case, Drive], dict[str, Array]]
 
 
 def _carried(
-    case: Case,
-    airspeed_m_s: float,
-    off: Sequence[str],
-    ask: Ask,
-    bands: bool = True,
-) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:
+    case: Case, airspeed_m_s: float, off: Sequence[str], ask: Ask, bands: bool = True,
+) -> tuple[Drive, dict[str, DriveBand], dict[str, Array]]:  # fmt: skip
     """Answers with their bands: unknowns and errors of the rotor through the drive, then unknowns of the drive."""
     if airspeed_m_s:
         case.axial_only()

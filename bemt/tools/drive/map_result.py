@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.data import readers as importers
 from bemt.physics.dataset import Dataset
@@ -52,11 +52,10 @@ def speed_known(points: Dataset) -> Array:
     return np.array(errors)
 
 
-def scatter_document(points: Dataset) -> dict[str, Any]:
-    """Summary of `speed_known`. [1]"""
+def scatter(points: Dataset) -> tuple[int, float, float]:
+    """Points of `speed_known`, the largest of its errors and their root mean square [1]."""
     e = speed_known(points)
-    worst, rms = (float(np.max(np.abs(e))), float(np.sqrt(np.mean(e**2)))) if e.size else (None, None)
-    return {"points": int(e.size), "worst_of_full_thrust": worst, "rms_of_full_thrust": rms}
+    return (e.size, float(np.max(np.abs(e))), float(np.sqrt(np.mean(e**2)))) if e.size else (0, math.nan, math.nan)
 
 
 # A bench map as CSV, JSON and a C header, for the controller that asks for a thrust.
@@ -80,22 +79,6 @@ def table_csv(table: dict[str, Array]) -> str:
     """One table as CSV."""
     rows = [{name: float(v[i]) for name, v in table.items()} for i in range(len(next(iter(table.values()))))]
     return csv_text(list(table), rows)
-
-
-def export_document(chart: BenchMap, nodes: int = 41) -> dict[str, Any]:
-    """The map as a JSON document."""
-    forward, inverse = tables(chart, nodes)
-    return {
-        "full_thrust_N": chart.full_thrust_N,
-        "voltage_is_a_parameter": chart.with_voltage,
-        "voltage_ref_V": chart.voltage_ref,
-        "voltage_range_V": list(chart.voltage_range),
-        "voltage_exponent": {name: curve.exponent for name, curve in chart.curves.items()},
-        "smoothness": {name: curve.smoothness for name, curve in chart.curves.items()},
-        "forward": forward,
-        "inverse": inverse,
-        "notes": list(chart.notes),
-    }
 
 
 def _array(name: str, values: Array, comment: str) -> str:
@@ -176,30 +159,64 @@ RESULTS = ("{}.map.json", "{}.map.csv", "{}.inverse.csv", "{}_map.h", "{}.map.pn
 
 @dataclass(frozen=True)
 class MapResult:
-    """A map with its document ``bemt.map/1``; ``reached`` is False when the wanted thrust is more than it gives."""
+    """A map, and how well it holds its recordings."""
 
     chart: bench_map.BenchMap
-    document: dict[str, Any]
+    name: str
+    files: tuple[str, ...]
     nodes: int
-    reached: bool
+    steady_points: int
+    trip: bench_map.HeldOut
+    spread: float  # Of repeats at one pulse width, over full thrust [1]
+    speed_known: tuple[int, float, float]  # Of :func:`scatter`
+    misfit: float  # Over full thrust [1]
+    asked: tuple[float, float | None] | None = None  # Thrust [N] that is wanted, and its voltage [V]
+
+    @property
+    def pulse_us(self) -> float:
+        """Pulse width for the thrust that is wanted; NaN where it is more than the drive gives."""
+        return math.nan if self.asked is None else float(self.chart.pulse_for(*self.asked))
+
+    @property
+    def reached(self) -> bool:
+        """Whether the drive gives the thrust that is wanted."""
+        return self.asked is None or math.isfinite(self.pulse_us)
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.map/1``."""
+        chart, trip = self.chart, self.trip
+        forward, inverse = tables(chart, self.nodes)
+        points, worst, rms = self.speed_known
+        near = float(np.mean(np.abs(trip.error) <= 0.01))
+        out = {
+            "schema": SCHEMA, "name": self.name, "files": list(self.files), "full_thrust_N": chart.full_thrust_N,
+            "voltage_is_a_parameter": chart.with_voltage, "voltage_ref_V": chart.voltage_ref,
+            "voltage_range_V": list(chart.voltage_range),
+            "voltage_exponent": {name: curve.exponent for name, curve in chart.curves.items()},
+            "smoothness": {name: curve.smoothness for name, curve in chart.curves.items()}, "forward": forward,
+            "inverse": inverse, "notes": list(chart.notes), "steady_points": self.steady_points,
+            "held_out": {"points": len(trip.error), "worst_of_full_thrust": trip.worst,
+                         "rms_of_full_thrust": trip.rms, "share_within_1_pct": near},
+            "repeat_spread_of_full_thrust": self.spread,
+            "speed_known": {"points": points, "worst_of_full_thrust": worst, "rms_of_full_thrust": rms},
+            "misfit_of_full_thrust": self.misfit,
+        }  # fmt: skip
+        if self.asked is not None:
+            out["answer"] = {"thrust_N": self.asked[0], "voltage_V": self.asked[1], "pulse_us": self.pulse_us}
+        return out
 
 
 def fit(
-    files: Sequence[str],
-    sign: int = 1,
-    nodes: int = 41,
-    name: str | None = None,
-    thrust: float | None = None,
-    voltage: float | None = None,
-    out: str | None = None,
-) -> MapResult:
+    files: Sequence[str], sign: int = 1, nodes: int = 41, name: str | None = None, thrust: float | None = None,
+    voltage: float | None = None, out: str | None = None,
+) -> MapResult:  # fmt: skip
     """Fit a map to recordings of one drive and write it where told; faults of options and files come at once."""
     parts: list[Dataset] = []
     faults = _option_faults(thrust, voltage, nodes, name)
     name = name or Path(files[0]).stem
     read: dict[Path, str] = {}
     for i, file in enumerate(files):
-        try:
+        with gathered(faults):
             got = importers.read(file)
             own = _sources(Path(file), got)
             if twice := next((read[path] for path in own if path in read), None):
@@ -209,12 +226,9 @@ def fit(
             if not isinstance(got, Dataset):
                 raise InputError(Fault(file, "", "no recording", "a log or a table of a thrust stand"))
             parts.append(bench_map.points(got, file, sign, i))
-        except InputError as error:
-            faults += error.faults
     if out:
         faults += outputs.faults("--out", Path(out), [form.format(name) for form in RESULTS], read)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     points = bench_map.join(parts)
     chart = bench_map.fit(points)
     off = bench_map.misfit(points, chart)
@@ -222,52 +236,37 @@ def fit(
         got = f"thrust that deviates by {100 * off:.0f} % of its largest value from any rising curve"
         hint = "Is there a propeller, and did the motor run through? Different drives do not share a map"
         raise InputError(Fault(", ".join(files), "thrust_N", got, "thrust that rises with the pulse width", hint))
-    trip = bench_map.held_out(points)
-    spread, speed = bench_map.repeat_spread(points, chart), scatter_document(points)
-    document: dict[str, Any] = {
-        "schema": SCHEMA, "name": name, "files": list(files), **export_document(chart, nodes),
-        "steady_points": len(points),
-        "held_out": {"points": len(trip.error), "worst_of_full_thrust": trip.worst, "rms_of_full_thrust": trip.rms,
-                     "share_within_1_pct": float(np.mean(np.abs(trip.error) <= 0.01))},
-        "repeat_spread_of_full_thrust": spread, "speed_known": speed,
-        "misfit_of_full_thrust": off,
-    }  # fmt: skip
-    reached = True
-    if thrust is not None:
-        pulse = float(chart.pulse_for(thrust, voltage))
-        document["answer"] = {"thrust_N": thrust, "voltage_V": voltage, "pulse_us": pulse}
-        reached = math.isfinite(pulse)
+    asked = None if thrust is None else (thrust, voltage)
+    made = MapResult(chart, name, tuple(files), nodes, len(points), bench_map.held_out(points),
+                     bench_map.repeat_spread(points, chart), scatter(points), off, asked)  # fmt: skip
     if out:
-        _write(Path(out), name, chart, nodes, json_text(document))
-    return MapResult(chart, document, nodes, reached)
+        _write(Path(out), name, chart, nodes, json_text(made.document()))
+    return made
 
 
 def text(result: MapResult) -> str:
     """Lay a map out for a terminal."""
-    chart, nodes, document = result.chart, result.nodes, result.document
-    trip, spread = document["held_out"], document["repeat_spread_of_full_thrust"]
-    speed, answer = document["speed_known"], document.get("answer")
+    chart, nodes, trip, spread = result.chart, result.nodes, result.trip, result.spread
     forward, _ = tables(chart, nodes)
     rows = [[number_text(float(v[i])) for v in forward.values()] for i in range(nodes)]
     lines = [text_table(list(forward), rows, left=())]
-    worst, rms = (100 * trip[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
-    lines.append(f"held out: {trip['points']} points, worst {worst:.2f} %, rms {rms:.2f} % of full thrust")
+    worst, rms = 100 * trip.worst, 100 * trip.rms
+    lines.append(f"held out: {len(trip.error)} points, worst {worst:.2f} %, rms {rms:.2f} % of full thrust")
     if np.isfinite(spread):
         lines.append(f"the recording itself scatters by up to {100 * spread:.2f} % of full thrust at equal pulse width")
-    if speed["points"]:
-        worst, rms = (100 * speed[f"{key}_of_full_thrust"] for key in ("worst", "rms"))
-        lines.append(
-            f"with known speed the thrust error would still be {worst:.2f} %, rms {rms:.2f} %: scatter of the readings"
-        )
+    known, worst, rms = result.speed_known
+    if known:
+        words = f"{100 * worst:.2f} %, rms {100 * rms:.2f} %: scatter of the readings"
+        lines.append(f"with known speed the thrust error would still be {words}")
     if chart.with_voltage:
         m = chart.curves["thrust"].exponent
         low, high = chart.voltage_range
         law = f"thrust scales with (V / {chart.voltage_ref:.2f} V)^{m:.2f}"
         lines.append(f"{law}, recorded from {low:.2f} to {high:.2f} V")
     lines += [f"! {note}" for note in chart.notes]
-    if answer is not None:
-        shown = number_text(answer["pulse_us"], 6, none="more than this drive can give")
-        lines.append(f"{answer['thrust_N']:g} N: pulse width {shown}{' us' if np.isfinite(answer['pulse_us']) else ''}")
+    if result.asked is not None:
+        shown = number_text(result.pulse_us, 6, none="more than this drive can give")
+        lines.append(f"{result.asked[0]:g} N: pulse width {shown}{' us' if result.reached else ''}")
     return "\n".join(lines) + "\n"
 
 
@@ -299,11 +298,7 @@ def _sources(path: Path, got: object) -> set[Path]:
 def _write(folder: Path, name: str, chart: bench_map.BenchMap, nodes: int, text: str) -> None:
     forward, inverse = tables(chart, nodes)
     contents: Iterable[bytes | str] = (
-        text,
-        table_csv(forward),
-        table_csv(inverse),
-        c_header(chart, name, nodes),
-        outputs.bench_map(chart, name),
-    )
+        text, table_csv(forward), table_csv(inverse), c_header(chart, name, nodes), outputs.bench_map(chart, name),
+    )  # fmt: skip
     for form, content in zip(RESULTS, contents, strict=True):
         write_atomic(folder / form.format(name), content)

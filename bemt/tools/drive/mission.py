@@ -46,12 +46,9 @@ class History:
 
 
 def simulate(
-    drive: Drive,
-    steps: Sequence[tuple[float, float]],
-    end_s: float,
-    times_s: ArrayLike | None = None,
+    drive: Drive, steps: Sequence[tuple[float, float]], end_s: float, times_s: ArrayLike | None = None,
     soc: float = 1.0,
-) -> History:
+) -> History:  # fmt: skip
     """Integrate the drive through steps of the command."""
     from scipy.integrate import solve_ivp
 

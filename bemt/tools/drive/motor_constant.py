@@ -216,11 +216,9 @@ def fit_waveform(time_s: ArrayLike, volts: ArrayLike) -> Waveform:
 
     span = 0.5 / t[-1]
     best = minimize_scalar(
-        lambda f: float(np.sum(solve(f)[1] ** 2)),
-        bounds=(max(coarse - span, 0.1 * coarse), coarse + span),
-        method="bounded",
-        options={"xatol": 1e-9 * coarse},
-    )
+        lambda f: float(np.sum(solve(f)[1] ** 2)), bounds=(max(coarse - span, 0.1 * coarse), coarse + span),
+        method="bounded", options={"xatol": 1e-9 * coarse},
+    )  # fmt: skip
     f = float(best.x)
     c, rest = solve(f)
     sizes = [math.hypot(c[1 + 2 * k], c[2 + 2 * k]) for k in range(3)]

@@ -12,8 +12,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
-from bemt.base.folders import inside
+from bemt.base.document import Documented
+from bemt.base.errors import Fault, InputError, gathered, refuse
+from bemt.base.given import inside
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import FieldLimits, Table, entry, read_model
 from bemt.data import readers as importers
@@ -152,17 +153,12 @@ def read(path: str | Path) -> MotorTrials:
         raise InputError([Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items()])
     faults: list[Fault] = []
     emf = torque = loop = None
-    try:
+    with gathered(faults):
         emf = None if emf_table is None else _back_emf(file, emf_table, winding, motor.pole_pairs)
-    except InputError as error:
-        faults += error.faults
-    try:
+    with gathered(faults):
         if torque_table is not None:
             torque, loop = _torque(file, torque_table, winding)
-    except InputError as error:
-        faults += error.faults
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     gains = {name: table.u_gain_pct for name, table in (("back_emf", emf_table), ("torque", torque_table)) if table}
     notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
     measured = Measured(
@@ -193,8 +189,7 @@ def _columns(path: Path, units: tuple[str, ...]) -> tuple[Array, ...]:
             found.append(got[of_unit[0]])
     if "trial" not in got:
         faults.append(Fault(name, "trial", "no column trial", "the number of the trial of each row"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     columns = (got["trial"], *found)
     bad = ~np.all(np.isfinite(columns), axis=0)
     if np.any(bad):
@@ -271,120 +266,152 @@ RESULTS = ("motor.json", "trials.csv", "motor.png")
 TITLES = {"data_sheet": "data sheet", "back_emf": "back-EMF", "torque": "torque sensor"}
 
 
-def _method(name: str, line: Line, u_gain: float, to_kt: float) -> dict[str, Any]:
+class MethodResult(Documented):
+    """K_t by one method, in the convention asked for [N m/A]."""
+
+    method: str
+    n: int
+    mean: float
+    u: float
+    sigma3: float
+    interval95: tuple[float, float]
+    intercept: float
+    u_intercept: float
+    trials: tuple[float, ...]
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Of its trials, or the one value."""
+        return self.trials or (self.mean,)
+
+
+class Explained(Documented):
+    """Errors that make the methods agree, with the K_t that is left."""
+
+    errors: tuple[str, ...]
+    sizes: tuple[float, ...]
+    u_sizes: tuple[float, ...]
+    Kt: float
+    u_Kt: float
+    chi2: float
+    p: float
+
+
+class MotorResult(Documented):
+    """``bemt.motor.result/1``: K_t by all methods, and whether they agree."""
+
+    name: str
+    data: str
+    convention: str
+    methods: tuple[MethodResult, ...]
+    agree: bool
+    p_of_agreement: float
+    explanations: tuple[Explained, ...]
+    named: tuple[str, ...]
+    Kt: float | None
+    u_Kt: float | None
+    stated: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"schema": "bemt.motor.result/1", **super().document()}
+
+
+def _method(name: str, line: Line, u_gain: float, to_kt: float) -> MethodResult:
     mean, u = line.slope, math.hypot(math.sqrt(line.cov[0, 0]), u_gain * line.slope)
-    return {
-        "method": name,
-        "n": len(line.slopes),
-        "mean": mean * to_kt,
-        "u": u * to_kt,
-        "sigma3": 3.0 * line.sd * to_kt,
-        "interval95": [(mean - 1.96 * u) * to_kt, (mean + 1.96 * u) * to_kt],
-        "intercept": line.intercept,
-        "u_intercept": float(math.sqrt(line.cov[1, 1])),
-        "trials": [float(v) * to_kt for v in line.slopes],
-    }
+    return MethodResult(
+        name, len(line.slopes), mean * to_kt, u * to_kt, 3.0 * line.sd * to_kt,
+        ((mean - 1.96 * u) * to_kt, (mean + 1.96 * u) * to_kt), line.intercept, float(math.sqrt(line.cov[1, 1])),
+        tuple(float(v) * to_kt for v in line.slopes),
+    )  # fmt: skip
 
 
-def document(trials: MotorTrials, verdict: motor_constant.Verdict) -> dict[str, Any]:
-    """All results as a JSON document."""
+def result(trials: MotorTrials, verdict: motor_constant.Verdict) -> MotorResult:
+    """All results."""
     m, to = trials.measured, trials.to_kt
-    methods: list[dict[str, Any]] = []
+    methods: list[MethodResult] = []
     if m.data_sheet is not None:
-        u = m.u_data_sheet * to
-        interval = [m.data_sheet * to - 1.96 * u, m.data_sheet * to + 1.96 * u]
-        methods.append({"method": "data_sheet", "n": 1, "mean": m.data_sheet * to, "u": u, "sigma3": math.nan,
-                        "interval95": interval, "intercept": math.nan, "u_intercept": math.nan,
-                        "trials": []})  # fmt: skip
+        K, u = m.data_sheet * to, m.u_data_sheet * to
+        span = (K - 1.96 * u, K + 1.96 * u)
+        methods.append(MethodResult("data_sheet", 1, K, u, math.nan, span, math.nan, math.nan, ()))
     if m.back_emf is not None:
         methods.append(_method("back_emf", m.back_emf, m.u_gain_back_emf, to))
     if m.torque is not None:
         methods.append(_method("torque", m.torque, math.hypot(m.u_gain_torque, m.u_shunt), to))
     best = verdict.none if verdict.agree else verdict.explanations[0] if len(verdict.explanations) == 1 else None
-    explained = [
-        {"errors": list(e.names), "sizes": list(e.sizes), "u_sizes": list(e.u_sizes), "Kt": e.ke * to,
-         "u_Kt": e.u_ke * to, "chi2": e.chi2, "p": e.p} for e in verdict.explanations
-    ]  # fmt: skip
-    return {
-        "schema": "bemt.motor.result/1", "name": trials.name, "data": trials.data, "convention": trials.convention,
-        "methods": methods, "agree": verdict.agree, "p_of_agreement": verdict.none.p, "explanations": explained,
-        "named": list(verdict.named), "Kt": best.ke * to if best else None, "u_Kt": best.u_ke * to if best else None,
-        "stated": dict(trials.stated), "notes": list(trials.notes),
-    }  # fmt: skip
+    explained = tuple(Explained(tuple(e.names), tuple(e.sizes), tuple(e.u_sizes), e.ke * to, e.u_ke * to, e.chi2, e.p)
+                      for e in verdict.explanations)  # fmt: skip
+    return MotorResult(
+        trials.name, trials.data, trials.convention, tuple(methods), verdict.agree, verdict.none.p, explained,
+        tuple(verdict.named), best.ke * to if best else None, best.u_ke * to if best else None, dict(trials.stated),
+        tuple(trials.notes),
+    )  # fmt: skip
 
 
 _UNITS = {
-    "back_emf.offset": "V",
-    "torque.offset": "N m",
-    "torque.shunt": "times the resistor assumed",
-    "data_sheet.gain": "times",
-    "back_emf.gain": "times",
-    "torque.gain": "times",
-}
+    "back_emf.offset": "V", "torque.offset": "N m", "torque.shunt": "times the resistor assumed",
+    "data_sheet.gain": "times", "back_emf.gain": "times", "torque.gain": "times",
+}  # fmt: skip
 
 
-def verdict_text(made: dict[str, Any]) -> list[str]:
+def verdict_text(made: MotorResult) -> list[str]:
     """The verdict in words."""
-    if made["agree"]:
-        return [f"the methods agree (p = {made['p_of_agreement']:.2g}); this does not exclude an error common to all"]
-    lines = [f"the methods do not agree (p = {made['p_of_agreement']:.1g})"]
-    if not made["explanations"]:
+    if made.agree:
+        return [f"the methods agree (p = {made.p_of_agreement:.2g}); this does not exclude an error common to all"]
+    lines = [f"the methods do not agree (p = {made.p_of_agreement:.1g})"]
+    if not made.explanations:
         return [*lines, "no offset, resistor, convention factor or gain, nor any pair of them, explains it"]
-    for e in made["explanations"]:
-        parts = []
-        for name, size, u in zip(e["errors"], e["sizes"], e["u_sizes"], strict=True):
-            if u:
-                parts.append(f"{name} {size:.4g} ± {1.96 * u:.2g} {_UNITS.get(name, '')}".rstrip())
-            else:
-                parts.append(f"{name}: its value is {size:.4g} times too large")
-        lines.append(f"explained by {' and '.join(parts)}: K_t = {e['Kt']:.4f} ± {1.96 * e['u_Kt']:.1g} N m/A")
-    if len(made["explanations"]) > 1:
+    for e in made.explanations:
+        parts = [
+            f"{name} {size:.4g} ± {1.96 * u:.2g} {_UNITS.get(name, '')}".rstrip()
+            if u
+            else f"{name}: its value is {size:.4g} times too large"
+            for name, size, u in zip(e.errors, e.sizes, e.u_sizes, strict=True)
+        ]
+        lines.append(f"explained by {' and '.join(parts)}: K_t = {e.Kt:.4f} ± {1.96 * e.u_Kt:.1g} N m/A")
+    if len(made.explanations) > 1:
         lines.append("these explain the trials equally well; the trials cannot distinguish them, so none is named")
-    if any(name.endswith("gain") for e in made["explanations"] for name in e["errors"]):
+    names = {name for e in made.explanations for name in e.errors}
+    if any(name.endswith("gain") for name in names):
         lines.append("a gain error is not an offset, resistor or convention error: look for a wrong calibration")
-    if any("torque.offset" in e["errors"] for e in made["explanations"]):
+    if "torque.offset" in names:
         lines.append(
             "a torque offset is the zero of the sensor, friction or cogging: the trials alone do not show which"
         )
     return lines
 
 
-def text(trials: MotorTrials, made: dict[str, Any]) -> str:
+def text(made: MotorResult) -> str:
     """Lay the results out for a terminal."""
     rows = []
-    for m in made["methods"]:
-        low, high = m["interval95"]
+    for m in made.methods:
+        low, high = m.interval95
         interval = f"{low:.5f} to {high:.5f}" if math.isfinite(low) else "unknown"
-        zero = f"{m['intercept']:.3g} ± {1.96 * m['u_intercept']:.2g}" if math.isfinite(m["intercept"]) else "-"
-        unit = {"back_emf": " V", "torque": " N m"}.get(m["method"], "")
-        rows.append([TITLES[m["method"]], str(m["n"]), number_text(m["mean"]), number_text(m["sigma3"], 3), interval,
-                     zero + unit])  # fmt: skip
+        zero = f"{m.intercept:.3g} ± {1.96 * m.u_intercept:.2g}" if math.isfinite(m.intercept) else "-"
+        unit = {"back_emf": " V", "torque": " N m"}.get(m.method, "")
+        rows.append([TITLES[m.method], str(m.n), number_text(m.mean), number_text(m.sigma3, 3), interval, zero + unit])
     head = ["method", "trials", "K_t [N m/A]", "3 sigma", "95 % of the mean", "intercept"]
-    lines = [trials.name + (f" ({trials.data})" if trials.data else ""), trials.convention, text_table(head, rows)]
-    lines += [f"stated: {name} {value:.4f}" for name, value in made["stated"].items()]
+    lines = [made.name + (f" ({made.data})" if made.data else ""), made.convention, text_table(head, rows)]
+    lines += [f"stated: {name} {value:.4f}" for name, value in made.stated.items()]
     lines += verdict_text(made)
-    if made["Kt"] is not None:
-        lines.append(f"K_t = {made['Kt']:.5f} ± {1.96 * made['u_Kt']:.2g} N m/A (95 %)")
-    return "\n".join(lines + [f"! {note}" for note in made["notes"]]) + "\n"
+    if made.Kt is not None and made.u_Kt is not None:
+        lines.append(f"K_t = {made.Kt:.5f} ± {1.96 * made.u_Kt:.2g} N m/A (95 %)")
+    return "\n".join(lines + [f"! {note}" for note in made.notes]) + "\n"
 
 
-def judge(file: str, out: str | None = None) -> tuple[MotorTrials, dict[str, Any]]:
-    """Read trials and judge them: what was read, and ``bemt.motor.result/1``; written where told, over no input."""
+def judge(file: str, out: str | None = None) -> MotorResult:
+    """Read trials and judge them; written where told, over no input."""
     trials = read(file)
     if out:
         outputs.check("--out", Path(out), RESULTS, trials.files)
-    made = document(trials, motor_constant.judge(trials.measured))
+    made = result(trials, motor_constant.judge(trials.measured))
     if out:
-        folder = Path(out)
-        write_atomic(folder / "motor.json", json_text(made))
-        rows = [
-            {"method": m["method"], "trial": t, "Kt_Nm_A": v}
-            for m in made["methods"]
-            for t, v in enumerate(m["trials"] or [m["mean"]], 1)
-        ]
-        write_atomic(folder / "trials.csv", csv_text(["method", "trial", "Kt_Nm_A"], rows))
-        title = f"{trials.name}: {trials.data}" if trials.data else trials.name
-        values = {TITLES[m["method"]]: np.array(m["trials"] or [m["mean"]]) for m in made["methods"]}
-        png = outputs.box_plot(values, trials.stated, "torque constant [N m/A]", title)
-        write_atomic(folder / "motor.png", png)
-    return trials, made
+        folder, names = Path(out), ["method", "trial", "Kt_Nm_A"]
+        write_atomic(folder / "motor.json", json_text(made.document()))
+        rows = [(m.method, t, v) for m in made.methods for t, v in enumerate(m.values, 1)]
+        write_atomic(folder / "trials.csv", csv_text(names, [dict(zip(names, row, strict=True)) for row in rows]))
+        title = f"{made.name}: {made.data}" if made.data else made.name
+        values = {TITLES[m.method]: np.array(m.values) for m in made.methods}
+        write_atomic(folder / "motor.png", outputs.box_plot(values, made.stated, "torque constant [N m/A]", title))
+    return made

@@ -11,7 +11,7 @@ import numpy as np
 
 from bemt.base import canvas
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 from bemt.tools.drive.bench_map import CHANNELS
 
 if TYPE_CHECKING:
@@ -109,5 +109,4 @@ def faults(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Pat
 def check(option: str, folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> None:
     """Refuse to write over what is read; to be called before anything is written."""
     found = faults(option, folder, names, inputs)
-    if found:
-        raise InputError(found)
+    refuse(found)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import csv_text, json_text, number_text, text_table, write_atomic
 from bemt.base.toml import Axis, Span, Table, axis_values, entry, read_model
 from bemt.tools.drive import outputs
@@ -90,8 +90,7 @@ def allocate(thrusters: Sequence[Thruster], force_N: float, moment_Nm: float, pr
     faults += [Fault("", name, f"{v}", "a finite number") for name, v in wishes.items() if not math.isfinite(v)]
     if priority not in ("moment", "force"):
         faults.append(Fault("", "priority", repr(priority), "moment or force"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     b = effectiveness(thrusters)
     low, high = np.array([t.thrust_min_N for t in thrusters]), np.array([t.thrust_max_N for t in thrusters])
     most = np.maximum(np.abs(low), np.abs(high))
@@ -224,8 +223,7 @@ def share(
         file = read_model(ThrustersFile, _toml(Path(path)))
     except InputError as error:
         raise InputError([*wrong, *error.faults]) from None
-    if wrong:
-        raise InputError(wrong)
+    refuse(wrong)
     thrusters = [
         Thruster(t.y_m, t.thrust_max_N, t.thrust_min_N, t.z_m, math.radians(t.cant_deg), t.name or f"thruster {i + 1}")
         for i, t in enumerate(file.thruster)

@@ -117,7 +117,7 @@ def export(
     """
     from pathlib import Path as File
 
-    from bemt.base.errors import Fault, InputError, system_fault
+    from bemt.base.errors import Fault, InputError, refuse, system_fault
     from bemt.base.given import number, path_text
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.exports.folder import Exported, export_cases
@@ -135,8 +135,7 @@ def export(
         request = Print(**{**vars(request), "min_thickness_mm": min_thickness_mm, "flare_mm": fillet_mm})
     else:
         faults += [Fault("", name, "given", "nothing without --printable") for name in asked(request)]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     folder = path_text("out", out)
     named = isinstance(case, (str, os.PathLike)) and File(case).exists()
     try:

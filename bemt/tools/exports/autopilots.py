@@ -150,20 +150,11 @@ class ArdupilotExport(LoadsExport):
         v_hover = v_max * float(np.sqrt(HOVER))
         volts = 22.2
         frame = {
-            "mass": ROTORS * hover / G0,
-            "num_motors": ROTORS,
-            "disc_area": ROTORS * np.pi * t.diameter_m**2 / 4.0,
-            "propExpo": e,
-            "hoverThrOut": HOVER,
-            "refVoltage": volts,
-            "maxVoltage": volts,
-            "refCurrent": ROTORS * hover * v_hover / (2.0 * volts),
-            "refAlt": 0.0,
-            "spin_min": 0.0,
-            "spin_max": 1.0,
-            "pwmMin": 1000,
-            "pwmMax": 2000,
-        }
+            "mass": ROTORS * hover / G0, "num_motors": ROTORS, "disc_area": ROTORS * np.pi * t.diameter_m**2 / 4.0,
+            "propExpo": e, "hoverThrOut": HOVER, "refVoltage": volts, "maxVoltage": volts,
+            "refCurrent": ROTORS * hover * v_hover / (2.0 * volts), "refAlt": 0.0, "spin_min": 0.0, "spin_max": 1.0,
+            "pwmMin": 1000, "pwmMax": 2000,
+        }  # fmt: skip
         lines = [f"# {line}" for line in header(job, "ArduPilot frame")] + [f"# {job.rotation}"]
         lines += [
             "# mass, num_motors and hoverThrOut are a stand-in: four rotors at half of full thrust. Keep them and",

@@ -38,15 +38,8 @@ if TYPE_CHECKING:
     from geometry.mesh import Options
 
 __all__ = [
-    "FEATURES",
-    "BladeExport",
-    "DiskExport",
-    "Export",
-    "Files",
-    "Job",
-    "LoadsExport",
-    "SolidExport",
-]
+    "FEATURES", "BladeExport", "DiskExport", "Export", "Files", "Job", "LoadsExport", "SolidExport",
+]  # fmt: skip
 
 Files = Mapping[str, str | bytes]
 """Content by path below the folder of the export."""

@@ -56,12 +56,10 @@ def section_errors(job: Job, sections: list[Any]) -> list[dict[str, float]]:
         got_l, got_d = s.cl_cd(a, Re)
         out.append(
             {
-                "r_over_R": float(x),
-                "Re": Re,
-                "cl": float(np.abs(got_l - cl).max()),
+                "r_over_R": float(x), "Re": Re, "cl": float(np.abs(got_l - cl).max()),
                 "cd_pct": float(100.0 * np.abs(got_d / cd - 1.0).max()),
             }
-        )
+        )  # fmt: skip
     return out
 
 
@@ -107,17 +105,9 @@ def baked(job: Job, count: int = 20) -> Frozen:
     M = np.sqrt(M2_STEP * np.arange(tab.shape[1]))
     cl, cd = (np.swapaxes(mixed[..., i], 1, 2) for i in (0, 1))
     return Frozen(
-        point.r[keep],
-        point.chord[keep],
-        point.beta[keep],
-        np.asarray(ALPHA_GRID),
-        M,
-        cl,
-        cd,
-        point.Re[keep],
-        point.alpha[keep],
-        point.M[keep],
-    )
+        point.r[keep], point.chord[keep], point.beta[keep], np.asarray(ALPHA_GRID), M, cl, cd, point.Re[keep],
+        point.alpha[keep], point.M[keep],
+    )  # fmt: skip
 
 
 def _re_axis(grid: Array, count: int) -> Array:

@@ -47,12 +47,9 @@ class XrotorExport(BladeExport):
         found = sections_of(job)
         rows += [f" {len(found)}", *(line for x, s in found for line in section_lines(x, s))]
         rows += [
-            "!LVDuct  LDuct   LWind",
-            "  T       F       F",
-            "!   II Nblds",
-            f" {r.size} {p.blades}",
+            "!LVDuct  LDuct   LWind", "  T       F       F", "!   II Nblds", f" {r.size} {p.blades}",
             "!         r/R          C/R     Beta0deg         Ubody",
-        ]
+        ]  # fmt: skip
         rows += [f" {x / p.R:.10g} {y / p.R:.10g} {np.degrees(z):.10g} 0.0" for x, y, z in zip(r, c, b, strict=True)]
         rows += ["!      URDuct", " 1.0"]
         return {f"{plain_name(job.case.name)}.xrotor": "\n".join(rows) + "\n"}
@@ -128,11 +125,9 @@ class QpropExport(BladeExport):
         found = _sections(job)
         first = found[0][1]
         rows = [
-            f"{job.case.name}, {job.rotation}, bemt {__version__}",
+            f"{job.case.name}, {job.rotation}, bemt {__version__}", "", f" {p.blades} {p.R:.10g}  ! Nblades [ R ]",
             "",
-            f" {p.blades} {p.R:.10g}  ! Nblades [ R ]",
-            "",
-        ]
+        ]  # fmt: skip
         rows += [
             f" {first.cl0:.12g} {first.cla:.12g}  ! CL0 CL_a",
             f" {first.clmin:.12g} {first.clmax:.12g}  ! CLmin CLmax",

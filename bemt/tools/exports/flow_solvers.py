@@ -132,15 +132,9 @@ class Flow360Export(DiskExport):
             "alphas": degrees.tolist(),
         }
         scales = {
-            "grid_unit_m": 1.0,
-            "a_sound_m_s": p.a_sound,
-            "density_kg_m3": p.rho,
-            "viscosity_Pa_s": p.mu,
-            "rpm": p.rpm,
-            "airspeed_m_s": p.airspeed_m_s,
-            "rotor_thrust_N": p.thrust_N,
-            "torque_Nm": p.torque_Nm,
-        }
+            "grid_unit_m": 1.0, "a_sound_m_s": p.a_sound, "density_kg_m3": p.rho, "viscosity_Pa_s": p.mu,
+            "rpm": p.rpm, "airspeed_m_s": p.airspeed_m_s, "rotor_thrust_N": p.thrust_N, "torque_Nm": p.torque_Nm,
+        }  # fmt: skip
         return {
             "bet_disk.json": json.dumps({"BETDisks": [disk]}) + "\n",
             "scales.json": json.dumps(scales, indent=1) + "\n",

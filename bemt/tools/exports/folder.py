@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError
-from bemt.base.face import as_html
+from bemt.base.action import as_html
+from bemt.base.document import Documented, rows_of
+from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError, gathered, refuse
 from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
 from bemt.base.toml import check_field, shown
@@ -22,6 +23,51 @@ from bemt.tools.exports.printing import Print, faults_of, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA
 from geometry.mesh import Options
+
+
+class Listed(Documented):
+    """A file as a manifest lists it."""
+
+    path: str
+    sha256: str
+    format: str = ""
+    unit: str = ""
+    bytes: int = 0
+    surfaces: tuple[Mapping[str, Any], ...] = ()
+
+
+class ShownBand(Documented):
+    """Band of the prediction, one standard uncertainty [%]."""
+
+    airspeed_m_s: tuple[float, ...]
+    thrust_pct: tuple[float, ...]
+    torque_pct: tuple[float, ...]
+    origin: str
+    flags: tuple[str, ...]
+
+
+class SectionError(Documented):
+    """Greatest error of fitted sections: of cl, and of cd in per cent."""
+
+    cl: float
+    cd_pct: float
+
+
+class TargetPart(Documented):
+    """What a manifest says of a target that is no solid."""
+
+    target: str
+    files: tuple[Listed, ...]
+    title: str = ""
+    holds: str = ""
+    notes: tuple[str, ...] = ()
+    fit_error_pct: Mapping[str, Any] = field(default_factory=dict)
+    section_error: SectionError | None = None
+    band: ShownBand | None = None
+
+
+def _targets(manifest: Mapping[str, Any]) -> tuple[TargetPart, ...]:
+    return rows_of(TargetPart, manifest.get("targets", []))
 
 
 class PartlyRefused(InputError):
@@ -46,10 +92,8 @@ def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     manifest: dict[str, Any] = {}
     faults: list[Fault] = []
     for target in sorted((exports()[word] for word in dict.fromkeys(formats)), key=lambda target: target.turn):
-        try:
+        with gathered(faults):
             manifest = joined(manifest, target.put(job, out))
-        except InputError as error:
-            faults += error.faults
     if manifest:
         content = case.content_hash()
         kept = _kept(before, manifest, out)
@@ -75,8 +119,8 @@ def _parts(manifest: Mapping[str, Any]) -> dict[str, Any]:
 def _formats(manifest: Mapping[str, Any]) -> list[str]:
     """Formats that a manifest speaks of."""
     parts = _parts(manifest)
-    out = [item["format"] for item in manifest["files"] if item["format"] not in parts]
-    return list(dict.fromkeys([*out, *parts, *(item["target"] for item in manifest.get("targets", []))]))
+    out = [file.format for file in rows_of(Listed, manifest["files"]) if file.format not in parts]
+    return list(dict.fromkeys([*out, *parts, *(one.target for one in _targets(manifest))]))
 
 
 def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[str, Any]:
@@ -86,21 +130,18 @@ def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[s
     def there(files: Mapping[str, str], folder: str = "") -> bool:
         return all(_unchanged(out, folder + path, digest) for path, digest in files.items())
 
+    def stays(file: Listed) -> bool:
+        own = bool(file.format) and file.format not in gone and (file.format not in parts or file.format in kept)
+        return own and there({file.path: file.sha256})
+
     parts = _parts(before)
     kept = {key: value for key, value in before.items() if key not in ("files", "targets", "case_sha256", *parts)}
     kept |= {word: part for word, part in parts.items() if word not in gone and there(part["files"])}
-    kept["files"] = [
-        item
-        for item in before.get("files", [])
-        if "format" in item
-        and item["format"] not in gone
-        and (item["format"] not in parts or item["format"] in kept)
-        and there({item["path"]: item["sha256"]})
-    ]
+    kept["files"] = [item for item in before.get("files", []) if stays(Listed.from_document(item))]
     targets = [
         item
-        for item in before.get("targets", [])
-        if item["target"] not in gone and there({f["path"]: f["sha256"] for f in item["files"]}, f"{item['target']}/")
+        for item, one in zip(before.get("targets", []), _targets(before), strict=True)
+        if one.target not in gone and there({f.path: f.sha256 for f in one.files}, f"{one.target}/")
     ]
     if targets:
         kept["targets"] = targets
@@ -109,10 +150,8 @@ def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[s
 
 def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
     """Files that a manifest lists, and what was in them."""
-    files: dict[str, str] = {item["path"]: item["sha256"] for item in manifest["files"]}
-    files |= {
-        f"{t['target']}/{item['path']}": item["sha256"] for t in manifest.get("targets", []) for item in t["files"]
-    }
+    files = {file.path: file.sha256 for file in rows_of(Listed, manifest["files"])}
+    files |= {f"{one.target}/{file.path}": file.sha256 for one in _targets(manifest) for file in one.files}
     return files | {path: digest for part in _parts(manifest).values() for path, digest in part["files"].items()}
 
 
@@ -165,16 +204,10 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 
 
 def export_cases(
-    path: str | Case,
-    out: str,
-    formats: Sequence[str],
-    unit: str = "mm",
-    fillet_mm: float = 0.0,
-    min_thickness_mm: float = 0.0,
-    given: Mapping[str, Any] | None = None,
-    hold: tuple[str, ...] = (),
+    path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
+    min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
     printed: Print | None = None,
-) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:
+) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:  # fmt: skip
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
     `given` is the operating point (``rpm``, ``airspeed_m_s``) and the options of single targets
@@ -186,8 +219,7 @@ def export_cases(
     known = exports()
     unknown = [word for word in formats if word not in known]
     faults = [Fault("", "--format", word, f"one of {', '.join(known)}", absent_target(word)) for word in unknown]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     asked = {key: value for key, value in (given or {}).items() if value is not None}
     faults += option_faults(asked) + _unused(asked, formats, hold)
     faults += faults_of(printed, formats) if printed is not None else []
@@ -195,8 +227,7 @@ def export_cases(
         solid = Options(fillet=fillet_mm * 1e-3, min_thickness=min_thickness_mm * 1e-3)
     except GeometryError as error:
         faults += [Fault("", f"{_option(name)}-mm", *rest) for name, *rest in error.faults]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     paths = [] if isinstance(path, Case) else find_cases([path])
     cases = [path] if isinstance(path, Case) else []
     refused, made = [], []
@@ -268,33 +299,28 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
 def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
     """What each target holds, and how well."""
     lines = []
-    for item in manifest.get("targets", []):
-        lines.append(
-            f"{manifest['name']} as {item['title']}, in {out / item['target']}: "
-            f"{', '.join(f['path'] for f in item['files'])}"
-        )
-        lines.append(f"  holds {item['holds']}")
-        error = item.get("fit_error_pct", {})
-        shown_errors = []
+    for one in _targets(manifest):
+        files = ", ".join(f.path for f in one.files)
+        lines += [f"{manifest['name']} as {one.title}, in {out / one.target}: {files}", f"  holds {one.holds}"]
+        error, shown_errors = one.fit_error_pct, []
         for word in ("thrust", "torque"):
             value = error.get(word)
             worst = value.get("flight") if isinstance(value, dict) else value
             shown_errors.append(f"{word} {'not held' if worst is None else number_text(worst, 3) + ' %'}")
         if error:
             lines.append(f"  greatest error {', '.join(shown_errors)} (of {error['of']})")
-        if item.get("section_error"):
-            cl, cd = (number_text(item["section_error"][key], 2) for key in ("cl", "cd_pct"))
+        if one.section_error:
+            cl, cd = (number_text(e, 2) for e in (one.section_error.cl, one.section_error.cd_pct))
             lines.append(f"  sections: cl within {cl}, cd within {cd} % between the stalls")
-        if "band" in item:
-            band = item["band"]
-            speeds = dict.fromkeys(zip(band["airspeed_m_s"], band["thrust_pct"], band["torque_pct"], strict=True))
+        if band := one.band:
+            speeds = dict.fromkeys(zip(band.airspeed_m_s, band.thrust_pct, band.torque_pct, strict=True))
             words = ", ".join(
                 f"{number_text(t, 3)} % of thrust, {number_text(q, 3)} % of torque at {number_text(v, 3)} m/s"
                 for v, t, q in speeds
             )
-            lines.append(f"  standard uncertainty of the prediction: {words} ({band['origin']})")
-            lines += [f"  ! {flag}" for flag in band["flags"]]
-        lines += [f"  note: {note}" for note in item["notes"]]
+            lines.append(f"  standard uncertainty of the prediction: {words} ({band.origin})")
+            lines += [f"  ! {flag}" for flag in band.flags]
+        lines += [f"  note: {note}" for note in one.notes]
     if manifest.get("kept"):
         lines.append(f"kept from an earlier export into {out}: {', '.join(manifest['kept'])}")
     if manifest.get("stale"):
@@ -308,15 +334,8 @@ def text(manifest: dict[str, Any], out: Path) -> str:
     if not manifest["files"] and targets:
         return "\n".join(targets)
     rows = [
-        [
-            item["path"],
-            item["format"],
-            item["unit"],
-            f"{item['bytes'] / 1e6:.2f}",
-            ", ".join(s["name"] for s in item["surfaces"]),
-            item["sha256"][:12],
-        ]
-        for item in manifest["files"]
+        [f.path, f.format, f.unit, f"{f.bytes / 1e6:.2f}", ", ".join(s["name"] for s in f.surfaces), f.sha256[:12]]
+        for f in rows_of(Listed, manifest["files"])
     ]
     volumes, checks = manifest["volumes_m3"], manifest["checks_m"]
     lines = [

@@ -211,17 +211,10 @@ def table_document(job: Job) -> dict[str, Any]:
     """The whole table as plain values."""
     t = job.performance
     return {
-        "name": t.name,
-        "diameter_m": t.diameter_m,
-        "blades": t.blades,
-        "rotation": "right" if t.sense > 0 else "left",
-        "density_kg_m3": t.rho,
-        "rpm": t.rpm.tolist(),
-        "J": t.J.tolist(),
-        "CT": t.CT.tolist(),
-        "CP": t.CP.tolist(),
-        "J_zero_thrust": t.J_zero.tolist(),
-    }
+        "name": t.name, "diameter_m": t.diameter_m, "blades": t.blades,
+        "rotation": "right" if t.sense > 0 else "left", "density_kg_m3": t.rho, "rpm": t.rpm.tolist(),
+        "J": t.J.tolist(), "CT": t.CT.tolist(), "CP": t.CP.tolist(), "J_zero_thrust": t.J_zero.tolist(),
+    }  # fmt: skip
 
 
 def table_of_document(doc: dict[str, Any], rpm: Array, V: Array) -> tuple[Array, Array]:
@@ -266,14 +259,10 @@ def table_module(job: Job, title: str) -> str:
     values = [
         f"{name} = {doc[key]!r}"
         for name, key in (
-            ("DIAMETER", "diameter_m"),
-            ("DENSITY", "density_kg_m3"),
-            ("RPM", "rpm"),
-            ("J_AXIS", "J"),
-            ("CT", "CT"),
+            ("DIAMETER", "diameter_m"), ("DENSITY", "density_kg_m3"), ("RPM", "rpm"), ("J_AXIS", "J"), ("CT", "CT"),
             ("CP", "CP"),
         )
-    ]
+    ]  # fmt: skip
     head = "\n".join(header(job, title))
     return (
         f'"""{head}"""\n\nimport bisect\nimport math\n\nSENSE = {job.performance.sense}  # +1 right-handed\n'
@@ -338,15 +327,10 @@ def _lost(export: Export, job: Job) -> list[str]:
 def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
     """Manifest entry of one target: what a reader of its files must know, and a hash of each."""
     found: dict[str, Any] = {
-        "target": export.id,
-        "title": export.title,
-        "kind": export.kind,
-        "holds": export.holds,
-        "features": sorted(export.features),
-        "conventions": export.conventions,
-        "rotation": job.rotation,
+        "target": export.id, "title": export.title, "kind": export.kind, "holds": export.holds,
+        "features": sorted(export.features), "conventions": export.conventions, "rotation": job.rotation,
         "source": export.source,
-    }
+    }  # fmt: skip
     found |= export.checked(job, files)
     if export.kind == "loads" and job.rpm is None and job.full_throttle is not None:
         found["full_throttle"] = job.full_throttle

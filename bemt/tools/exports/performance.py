@@ -244,21 +244,10 @@ def performance_of(case: Case, rpm_top: float, slow_too: bool = True) -> Perform
             load[row, down] = load[row, ends[1] + 1]
     scale = air.rho * (rpm[:, None] / 60.0) ** 2 * D**4
     return Performance(
-        name=case.name,
-        rpm=rpm,
-        J=J,
-        thrust_N=T,
-        torque_Nm=Q,
-        CT=T / scale,
-        CP=2.0 * np.pi * Q / (scale * D),
-        J_zero=J_zero,
-        diameter_m=D,
-        rho=float(air.rho),
-        a_sound=float(air.a_sound),
-        mu=float(air.mu),
-        blades=int(case.rotor().B),
-        sense=int(case.rotor().rotation),
-    )
+        name=case.name, rpm=rpm, J=J, thrust_N=T, torque_Nm=Q, CT=T / scale, CP=2.0 * np.pi * Q / (scale * D),
+        J_zero=J_zero, diameter_m=D, rho=float(air.rho), a_sound=float(air.a_sound), mu=float(air.mu),
+        blades=int(case.rotor().B), sense=int(case.rotor().rotation),
+    )  # fmt: skip
 
 
 def _slow(case: Case, ready: Model, rpm_top: float, J: Array, flight: NDArray[np.bool_]) -> Array:
@@ -305,16 +294,11 @@ class StatedBand:
     def document(self) -> dict[str, Any]:
         """For the manifest, uncertainties in per cent."""
         return {
-            "rpm": self.rpm,
-            "airspeed_m_s": list(self.airspeed_m_s),
-            "thrust_N": list(self.thrust_N),
-            "thrust_pct": [100.0 * u for u in self.thrust],
-            "torque_Nm": list(self.torque_Nm),
-            "torque_pct": [100.0 * u for u in self.torque],
-            "level": "one standard uncertainty",
-            "origin": self.origin,
-            "flags": list(self.flags),
-        }
+            "rpm": self.rpm, "airspeed_m_s": list(self.airspeed_m_s), "thrust_N": list(self.thrust_N),
+            "thrust_pct": [100.0 * u for u in self.thrust], "torque_Nm": list(self.torque_Nm),
+            "torque_pct": [100.0 * u for u in self.torque], "level": "one standard uncertainty",
+            "origin": self.origin, "flags": list(self.flags),
+        }  # fmt: skip
 
 
 def band_of(case: Case, rpm: float, airspeed_m_s: tuple[float, float]) -> StatedBand:
@@ -382,15 +366,10 @@ class Loading:
         n, D = self.rpm / 60.0, 2.0 * self.R
         scale = self.rho * n**2 * D**4
         return {
-            "rpm": self.rpm,
-            "airspeed_m_s": self.airspeed_m_s,
-            "J": self.J,
-            "rotor_thrust_N": self.thrust_N,
-            "torque_Nm": self.torque_Nm,
-            "CT": self.thrust_N / scale,
-            "CP": 2.0 * np.pi * self.torque_Nm / (scale * D),
-            "duct_thrust_N": self.duct_thrust_N,
-        }
+            "rpm": self.rpm, "airspeed_m_s": self.airspeed_m_s, "J": self.J, "rotor_thrust_N": self.thrust_N,
+            "torque_Nm": self.torque_Nm, "CT": self.thrust_N / scale,
+            "CP": 2.0 * np.pi * self.torque_Nm / (scale * D), "duct_thrust_N": self.duct_thrust_N,
+        }  # fmt: skip
 
 
 def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
@@ -410,13 +389,10 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     if around:
         raise InputError(
             Fault(
-                case.path.as_posix(),
-                "model.effects_on",
-                ", ".join(around),
-                "effects that have a radial distribution",
-                "Switch them off for a disk",
+                case.path.as_posix(), "model.effects_on", ", ".join(around),
+                "effects that have a radial distribution", "Switch them off for a disk",
             )
-        )
+        )  # fmt: skip
     rotor = prep.rotor
     rad = {k: v[0] for k, v in s.radial.items()}
     W, chord = rad["W"], prep.st[:, K.S_CHORD]
@@ -428,25 +404,7 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     if abs(scale[0] - 1.0) > 1e-9 or abs(scale[1] - 1.0) > 1e-9:  # pragma: no cover - a bug
         raise AssertionError(f"radial loads do not sum to the totals: {scale}")
     return Loading(
-        float(rpm),
-        float(airspeed_m_s),
-        float(air.rho),
-        float(air.mu),
-        float(air.a_sound),
-        rad["r"],
-        prep.stations.dr,
-        chord,
-        prep.st[:, K.S_BETA],
-        dT,
-        dQ,
-        rad["alpha"],
-        Re,
-        M,
-        rotor.R,
-        rotor.Rhub,
-        int(rotor.B),
-        int(rotor.rotation),
-        float(dT.sum()),
-        float(dQ.sum()),
-        float(s.T_duct[0] + s.T_stator[0]),
-    )
+        float(rpm), float(airspeed_m_s), float(air.rho), float(air.mu), float(air.a_sound), rad["r"],
+        prep.stations.dr, chord, prep.st[:, K.S_BETA], dT, dQ, rad["alpha"], Re, M, rotor.R, rotor.Rhub, int(rotor.B),
+        int(rotor.rotation), float(dT.sum()), float(dQ.sum()), float(s.T_duct[0] + s.T_stator[0]),
+    )  # fmt: skip

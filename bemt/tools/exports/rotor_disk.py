@@ -233,17 +233,10 @@ def _mesh(p: Loading) -> str:
     )
     body = "\n".join(
         [
-            "convertToMeters 1;",
-            f"vertices ({' '.join(points)});",
-            "blocks\n(",
-            *(f"    {b}" for b in blocks),
-            ");",
-            "edges\n(",
-            *(f"    {e}" for e in edges),
-            ");",
-            f"boundary\n(\n{patches}\n);",
+            "convertToMeters 1;", f"vertices ({' '.join(points)});", "blocks\n(", *(f"    {b}" for b in blocks), ");",
+            "edges\n(", *(f"    {e}" for e in edges), ");", f"boundary\n(\n{patches}\n);",
         ]
-    )
+    )  # fmt: skip
     return (
         dictionary("blockMeshDict", {}, note="O-grid: square core inside the hub, rings at hub and tip") + body + "\n"
     )
@@ -278,12 +271,10 @@ def _fields(p: Loading, levels: dict[str, float]) -> dict[str, str]:
         U = dict.fromkeys(("inlet", "outlet", "side"), quiet_U)
         P = dict.fromkeys(("inlet", "outlet", "side"), quiet_p)
     kinds = {
-        "U": ("volVectorField", "[0 1 -1 0 0 0 0]"),
-        "p": ("volScalarField", "[0 2 -2 0 0 0 0]"),
-        "k": ("volScalarField", "[0 2 -2 0 0 0 0]"),
-        "omega": ("volScalarField", "[0 0 -1 0 0 0 0]"),
+        "U": ("volVectorField", "[0 1 -1 0 0 0 0]"), "p": ("volScalarField", "[0 2 -2 0 0 0 0]"),
+        "k": ("volScalarField", "[0 2 -2 0 0 0 0]"), "omega": ("volScalarField", "[0 0 -1 0 0 0 0]"),
         "nut": ("volScalarField", "[0 2 -1 0 0 0 0]"),
-    }
+    }  # fmt: skip
     out = {}
     for name, (kind, dims) in kinds.items():
         if name == "U":
@@ -304,20 +295,11 @@ def _control() -> str:
     return dictionary(
         "controlDict",
         {
-            "application": "simpleFoam",
-            "startFrom": "startTime",
-            "startTime": 0,
-            "stopAt": "endTime",
-            "endTime": 400,
-            "deltaT": 1,
-            "writeControl": "timeStep",
-            "writeInterval": 400,
-            "writeFormat": "ascii",
-            "writePrecision": 9,
-            "timeFormat": "general",
-            "runTimeModifiable": False,
+            "application": "simpleFoam", "startFrom": "startTime", "startTime": 0, "stopAt": "endTime",
+            "endTime": 400, "deltaT": 1, "writeControl": "timeStep", "writeInterval": 400, "writeFormat": "ascii",
+            "writePrecision": 9, "timeFormat": "general", "runTimeModifiable": False,
         },
-    )
+    )  # fmt: skip
 
 
 def _schemes() -> str:
@@ -328,18 +310,15 @@ def _schemes() -> str:
             "ddtSchemes": {"default": "steadyState"},
             "gradSchemes": {"default": "Gauss linear", "limited": "cellLimited Gauss linear 1"},
             "divSchemes": {
-                "default": "none",
-                "div(phi,U)": "bounded Gauss linearUpwind limited",
-                "div(phi,k)": upwind,
-                "div(phi,omega)": upwind,
-                "div((nuEff*dev2(T(grad(U)))))": "Gauss linear",
+                "default": "none", "div(phi,U)": "bounded Gauss linearUpwind limited", "div(phi,k)": upwind,
+                "div(phi,omega)": upwind, "div((nuEff*dev2(T(grad(U)))))": "Gauss linear",
             },
             "laplacianSchemes": {"default": "Gauss linear corrected"},
             "interpolationSchemes": {"default": "linear"},
             "snGradSchemes": {"default": "corrected"},
             "wallDist": {"method": "meshWave"},
         },
-    )
+    )  # fmt: skip
 
 
 def _solution() -> str:

@@ -111,18 +111,13 @@ class TableExport(LoadsExport):
         t, name = job.performance, plain_name(job.case.name)
         rows = [
             {
-                "rpm": t.rpm[i],
-                "airspeed_m_s": t.J[j] * t.rpm[i] / 60.0 * t.diameter_m,
-                "J": t.J[j],
-                "CT": t.CT[i, j],
-                "CP": t.CP[i, j],
-                "thrust_N": t.thrust_N[i, j],
-                "torque_Nm": t.torque_Nm[i, j],
+                "rpm": t.rpm[i], "airspeed_m_s": t.J[j] * t.rpm[i] / 60.0 * t.diameter_m, "J": t.J[j],
+                "CT": t.CT[i, j], "CP": t.CP[i, j], "thrust_N": t.thrust_N[i, j], "torque_Nm": t.torque_Nm[i, j],
                 "density_kg_m3": t.rho,
             }
             for i in range(t.rpm.size)
             for j in range(t.J.size)
-        ]
+        ]  # fmt: skip
         hub = _hub_rows(job)
         return {
             f"{name}.csv": csv_text(list(rows[0]), rows),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from bemt.base.action import Told, action, in_words
-from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
+from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, gathered, refuse
 
 if TYPE_CHECKING:
     from bemt.base.errors import Fault
@@ -116,18 +116,11 @@ def layouts() -> dict[str, str]:
     common=("healthy", "mass_kg", "case", "layout", "picture", "out_csv", "healthy_day"),
 )  # fmt: skip
 def fly(
-    logs: StrPath | Sequence[StrPath],
-    *,
-    case: StrPath | None = None,
-    mass_kg: float | None = None,
-    layout: str = "",
-    healthy: Sequence[StrPath | Sequence[StrPath]] = (),
-    healthy_day: Literal["same", "other", ""] = "",
-    healthy_mass_kg: float | None = None,
-    out_case: StrPath | None = None,
-    picture: StrPath | None = None,
+    logs: StrPath | Sequence[StrPath], *, case: StrPath | None = None, mass_kg: float | None = None, layout: str = "",
+    healthy: Sequence[StrPath | Sequence[StrPath]] = (), healthy_day: Literal["same", "other", ""] = "",
+    healthy_mass_kg: float | None = None, out_case: StrPath | None = None, picture: StrPath | None = None,
     out_csv: StrPath | None = None,
-) -> FlightsAnswer | Told:
+) -> FlightsAnswer | Told:  # fmt: skip
     """Identify the rotors of flight logs, and compare each with healthy flights.
 
     Parameters
@@ -178,8 +171,7 @@ def fly(
         faults.append(Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg"))
     if out_case is not None and case is None:
         faults.append(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     folder = any(Path(p).is_dir() for p in given)
     mine = [f for p in given for f in _files(p)]
     calm = _grouped(healthy)
@@ -240,16 +232,13 @@ def _grouped(healthy: Sequence[StrPath | Sequence[StrPath]]) -> list[tuple[str, 
 
 def _read(paths: Sequence[str] | dict[str, None]) -> tuple[dict[str, FlightLog], list[Fault]]:
     """Logs by their path, and what is wrong with the others."""
-    from bemt.base.errors import InputError
     from bemt.tools.flight.read import read_log
 
     found: dict[str, FlightLog] = {}
     faults: list[Fault] = []
     for path in paths:
-        try:
+        with gathered(faults):
             found[path] = read_log(path)
-        except InputError as error:
-            faults += error.faults
     return found, faults
 
 
@@ -257,9 +246,9 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
     """Write the case with the rotor as the flights show it; gives what to print, and whether it could be solved."""
     import shlex
 
-    from bemt.judge.diagnose.rotor_calibration import document, text, write
+    from bemt.judge.diagnose.rotor_calibration import lines_of, write
     from bemt.rotors.case.load import with_changes
-    from bemt.tools.flight.rotor_case import learn_from_flights
+    from bemt.tools.flight.identify import learn_from_flights
 
     files = [a.log.file for a in answers]
     from bemt.rotors.propeller import rotor_of
@@ -271,9 +260,8 @@ def _learn(answers: Sequence[FlightAnswer], label: str, folder: str, mass_kg: fl
     found = learn_from_flights(case, files, [a.found for a in answers])
     written = write(case, found, files, folder, "fly", "--out-case")
     place = shlex.quote(Path(folder).as_posix())
-    said = document(case, found, files) | {"recommended_airspeed_m_s": None}  # a stand's advice
     lines = [
-        text(said),
+        *lines_of(case, found, files, advice=False),  # that is for a stand
         "These flights show the rotor at hover alone; for torque and fast flight add a stand or tunnel run.",
         f"{place}: {', '.join(written)}",
         f"next: bemt sweep {place}",

@@ -10,24 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
 from bemt.tools.flight.balance import axes_of, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
-from bemt.tools.flight.inflow import Inflow, inflow
 from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
-from bemt.tools.flight.layout import layout_of
+from bemt.tools.flight.layout import layout_of, mass_faults
 from bemt.tools.flight.log import FlightLog
-from bemt.tools.flight.mass import mass_faults
-from bemt.tools.flight.motor_speed import speed_changes
-from bemt.tools.flight.repeat import flight_scatter
-from bemt.tools.flight.sessions import Sessions, sessions
-from bemt.tools.flight.simulator import simulator_constants
-from bemt.tools.flight.speed_sensor import checked
-from bemt.tools.flight.thrust_curve import thrust_curve
+from bemt.tools.flight.repeat import Sessions, flight_scatter, sessions
+from bemt.tools.flight.speed_sensor import checked, speed_changes
+from bemt.tools.flight.thrust_curve import Inflow, inflow, simulator_constants, thrust_curve
 from bemt.tools.flight.vibration import Vibration, shaken, vibration
 from bemt.tools.flight.wind import Wind, wind
 
@@ -69,7 +64,7 @@ class FlightAnswer:
     # At the frequencies of the rotors
     vibration: Vibration = field(default_factory=lambda: Vibration(float("nan"), float("nan")))
     shaken: tuple[tuple[int, float, bool], ...] = ()  # As :func:`bemt.tools.flight.vibration.shaken` gives it
-    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.motor_speed.speed_changes` gives it
+    speeds: tuple[tuple[int, float], ...] = ()  # As :func:`bemt.tools.flight.speed_sensor.speed_changes` gives it
     inflow: Inflow | None = None  # Thrust over the flow
     mass: Constant | None = None  # Mass from healthy flights of known mass [kg]
     predicted: Predicted | None = None  # The case in this flight
@@ -143,18 +138,13 @@ class FlightAnswer:
 
 
 def answer_on(
-    log: FlightLog,
-    healthy: Sequence[FlightLog] = (),
-    mass_kg: float | None = None,
-    layout: str = "",
-    healthy_mass_kg: float | None = None,
-    stated_days: Sequence[str] = (),
-    day: str = "",
-) -> FlightAnswer:
+    log: FlightLog, healthy: Sequence[FlightLog] = (), mass_kg: float | None = None, layout: str = "",
+    healthy_mass_kg: float | None = None, stated_days: Sequence[str] = (), day: str = "",
+) -> FlightAnswer:  # fmt: skip
     """Identify and judge one flight, with healthy flights of the same vehicle.
 
     Masses include the battery [kg]; that of the healthy flights gives the mass of this one where it is not stated.
-    `stated_days` and `day` are as :func:`bemt.tools.flight.sessions.sessions` takes them. InputError when logs have
+    `stated_days` and `day` are as :func:`bemt.tools.flight.repeat.sessions` takes them. InputError when logs have
     another number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
     mass cannot have flown.
     """
@@ -165,8 +155,7 @@ def answer_on(
     faults = mass_faults(log, mass_kg, "--mass-kg")
     for h in healthy:
         faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     if layout:
         log = replace(log, layout=layout)
     log, healthy = checked(log), [checked(replace(h, layout=layout or h.layout)) for h in healthy]

@@ -12,7 +12,7 @@ and ISBD messages.
 from __future__ import annotations
 
 import mmap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -215,37 +215,20 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     hover = whole("MOT_THST_HOVER", 0.0)
     if thrust is not None and thrust[1].size and not np.nanmax(thrust[1]) > _IDLE * hover:
         thrust = thrust[0], 0.0 * thrust[1]
-    esc = found.get("ESC", {})
-    speeds, currents = None, None
-    if "Instance" in esc:
-        there = [int(i) for i in np.unique(esc["Instance"])]
-        own = [n - 1 for n in channels] if {n - 1 for n in channels} <= set(there) else there
-        if len(own) == len(channels) or not channels:
-            speeds, currents = (
-                _together([take("ESC", (key,), esc["Instance"] == i) for i in own]) for key in ("RPM", "Curr")
-            )
-    if speeds is not None and not np.any(speeds[1]):
-        speeds = None
+    speeds, currents = _of_escs(found.get("ESC", {}), channels, take)
     att, battery = take("ATT", ("Roll", "Pitch", "Yaw")), take("BAT", ("Volt", "Curr"))
     axis = (att[0], _thrust_axis(np.radians(att[1]))) if att else None
     state = "XKF1" if "XKF1" in found else "NKF1"
     acceleration = flipped(take("IMU", _IMU[3:]))
     sources = {
-        "command": command,
-        "rpm": speeds,
-        "current": currents,
-        "acceleration": acceleration,
-        "rates": flipped(take("IMU", _IMU[:3])),
-        "upright": (axis[0], axis[1][:, 2]) if axis else None,
-        "axis": axis,
-        "velocity": flipped(take(state, ("VN", "VE", "VD"))),
-        "position": flipped(take(state, ("PN", "PE", "PD"))),
+        "command": command, "rpm": speeds, "current": currents, "acceleration": acceleration,
+        "rates": flipped(take("IMU", _IMU[:3])), "upright": (axis[0], axis[1][:, 2]) if axis else None, "axis": axis,
+        "velocity": flipped(take(state, ("VN", "VE", "VD"))), "position": flipped(take(state, ("PN", "PE", "PD"))),
         "voltage": (battery[0], battery[1][:, 0]) if battery else None,
         "battery_current": (battery[0], battery[1][:, 1]) if battery else None,
         "thrust": (thrust[0], thrust[1][:, 0]) if thrust else None,
-        "torque": (rate[0], rate[1][:, :3]) if rate else None,
-        "vibe": take("VIBE", ("VibeX", "VibeY", "VibeZ")),
-    }
+        "torque": (rate[0], rate[1][:, :3]) if rate else None, "vibe": take("VIBE", ("VibeX", "VibeY", "VibeZ")),
+    }  # fmt: skip
     B = len(channels)
     layout = layout if layout and len(LAYOUTS[layout].split()) == B else ""
     main = "command" if command else "rpm" if speeds else "acceleration" if acceleration else "vibe"
@@ -254,6 +237,20 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
     kept = {k: params[k] for k in curve if np.isfinite(params.get(k, np.nan))}
     return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends, mixed=said, date=_date(found),
                   parameters=kept, stated_rotors=stated)  # fmt: skip
+
+
+def _of_escs(
+    esc: Mapping[str, NDArray[Any]], channels: list[int], take: Callable[..., Source | None]
+) -> tuple[Source | None, Source | None]:
+    """Speeds and currents of the motors on these channels."""
+    if "Instance" not in esc:
+        return None, None
+    there = [int(i) for i in np.unique(esc["Instance"])]
+    own = [n - 1 for n in channels] if {n - 1 for n in channels} <= set(there) else there
+    if channels and len(own) != len(channels):
+        return None, None
+    speeds, currents = (_together([take("ESC", (key,), esc["Instance"] == i) for i in own]) for key in ("RPM", "Curr"))
+    return speeds if speeds is not None and np.any(speeds[1]) else None, currents
 
 
 def _date(found: Mapping[str, Mapping[str, NDArray[Any]]]) -> str:

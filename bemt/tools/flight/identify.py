@@ -2,21 +2,29 @@
 
 Over a flight that begins and ends at rest, the mean upward force is the weight plus m dVz/dt:
 k = m (g + dVz/dt) / mean(sum n_i^2 cos(tilt)). No accelerometer scale enters.
-Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.batches`).
+Bands are from ten pieces of the flight (:mod:`bemt.tools.flight.repeat`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
+from bemt.base.errors import Fault, refuse
 from bemt.base.units import G0
-from bemt.tools.flight.batches import BATCHES, half_width, jackknifed
+from bemt.judge.diagnose.rotor_calibration import learn
+from bemt.rotors.model import air_fields, air_of_points
 from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.repeat import BATCHES, flight_scatter, half_width, jackknifed
+
+if TYPE_CHECKING:
+    from bemt.rotors.as_measured import AsMeasured
+    from bemt.rotors.case import Case
 
 _APART = 0.1  # a rotor's own constant is given when its half width is below this share [1]
 
@@ -186,3 +194,35 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
             out["battery resistance"] = Constant(float(-line[0]), float(half[0]), "ohm")
             return
     unseen.append("battery resistance: log the current, and change thrust in steps")
+
+
+# The rotor of a flight as a case: its thrust constant is a reference run at hover.
+AIR = 0.03
+"""Uncertainty of the density, which logs do not hold, against that of the case: 8 K or 300 m of altitude [1]."""
+
+
+def learn_from_flights(case: Case, files: Sequence[str], flights: Sequence[Identified]) -> AsMeasured:
+    """Condition the rotor of a case on hovering flights, one point a flight, by the names of their logs.
+
+    Thrust is that of the rotor where it sits: body in its wash and neighbours included. Flights differ by what
+    :func:`bemt.tools.flight.repeat.flight_scatter` says; all share the uncertainty of the density. InputError when a
+    flight has no thrust constant in N/rpm^2, or one that is not of this propeller.
+    """
+    faults, k, own, rpm = [], [], [], []
+    for file, flight in zip(files, flights, strict=True):
+        c = flight.constants.get("thrust constant")
+        if c is None or c.unit != "N/rpm^2":
+            got = "no speeds of the rotors" if c is None else "no mass"
+            faults.append(Fault(file, "", f"{got}, so no thrust", "a flight with rotor speeds, and --mass-kg"))
+            continue
+        k.append(c.value)
+        own.append(c.half / c.value / 2.0)
+        rpm.append(float(np.mean(flight.rotors["mean rpm"])))
+    refuse(faults)
+    air = {name: np.broadcast_to(v, len(k)) for name, v in air_fields(case.air()).items()}
+    CT = 3600.0 * np.array(k) / (air["rho"] * case.diameter_m**4)
+    sd, _ = flight_scatter(k)
+    u = CT * np.hypot(own, sd)
+    unseen = np.full(CT.shape, np.nan)
+    still = np.zeros(CT.shape)
+    return learn(case, files, [CT, unseen], [u, still], np.array(rpm), still, air_of_points(air), (AIR, AIR))

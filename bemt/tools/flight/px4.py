@@ -140,20 +140,13 @@ def _made(name: str, found: Any) -> FlightLog:
     gyro = take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)])
     volt, amp = take("battery_status", ["voltage_v"]), take("battery_status", ["current_a"])
     sources: dict[str, Source | None] = {
-        "command": command,
-        "rpm": speeds,
-        "current": currents,
+        "command": command, "rpm": speeds, "current": currents,
         "acceleration": (acc[0], acc[1] * _FLIP) if acc else None,
-        "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None,
-        "upright": (axis[0], axis[1][:, 2]) if axis else None,
-        "axis": axis,
-        "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
-        "position": (xyz[0], xyz[1] * _FLIP) if xyz else None,
-        "voltage": (volt[0], volt[1][:, 0]) if volt else None,
-        "battery_current": (amp[0], amp[1][:, 0]) if amp else None,
-        "thrust": thrust,
-        "torque": torque,
-    }
+        "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None, "upright": (axis[0], axis[1][:, 2]) if axis else None,
+        "axis": axis, "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
+        "position": (xyz[0], xyz[1] * _FLIP) if xyz else None, "voltage": (volt[0], volt[1][:, 0]) if volt else None,
+        "battery_current": (amp[0], amp[1][:, 0]) if amp else None, "thrust": thrust, "torque": torque,
+    }  # fmt: skip
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
     layout = _layout(params, B)

@@ -129,14 +129,9 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
         if v.shape[1:] != wide.get(key, v.shape[1:]) or (key == "pwm" and v.ndim != 2):
             raise InputError(Fault(name, key, f"arrays of {v.shape[1:]}", "vectors of three, R of 3 x 3, pwm of a row"))
     sources = {
-        "command": got["pwm"],
-        "rates": got.get("w"),
-        "upright": (time, got["R"][1][:, 2, 2]),
-        "axis": (time, got["R"][1][:, :, 2]),
-        "velocity": got["v"],
-        "position": got.get("p"),
-        "force": got.get("fa"),
-    }
+        "command": got["pwm"], "rates": got.get("w"), "upright": (time, got["R"][1][:, 2, 2]),
+        "axis": (time, got["R"][1][:, :, 2]), "velocity": got["v"], "position": got.get("p"), "force": got.get("fa"),
+    }  # fmt: skip
     return joined(name, "CSV of arrays", sources, "command", command_unit="pwm", ends=ends)
 
 

@@ -282,12 +282,9 @@ def headline(j: FlightVerdict) -> str:
     if said.beside:
         return f"Cause found: {said.effects[0]}{size}; possibly also {' or '.join(said.effects[1:])}"
     words = {
-        "none": "No cause found",
-        "named": f"Cause found: {' and '.join(said.effects)}{size}",
-        "class": f"One of these: {_open(said)}{size}",
-        "unknown": "Something unlisted",
-        "insufficient": "Cannot tell",
-    }
+        "none": "No cause found", "named": f"Cause found: {' and '.join(said.effects)}{size}",
+        "class": f"One of these: {_open(said)}{size}", "unknown": "Something unlisted", "insufficient": "Cannot tell",
+    }  # fmt: skip
     return words[said.verdict]
 
 

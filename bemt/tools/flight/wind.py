@@ -32,8 +32,8 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.units import G0
-from bemt.tools.flight.batches import BATCHES, jackknifed, u_of_mean
 from bemt.tools.flight.log import FlightLog
+from bemt.tools.flight.repeat import BATCHES, jackknifed, u_of_mean
 
 _SMOOTH_S = 0.2
 _SHARE, _FACTOR = 0.066, 0.45  # r [s/m] and the standard deviation of its logarithm

@@ -97,7 +97,7 @@ def stand(
     import shutil
     from pathlib import Path as File
 
-    from bemt.base.errors import Fault, InputError
+    from bemt.base.errors import Fault, refuse
     from bemt.base.given import path_text
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.stand.session import sit
@@ -113,8 +113,7 @@ def stand(
         faults.append(Fault("", "wind_m_s", f"{wind_m_s:g}", "0 m/s or more"))
     if folder.exists() and any(folder.iterdir()):
         faults.append(Fault(folder.as_posix(), "", "a folder with files", "a new folder"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     given = {"largest_us": largest_us, "ramp_us_s": ramp_us_s, "current_A": current_A, "pressure_hPa": pressure_hPa,
              "vibration_m_s2": vibration_m_s2, "temperature_C": temperature_C}  # fmt: skip
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import secrets
 import sys
@@ -13,16 +14,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bemt.base.canvas import CYCLE, GREY, STYLE, blank, frame, png
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
+from bemt.base.page import render
 from bemt.base.tables import json_text, write_atomic
 from bemt.judge.actions import plan
-from bemt.judge.diagnose.improve import beside
+from bemt.judge.diagnose.folder import beside
 from bemt.judge.diagnose.suggest import minutes
 from bemt.judge.proof import prove
 from bemt.judge.proof.loop import A_RUN, Course, Points, follow
 from bemt.physics import effects
 from bemt.rotors.case import load_case
-from bemt.tools.stand import sealed, story
+from bemt.tools.stand import sealed
 from bemt.tools.stand.guard import Limits
 from bemt.tools.stand.hand import Person, Rows, Simulated, Wired, lapsed, wire_of_the_simulated
 from bemt.tools.stand.verbs import Stand, Stopped
@@ -240,7 +243,7 @@ def sit(
     if there is not None:
         tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
-    files = story.write(out, rotor, answer.course, made, lines)
+    files = write_story(out, rotor, answer.course, made, lines)
     return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(lines))
 
 
@@ -272,3 +275,60 @@ def _limits(
         got = f"{limits.largest_us:g} us, {limits.ramp_us_s:g} us/s"
         raise InputError(Fault("", "largest_us, ramp_us_s", got, "1000 to 2500 us and a rise above 0"))
     return lapsed(limits, lapse)
+
+
+# The story of a sitting: what was run, what was said after each run, and what was decided; HTML and a picture.
+_MOST = 5  # Explanations in a picture
+_KINDS = {"again": "recording", "run": "run", "reference": "reference"}
+
+
+def write_story(
+    out: Path, rotor: Propeller, course: Course, made: Sequence[tuple[str, str]], lines: Sequence[str]
+) -> tuple[Path, ...]:  # fmt: skip
+    """Write story.html and story.png."""
+    if not made:
+        return ()
+    picture = out / "story.png"
+    write_atomic(picture, png(drawn(rotor, course, made)))
+    told = [tuple(line.partition(": ")[::2]) for line in lines]
+    image = base64.b64encode(picture.read_bytes()).decode()
+    page = render("bemt.tools.stand", "story.html", title=f"{rotor.name} on the stand", lines=told, image=image)
+    write_atomic(out / "story.html", page)
+    return out / "story.html", picture
+
+
+def drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
+    """Loads over those of the model, run by run, beside the probabilities after each answer."""
+    import matplotlib
+
+    made = made[:4]
+    with matplotlib.rc_context(STYLE):
+        return _drawn(rotor, course, made)
+
+
+def _drawn(rotor: Propeller, course: Course, made: Sequence[tuple[str, str]]) -> Any:
+    figure, axes = blank(3.0, 1, 3)
+    for k, (kind, text) in enumerate(made):
+        rows = np.genfromtxt(text.splitlines(), delimiter=",", names=True)
+        points = rotor.solve(rpm=rows["rpm"], airspeed_m_s=rows["airspeed_m_s"], bands=False)
+        for ax, name in zip(axes[0], ("thrust_N", "torque_Nm"), strict=False):
+            share = 100.0 * (rows[name] / np.asarray(getattr(points, name)) - 1.0)
+            u = 100.0 * rows[f"u_{name}"] / np.asarray(getattr(points, name))
+            ax.errorbar(rows["rpm"], share, u, fmt="o", ms=3, lw=0.8, color=CYCLE[k], label=f"{k + 1} {_KINDS[kind]}")
+    for ax, what in zip(axes[0], ("thrust", "torque"), strict=False):
+        ax.axhline(0.0, color=GREY, lw=0.8)
+        ax.set(xlabel="speed [rev/min]", title=f"{what} off the model [%]")
+        frame(ax)
+    axes[0, 0].legend()
+    ax = axes[0, 2]
+    said = [{r.effect or "nothing": r.probability for r in a.ranking} for a in course.answers]
+    names = list(dict.fromkeys(n for one in said for n in sorted(one, key=lambda n: -one[n])[:3]))[:_MOST]
+    for k, one in enumerate(said):
+        at = np.arange(len(names)) + 0.8 * (k + 0.5) / len(said) - 0.4
+        share = [one.get(n, 0.0) for n in names]
+        ax.barh(at, share, 0.7 / len(said), color=CYCLE[k % len(CYCLE)], label=f"answer {k + 1}")
+    ax.set(yticks=np.arange(len(names)), yticklabels=names, xlim=(0.0, 1.0), title="probability")
+    ax.invert_yaxis()
+    ax.legend()
+    frame(ax)
+    return figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from bemt.base.errors import Fault, InputError
+from bemt.base.errors import Fault, refuse
 
 DOMAINS = ("free", "pipe")
 SECTORS = ("half", "blade", "full")
@@ -124,8 +124,7 @@ class Settings:
         if self.plate_z is not None:
             lowest = min([self.rotor.low, *(b.low for b in (self.duct, self.body) if b is not None)])
             check(self.plate_z < lowest, "plate", f"z = {self.plate_z:g} m", f"behind all else, below {lowest:g} m")
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
 
     @property
     def sectors(self) -> int:

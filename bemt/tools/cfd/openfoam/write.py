@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from bemt.base.errors import Fault, InputError, needs
+from bemt.base.errors import Fault, InputError, needs, refuse
 from bemt.base.foam_text import dictionary, vector
 from bemt.base.tables import write_atomic
 from bemt.base.toml import check_field, entry
@@ -296,8 +296,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     """Work out the settings of a run."""
     file = case.path.as_posix()
     faults = check_run(run, file=file)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     rotor, whole, air = case.rotor(), case.duct(), case.air()
     rpm = case.rpm if run.rpm is None else run.rpm
     V = case.airspeed_m_s if run.airspeed_m_s is None else run.airspeed_m_s

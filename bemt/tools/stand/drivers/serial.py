@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import time
 
-from bemt.base.errors import Fault, InputError, needs
+from bemt.base.errors import Fault, InputError, needs, refuse
 from bemt.base.units import UNITS
 from bemt.tools.stand.drivers import parts, silent
 
@@ -45,8 +45,7 @@ def read_format(line: str) -> tuple[str, re.Pattern[str], list[tuple[str, float]
     missing = [c for c in ("thrust_N", "rpm") if c not in dict(channels)]
     if missing and not faults:
         faults.append(Fault("", "line", f"no {', no '.join(missing)}", "speed and thrust among the channels"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     pattern = re.sub(r"\\\{\w+\\\}", r"\\s*([-+.\\deE]+|nan|NaN)\\s*", re.escape(back))
     return out, re.compile(pattern), channels
 
