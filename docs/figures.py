@@ -221,6 +221,8 @@ FIGURES = (
     Figure(BELIEVE, "In flight it is # to # % low", CALIBRATION, _k1k2_low),
     Figure(BELIEVE, "on the ducted fan it gives # N for # N", FAN, lambda d: [_fan(d)["k1k2"], _fan(d)["cfd"]]),
     Figure(BELIEVE, "With this version # of # claims are right", PROOF, _now),
+    Figure(BELIEVE, "in one run, and # of # recordings without a cause were given one", PROOF,
+           lambda t: [float(v) for v in re.findall(r"claims on recordings without a cause (\d+) of (\d+)", t)[0]]),
     Figure(BELIEVE, "two runs of # items", "reports/proof/proof.json", lambda d: [d["items"]]),
     Figure(BELIEVE, "# of # claims were right: # %, 95 % interval # to # %", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1], *wilson(*claims(t)[:2])]),
