@@ -126,7 +126,8 @@ def import_(
         seen = [wrote] if wrote else [*runs, *rest]
         sentence, found["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
-    return Told(found, "\n".join([*lines, load.text(found, wrote)]), exit_code=load.exit_code(found))
+    text = "\n".join([*lines, load.text(found, wrote)])
+    return Told(found, text, exit_code=load.exit_code(found), complaints=load.complaints(found))
 
 
 def words(given: Mapping[str, str]) -> list[str]:

@@ -34,6 +34,7 @@ from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputErr
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
@@ -46,14 +47,15 @@ from bemt.data.recordings.adapt import (
     reduction_document,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.cfd_study import merged, of_table
 from bemt.data.recordings.choice import Choice, averaged
 from bemt.data.recordings.reduce import reduction
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 
-__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "document", "exit_code", "import_file", "text"]
+__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "complaints", "document", "exit_code", "import_file", "text"]
 
 SCHEMA = "bemt.import/1"
 INTERNAL = "internal error of this program"
@@ -195,6 +197,11 @@ def document(
             records[name] = import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
+    exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
+    if exports and all(exports.values()) and not runs:
+        for name, what in exports.items():
+            errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
+        to_do = None
     told = {r["name"] for r in runs}
     runs += [cfd_run.document(d) for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told]
     notes = _restart_notes(names, records)
@@ -322,11 +329,13 @@ def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
     return {"unit": unit, "mean": mean, "averaged_over": over, "drift": found.drift if found is not None else None}
 
 
+def complaints(found: Mapping[str, Any]) -> tuple[str, ...]:
+    """What could not be read and why, for the error stream."""
+    nothing = () if found["files"] or not found["to_do"] else (str(found["to_do"]),)
+    return (*(str(file["error"]) for file in found["files"] if file["error"] is not None), *nothing)
+
+
 def _file_text(file: Mapping[str, Any]) -> str:
-    if file["error"] is not None:
-        if not os.path.exists(file["path"]):
-            return str(file["error"])
-        return f"{file['path']}: refused\n  " + str(file["error"]).replace("\n", "\n  ")
     lines = [f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"]
     rows, plain = [], []
     for name, channel in file["channels"].items():
@@ -352,17 +361,17 @@ def _file_text(file: Mapping[str, Any]) -> str:
 
 
 def text(found: Mapping[str, Any], wrote: str = "") -> str:
-    """Lay a document out for a terminal, with what to do next with recordings of a rotor."""
+    """Lay a document out for a terminal, with what to do next with recordings of a rotor; refusals: `complaints`."""
     own = {name for run in found["runs"] for name in run["files"]}
     lines = [
         f"{file['path']}: {file['format']} ({file['kind']}), {file['rows']} rows"
         if file["path"] in own
         else _file_text(file) + "\n"
         for file in found["files"]
-        if file["format"] != RUN or file["error"]
+        if file["format"] != RUN and file["error"] is None
     ]
     lines += [cfd_run.run_text(run) + "\n" for run in found["runs"]]
-    if found["to_do"]:
+    if found["to_do"] and found["files"]:
         steps = "\n".join(f"  ! {line}" for line in found["to_do"].splitlines())
         lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
     if wrote or found["runs"]:
@@ -387,8 +396,8 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
 
 
 def exit_code(found: Mapping[str, Any]) -> int:
-    """Give the worst of all files: 3 when a reader failed, 2 when a file was refused, else 0."""
-    told = [str(file["error"]) for file in found["files"] if file["error"] is not None]
+    """Give the worst of all files: 3 when a reader failed, 2 when a file was refused or nothing was read, else 0."""
+    told = complaints(found)
     return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
 
