@@ -551,6 +551,31 @@ def test_one_point_stands_beside_bemt_on_one_screen(
     assert not {"verdict", "effects"} & found.keys()
 
 
+@pytest.mark.parametrize(
+    ("torque", "sign", "words"), [("Nmm", "1", "factor of 1000"), ("N m", "-1", "signs are opposite"), ("N m", "1", "")]
+)
+def test_what_is_a_unit_or_a_sign_is_no_physics(
+    torque: str, sign: str, words: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [put("T.out", rfile("thrust", steady(13.0), None)), put("Q.out", rfile("torque", steady(0.205), None))]
+    told = ["--rpm", "10000", "--unit", "thrust=N", f"torque={torque}", "--sign", f"torque={sign}"]
+    assert main(["import", *map(str, files), *told, "--out", "run.toml"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "run.toml", "--case", "10x5"]) == 0
+    head = capsys.readouterr().out.splitlines()[0]
+    assert words in head and ("agree" in head) == (not words)
+
+
+def test_a_bench_is_no_cfd_and_has_the_u_of_a_stand(put: Callable[..., Path]) -> None:
+    from bemt.judge.compare import one_run
+
+    file = put("bench.csv", "rpm,thrust_gf\n6000,500\n7000,690\n")
+    found = one_run.compare_run(str(file), "10x5")
+    for point in found["points"]:
+        assert point["loads"]["thrust_N"]["u_cfd"] == pytest.approx(0.05 * point["loads"]["thrust_N"]["cfd"])
+    assert "CFD" not in one_run.text(found) and any("u of the recording: not stated" in n for n in found["notes"])
+
+
 def test_diagnose_takes_exports_with_what_they_do_not_say(
     put: Callable[..., Path], project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

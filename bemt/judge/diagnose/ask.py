@@ -191,7 +191,8 @@ def diagnosed(
             raise
         # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
-        found = one_run.compare_run(seen, cases[0], progress) | {"verdict": "insufficient", "effects": []}
+        called = given[0] if given and isinstance(given[0], str) else ""
+        found = one_run.compare_run(seen, cases[0], progress, called) | {"verdict": "insufficient", "effects": []}
         return OnePoint(found, f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}")
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
     names = [one if isinstance(one, str) else "recording" for one in files]
