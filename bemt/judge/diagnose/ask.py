@@ -25,9 +25,12 @@ from bemt.judge.diagnose.along_blade import along as along_blade
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.chain import diagnose
 from bemt.judge.diagnose.document import document, text
+from bemt.judge.diagnose.figures_recording import first_picture
 from bemt.judge.diagnose.load import cases_of, load_all
+from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.suggest import Given
-from bemt.rotors.case import case_of
+from bemt.judge.loss import CLAIMS
+from bemt.rotors.case import Case, case_of
 from bemt.rotors.case.words import sorted_out
 from bemt.rotors.propeller import Propeller, rotor_of
 
@@ -79,6 +82,7 @@ class Answer:
     propeller: Propeller
     document: dict[str, Any]
     blade: dict[str, AlongBlade]
+    beside: str = ""  # That all readings lie inside the band of the case, where they do and no cause is claimed
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
@@ -101,12 +105,12 @@ class Answer:
     @property
     def text(self) -> str:
         """The answer as text, as on the command line."""
-        return "\n\n".join([text(self.diagnosis), *(c.text() for c in self.blade.values())])
+        return "\n\n".join([text(self.diagnosis, lead=self.beside), *(c.text() for c in self.blade.values())])
 
     @property
     def details(self) -> str:
         """All sentences, and the tables behind them."""
-        return "\n\n".join([text(self.diagnosis, details=True), *(c.text() for c in self.blade.values())])
+        return "\n\n".join([text(self.diagnosis, True, self.beside), *(c.text() for c in self.blade.values())])
 
     @property
     def improved(self) -> Propeller | None:
@@ -201,7 +205,20 @@ def diagnosed(
         told["along_blade"] = {run: c.document() for run, c in blade.items()}
     if target is not None:
         folder.write(target, answer, told, cases, figures=figures)
-    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
+    beside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
+    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, beside)
+
+
+def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
+    """That every reading lies inside the band of its case; "" where one does not, or there are several cases."""
+    own = [r for r in records if not r.reference]
+    (view, *more) = first_picture(own, cases)
+    counts = [view.inside(c)[:2] for c in view.channels]
+    return (
+        view.sentence.partition(";")[0].rstrip(".") + "."
+        if not more and all(n == total for n, total in counts) and any(t for _, t in counts)
+        else ""
+    )
 
 
 def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:

@@ -81,7 +81,7 @@ def load(
     if is_run(imported):
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
-        return replace(made, notes=(*made.notes, *imported.notes))
+        return replace(made, notes=(*made.notes, *imported.notes), computed=True)
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
@@ -108,7 +108,7 @@ def load(
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
-    return replace(made, findings=found, contradictions=broken, notes=notes)
+    return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd")
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:
