@@ -72,7 +72,7 @@ def sniff(head: bytes | str) -> bool:
         return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(_numeric(c) for c in cells) for cells in split[1:])
-    return alike >= 0.8 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
+    return alike >= 0.5 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
 
 
 def _numeric(cell: str) -> bool:
@@ -133,12 +133,17 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     return build.finish()
 
 
+_DRIVE = {"V": "voltage (V)", "A": "current (A)", "W": "power (W)"}
+
+
 def heads_of(table: SplitTable | NumberTable) -> list[Heading]:
     """What the headings of all columns say, beside one another."""
     heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
     heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
     if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
         heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    if {"V", "A"} <= {head.text.upper() for head in heads}:  # the units of what a drive takes
+        heads = [replace(heading(_DRIVE.get(h.text.upper(), h.text)), text=h.text) if h.text else h for h in heads]
     return _apart(heads)
 
 

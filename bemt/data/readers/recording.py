@@ -35,7 +35,16 @@ from bemt.data.readers.headings import (
     surely_shaft_speed,
 )
 from bemt.data.readers.samples import Channel, clock_seconds, dataset, spikes
-from bemt.data.readers.split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
+from bemt.data.readers.split import (
+    MOST_ODD,
+    MOST_ODD_OF_UNIT,
+    SHEET_ERRORS,
+    SplitTable,
+    column_numbers,
+    some,
+    split_table,
+    with_unit,
+)
 from bemt.physics.dataset import Dataset
 
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
@@ -169,7 +178,8 @@ class Builder:
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
-        if len(bad) > MOST_ODD * (len(values) - empty):
+        known = head.unit is not None and head.unit_name not in ("", "-")
+        if len(bad) > (MOST_ODD_OF_UNIT if known else MOST_ODD) * (len(values) - empty):
             return self._add_text(index, head, label, bad, len(values) - empty)
         name = self.free(head.name)
         if bad:

@@ -387,6 +387,8 @@ def text(found: Mapping[str, Any], wrote: str = "") -> str:
         step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
         return "\n".join([*lines, step])
     loaded = [str(f["path"]) for f in found["files"] if "rpm" in f["channels"] and _LOADS & set(f["channels"])]
+    if not loaded and any(f["kind"] == "bench" and _LOADS & set(f["channels"]) for f in found["files"]):
+        lines.append("Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n")
     if loaded:
         first, *others = (shlex.quote(path) for path in loaded)
         lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")
