@@ -264,7 +264,7 @@ class Builder:
         slip = v.size and np.min(v) < COLDEST_PART  # degrees Celsius under a heading of kelvin, say
         # runs on a cold day and on a warm one are two airs; what warms within a run is a part
         run = self.channels["run"].values[known] if "run" in self.channels else np.zeros(v.size)
-        varies = max((float(np.ptp(v[run == k])) for k in np.unique(run)), default=0.0)
+        varies = max((float(np.ptp(v[run == k])) for k in np.unique(run[np.isfinite(run)])), default=0.0)
         if v.size and not slip and (np.max(v) > HOTTEST_AIR or varies > MOST_AIR_VARIES):
             label = self.rename("temperature_K", self.free("part_temperature_K"))
             span = f"{np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C"

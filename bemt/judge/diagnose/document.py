@@ -206,9 +206,11 @@ def _odds(told: dict[str, Any]) -> str:
 def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
     decision, catalogue = d.said, effects.catalogue()
-    first = [note for note in d.problem.notes if NO_SPEED in note or DROPPED in note]
-    lines = [headline(d), *(f"Before any physics: {note}." for note in first)]
+    lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    if len(d.problem.findings) > _FINDINGS:
+        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
+    lines += [f"Before any physics: {note}." for note in d.problem.notes if DROPPED in note]
     lines += [f"Model: {words}." for words in d.problem.validity]
     level = d.problem.level
     off = " and ".join(
@@ -218,8 +220,6 @@ def explanation(d: Diagnosis) -> list[str]:
     if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
-    if len(d.problem.findings) > _FINDINGS:
-        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:

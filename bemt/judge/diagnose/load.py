@@ -90,6 +90,11 @@ def load(
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
+    wrong = {(f.channel, i) for f in findings if f.id == "misread" for i in f.rows}
+    for name in {name for name, _ in wrong}:
+        v = np.array(imported[name])
+        v[[i for channel, i in wrong if channel == name]] = np.nan
+        imported = replace(imported, values={**imported.values, name: v})
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.provenance["format"] != "table"
