@@ -161,7 +161,7 @@ def _faults(w: Wanted) -> list[Fault]:
         unit, one = ("in", 25.4) if w.inches else ("mm", 1.0)
         value, ends = w.diameter_mm / one, " to ".join(f"{end / one:.5g}" for end in (5.0, 10000.0))
         expected = f"{ends} {unit}" if sized else "nothing without --stations or --fan"
-        hint = f"In m? That is {value * 1e3 / one:.4g} {unit}" if sized and 5.0 <= value * 1e3 <= 1e4 else ""
+        hint = f"In m? Times {1e3 / one:.4g}" if sized and 5.0 <= value * 1e3 <= 1e4 else ""
         faults.append(Fault("", f"--diameter-{unit}", f"{value:g}", expected, hint))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
         faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
@@ -188,9 +188,11 @@ def _files(w: Wanted) -> dict[str, bytes]:
         file = Path(w.stations)
         told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
-        hub, key = fresh.of_stations(file, D)
+        hub, key, few = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
-        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name)
+        text = fresh.stations_text(
+            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, few
+        )
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 
