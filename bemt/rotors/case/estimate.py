@@ -197,11 +197,11 @@ def text(doc: dict[str, Any]) -> str:
     if doc["given"]["source"]:
         notes.insert(0, f"as measured: {doc['given']['source']}")
     notes.insert(0, "± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %")
-    more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if doc["given"][key] is None]
+    more = ["--chord-mm (at 0.75 R)"] if doc["given"]["chord_mm"] is None else []
     if doc["given"]["reading"] is None:
         more.append("--reading rpm=...,thrust_g=...")
     if more and doc["given"]["known_from"] == "label":
-        notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
+        notes.append(f"for narrower bands give {' or '.join(more)}")
     return "\n".join([text_table(head, table, left=()), *notes]) + "\n"
 
 
@@ -213,7 +213,7 @@ class RotorEstimate(Dataset):
     --------
     >>> from bemt import estimate
     >>> print(estimate("10x5", rpm=6000).text.splitlines()[-1])
-    for narrower bands give --chord-mm, --measured-pitch-in, --reading rpm=...,thrust_g=... (chord and pitch at 0.75 R)
+    for narrower bands give --chord-mm (at 0.75 R) or --reading rpm=...,thrust_g=...
     """
 
     found: dict[str, Any] = field(default_factory=dict)

@@ -70,7 +70,7 @@ def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     try:
         one = records().get(label.strip())
-        found = parse_designation(label) if one is None else one.designation
+        found = parse_designation(label, blades) if one is None else one.designation
     except GeometryError as error:
         raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
