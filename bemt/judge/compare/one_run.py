@@ -105,9 +105,8 @@ def compare_run(
     if not computed and (open_u := [k for k in STAND_U if k in full and np.isnan(full.u[k][rows]).any()]):
         usual = ", ".join(f"{k.rsplit('_', 1)[0]} {STAND_U[k]:.0%}" for k in open_u)
         notes.insert(0, f"u of the recording: not stated; that of a stand which nobody calibrated, {usual}")
-        full = replace(
-            full, u=full.u | {k: np.where(np.isnan(v := full.u[k]), STAND_U[k] * abs(full[k]), v) for k in open_u}
-        )
+        stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
+        full = replace(full, u={**full.u, **stand})
     out = [_point(full, solved, int(i), k) for k, i in enumerate(rows)]
     lines = []
     if computed:

@@ -162,8 +162,8 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         keep &= ~again
     if not keep.any():
         if np.any(rpm < 0.0) and not np.any(rpm > 0.0):
-            got, hint = f"a speed that is negative in all rows, down to {np.nanmin(rpm):g}", "Turn its sign in the file"
-            raise InputError(Fault(series.name, "rpm", got, "a speed above 0", hint))
+            told = f"a speed that is negative in all rows, down to {np.nanmin(rpm):g}"
+            raise InputError(Fault(series.name, "rpm", told, "a speed above 0", "Turn its sign in the file"))
         raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
     correlated = correlated or {}
     record = Record(
