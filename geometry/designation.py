@@ -73,11 +73,12 @@ def blade_class(text: str) -> str | None:
     return next((name for pattern, name in _WORDS if re.search(pattern, text, re.IGNORECASE)), None)
 
 
-def parse_designation(text: str) -> Designation:
+def parse_designation(text: str, blades_told: int | None = None) -> Designation:
     """Read a propeller label: diameter x pitch in inches, with maker, blade count and kind of blade where it has them.
 
     A pitch without a point that no propeller has is tenths of an inch (``13x65``), and four or five digits are both
-    sizes without points (``5045``, ``51466``); five digits mean an FPV propeller, which has three blades.
+    sizes without points (``5045``, ``51466``); five digits mean an FPV propeller, which has three blades. How many
+    blades were told elsewhere counts as in the label: ``5x4.3`` with three is ``5x4.3x3``.
 
     >>> parse_designation("10x4.7").size, parse_designation("8x5x3").blades, parse_designation("13x65").pitch_in
     ('10x4.7', 3, 6.5)
@@ -119,7 +120,7 @@ def parse_designation(text: str) -> Designation:
         if blades is None and D <= _FPV_LARGEST and (glued := re.search(r"(?:^|[\s-])([TQ])-?$", before)):
             blades = {"T": 3, "Q": 4}[glued[1]]  # T5143S: makers' mark of three blades
         blades = 3 if blades is None and len(match["digits"]) == 5 and D <= _FPV_LARGEST else blades
-    if kind is None and D <= _FPV_LARGEST and (not sizes or (blades or 2) > 2):
+    if kind is None and D <= _FPV_LARGEST and (not sizes or (blades or blades_told or 2) > 2):
         kind = "fpv"
     maker = f"{maker} {suffix.words}".strip()
     return Designation(D, pitch, blades, kind, maker, suffix.reverse, suffix.width or letters.width)

@@ -44,6 +44,8 @@ __all__ = [
 VOLUME_TOLERANCE = 5e-3
 BETWEEN = 1.02
 """Least thickness that the rays must find over the one asked for: for what lies between the rays [1]."""
+MOST_THICK = 3.0
+"""Times the thickness asked for beyond which a blade does not follow any more [1]."""
 TRIES = 4
 """Meshes of a printed rotor until it is thick enough."""
 
@@ -244,7 +246,10 @@ def _thick_enough(rotor: Rotor, options: Options, printed: Printed) -> tuple[Opt
         thin, at = float(thick[k]), float(np.hypot(*middle[k, :2])) / rotor.R
         if thin >= BETWEEN * printed.min_thickness:
             return options, outer, curves, points, thin
-        made = made.thicker(1.002 * BETWEEN * printed.min_thickness / thin)
+        more = 1.002 * BETWEEN * printed.min_thickness / thin
+        if not made.min_thickness * more < MOST_THICK * printed.min_thickness:  # it no longer follows
+            break
+        made = made.thicker(more)
     got = f"{thin * 1e3:.3g} mm at r/R = {at:.2f}"
     raise GeometryError([("thickness", got, f"at least min_thickness, {printed.min_thickness * 1e3:g} mm", "")])
 

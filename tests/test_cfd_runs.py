@@ -369,7 +369,7 @@ def test_a_run_toml_says_all_its_faults(put: Callable[..., Path], capsys: pytest
         '[run]\nfiles = ["absent.out"]\nsector = 0\n[columns]\nthrust = { unit = "kg", sign = 2 }\ntork = {}\n',
     )
     assert main(["import", "run.toml"]) == 2
-    said = capsys.readouterr().out
+    said = capsys.readouterr().err
     assert all(word in said for word in ("run.sector", "columns.thrust", "columns.tork"))
 
 
@@ -383,8 +383,47 @@ def test_fields_get_one_sentence_with_the_export_to_make(
 ) -> None:
     put("field.dat", "").write_bytes(head)
     assert main(["import", "field.dat"]) == 2
-    said = capsys.readouterr().out
-    assert word in said and "report file of thrust and torque (Fluent)" in said and len(said.splitlines()) == 2
+    said = capsys.readouterr().err
+    assert word in said and "report file of thrust and torque (Fluent)" in said and len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "word"),
+    [("history.csv", '"Inner_Iter","rms[Rho]","rms[RhoE]"\n' + "".join(f"{k},-{k},-2.5\n" for k in range(9)), "residuals"),
+     ("yPlus.dat", "# y+ ()\n# Time\tpatch\tmin\tmax\taverage\n" + "".join(f"{k} blade 2 88 31\n" for k in range(9)), "y+")],
+)  # fmt: skip
+@pytest.mark.parametrize("more", [[], ["--rpm", "6000", "--out", "run.toml"]])
+def test_what_holds_no_loads_is_refused_as_what_it_is(
+    name: str, text: str, word: str, more: list[str], put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    put(name, text)
+    assert main(["import", name, *more]) == 2
+    said = capsys.readouterr()
+    assert f"got {word}" in said.err and "=N" not in said.err and not said.out
+
+
+def test_several_runs_are_no_run(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    head = "# Force\n# Time\ttotal_x total_y total_z\n"
+    for n in (6000, 8000, 10000):
+        rows = "".join(f"{k} 0 0 {n}\n" for k in range(1, 60))
+        put(f"of_{n}/postProcessing/forces/0/force.dat", head + rows)
+    assert main(["import", "of_6000", "of_8000", "of_10000"]) == 2
+    said = capsys.readouterr()
+    assert not said.out and said.err.count("Several runs?") == 1 == len(said.err.splitlines())
+
+
+def test_a_unit_or_a_sign_that_no_rotor_has_is_said(
+    put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("T.out", rfile("thrust", steady(11.4), None))
+    put("Q.out", rfile("torque", steady(0.205), None))
+    told = {}
+    for unit, sign in (("N m", "1"), ("Nmm", "1"), ("N m", "-1")):
+        words = ["--unit", "thrust=N", f"torque={unit}", "--rpm", "10000", "--sign", f"torque={sign}"]
+        assert main(["import", "T.out", "Q.out", *words]) == 0
+        told[unit, sign] = capsys.readouterr().out
+    assert ["figure of merit" in text for text in told.values()] == [False, True, False]
+    assert ["by the sign" in text for text in told.values()] == [False, False, True]
 
 
 def test_the_grid_is_named_before_any_physics(put: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
@@ -510,6 +549,31 @@ def test_one_point_stands_beside_bemt_on_one_screen(
     assert len(screen.splitlines()) <= 40 and max(map(len, screen.splitlines())) <= 120
     assert "no grid study: at least" in screen and "No cause is named from one point" in screen
     assert not {"verdict", "effects"} & found.keys()
+
+
+@pytest.mark.parametrize(
+    ("torque", "sign", "words"), [("Nmm", "1", "factor of 1000"), ("N m", "-1", "signs are opposite"), ("N m", "1", "")]
+)
+def test_what_is_a_unit_or_a_sign_is_no_physics(
+    torque: str, sign: str, words: str, put: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [put("T.out", rfile("thrust", steady(13.0), None)), put("Q.out", rfile("torque", steady(0.205), None))]
+    told = ["--rpm", "10000", "--unit", "thrust=N", f"torque={torque}", "--sign", f"torque={sign}"]
+    assert main(["import", *map(str, files), *told, "--out", "run.toml"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "run.toml", "--case", "10x5"]) == 0
+    head = capsys.readouterr().out.splitlines()[0]
+    assert words in head and ("agree" in head) == (not words)
+
+
+def test_a_bench_is_no_cfd_and_has_the_u_of_a_stand(put: Callable[..., Path]) -> None:
+    from bemt.judge.compare import one_run
+
+    file = put("bench.csv", "rpm,thrust_gf\n6000,500\n7000,690\n")
+    found = one_run.compare_run(str(file), "10x5")
+    for point in found["points"]:
+        assert point["loads"]["thrust_N"]["u_cfd"] == pytest.approx(0.05 * point["loads"]["thrust_N"]["cfd"])
+    assert "CFD" not in one_run.text(found) and any("u of the recording: not stated" in n for n in found["notes"])
 
 
 def test_diagnose_takes_exports_with_what_they_do_not_say(

@@ -15,7 +15,7 @@ from diagnosing import CASES, case, points, recording
 
 from bemt.app.cli import main, parsed
 from bemt.base.errors import InputError
-from bemt.judge.diagnose import assemble, chain, document, record
+from bemt.judge.diagnose import assemble, chain, document, record, suggest
 from bemt.judge.diagnose.load import load
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
@@ -548,3 +548,14 @@ def test_force_files_of_cfd_go_straight_in(tmp_path: Path, capsys: pytest.Captur
     said = json.loads(capsys.readouterr().out)
     assert (said["verdict"], said["readings"]) == ("none", 6)
     assert max(abs(s["before"] / said["fit"][c]["mean"]) for c, s in said["fit"].items()) < 0.01
+
+
+def test_the_headline_claims_what_the_verdict_claims_and_a_study_of_cfd_ends_in_a_run_of_cfd() -> None:
+    one = replace(record.from_series(recording(case(), points("static"), seed=1), case()), computed=True)
+    found = chain.diagnose([one], [case()], ["thrust_gain", "pitch_offset"])
+    claim = replace(found.decision, verdict="class", effects=("thrust_gain", "pitch_offset"))
+    silent = replace(found, decision=claim, said=replace(claim, verdict="insufficient", effects=()))
+    assert "do not show why" in document.headline(silent)
+    assert document.headline(replace(silent, said=claim)).startswith("The cause is")
+    assert "finer grid" in suggest.suggest(silent.found, []).text
+    assert "reference" not in silent.next.text + str(silent.next.otherwise)

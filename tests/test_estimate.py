@@ -58,6 +58,9 @@ def test_labels_of_one_propeller_give_one_answer(capsys: pytest.CaptureFixture[s
     for one, other in (("10x4.5", "1045"), ("13x6.5", "13x65"), ("5x4.3x3", "HQ5x4.3x3")):
         a, b = (told(capsys, label, "--rpm", "6000") for label in (one, other))
         assert a["rows"] == b["rows"]
+    for label in ("5x4.3", "6x4", "5x4.5", "8x5"):
+        a, b = (told(capsys, *words, "--rpm", "6000") for words in ((f"{label}x3",), (label, "--blades", "3")))
+        assert a["rows"] == b["rows"], label
 
 
 WRONG = ("8x5x3", "--blades", "2", "--density-kg-m3", "1225")

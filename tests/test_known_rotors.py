@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.base.units import G0, INCH
 from bemt.data.readers.uiuc_names import FAMILIES
@@ -152,6 +153,22 @@ def test_what_is_no_reading_is_refused(text: str, got: str) -> None:
 
 
 # ---- classes
+
+
+@pytest.mark.parametrize("reading", ["rpm=6000,thrust_g=4000", "rpm=6000,thrust_g=5", "rpm=54000,thrust_g=500"])
+def test_a_reading_of_another_rotor_is_refused(
+    reading: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for door in (["estimate", "10x5", "--rpm", "6000"], ["new", "10x5", "--out", str(tmp_path / "case")]):
+        assert cli.main([*door, "--reading", reading]) == 2
+        said = capsys.readouterr()
+        assert "within a factor of 3" in said.err and not said.out
+    assert not (tmp_path / "case").exists()
+
+
+def test_a_reading_far_outside_the_band_is_doubted_and_one_inside_it_is_not() -> None:
+    seen = [estimate.of_label("10x5", 6000, reading=f"rpm=6000,thrust_g={g}").text for g in (450, 900)]
+    assert ["standard deviations off" in text for text in seen] == [False, True]
 
 
 def test_a_class_counts() -> None:

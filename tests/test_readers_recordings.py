@@ -1294,3 +1294,29 @@ def test_loads_before_the_tare_are_left_out(write: Write) -> None:
     first = "1000,1000,3,3,0.3,10,10\n"
     got = importers.read(write(head.format("Nm") + "\n" + first + "".join(row.format(k=k) + "\n" for k in range(1, 6))))
     assert np.isnan(got[channel][0]) and np.isfinite(got[channel][1:]).all() and said(got, "before the tare")
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [("4000,1.9\n5000,abc\n6000,4.3\n", "'abc' at 3:2"),
+     ("4000,inf\n5000,3\n6000,-inf\n8000,7.8\n", "'inf' at 2:2"),
+     ("4000,1.9\n5000\n6000,4.3\n8000,7.9\n", "3: got 1 cell"),
+     ("4000,1.9\n5000,3,1\n6000,4.3\n8000,7.9\n", "3: got 3 cells")],
+)  # fmt: skip
+def test_one_bad_cell_or_row_is_named_and_hides_no_column(rows: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "bench.csv"
+    file.write_text("rpm,thrust_N\n" + rows)
+    try:
+        found = importers.read(file)
+    except InputError as error:
+        assert words in str(error)
+    else:
+        assert words in " ".join(found.notes) and np.isfinite(found.thrust_N).sum() == 2
+
+
+def test_the_letters_of_a_drive_are_its_volts_amperes_and_watts(tmp_path: Path) -> None:
+    file = tmp_path / "bench.csv"
+    file.write_text("rpm,thrust_g,V,A,W\n5000,300,11.1,3,33.3\n6000,440,11,5,55\n7000,600,10.9,8,87.2\n")
+    assert {"voltage_V", "current_A", "electrical_power_W"} <= importers.read(file).values.keys()
+    file.write_text("rpm,thrust_g,V\n5000,300,0\n6000,440,5\n")
+    assert "voltage_V" not in importers.read(file)

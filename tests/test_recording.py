@@ -212,3 +212,14 @@ def test_mutated_recordings_are_read_or_refused(put: Put) -> None:
         read += 1
         assert len(got) == 12 and len(got.flags) == 12
     assert 5 < read < 245
+
+
+def test_what_a_table_shows_of_itself_survives_a_statement_about_one_column(put: Put) -> None:
+    """Power that is voltage times current, and a power coefficient beside CT, stay what they are."""
+    rows = "".join(f"{k}000,{k * k},{10 + k},{k / 2},{(10 + k) * k / 2},0.1,0.05\n" for k in range(3, 8))
+    head = "rpm,Zug,voltage (V),current (A),power (W),CT,Cp\n"
+    toml = '[recording]\nfile = "run.csv"\n[columns]\nthrust = { column = "Zug", unit = "gf" }\n'
+    stated = importers.read(put(toml, head + rows))
+    alone = importers.read(put("", head + rows).with_name("run.csv"))
+    assert {"electrical_power_W", "CP"} <= alone.values.keys() - {"Zug"} <= stated.values.keys()
+    assert "power_W" not in stated

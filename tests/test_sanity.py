@@ -354,6 +354,20 @@ def test_a_line_of_constant_speed_is_no_stuck_sensor() -> None:
     assert check(line) == ()
 
 
+@pytest.mark.parametrize("factor", [0.1, 0.5, 2.0, 3.9, 10.0])
+@pytest.mark.parametrize("rows", [5, 8, 20])
+def test_one_mistyped_reading_of_a_table_is_found_and_its_neighbours_are_not(factor: float, rows: int) -> None:
+    made = stand(rows)
+    table = {k: made[k].copy() for k in ("rpm", "thrust_N")}
+    assert not said(check(recording(table)), "misread")
+    table["thrust_N"] += 0.2 * table["thrust_N"].max()  # a shifted zero is no mistyped reading
+    assert not said(check(recording(table)), "misread")
+    wrong = {k: made[k].copy() for k in ("rpm", "thrust_N")}
+    wrong["thrust_N"][-2] *= factor
+    (found,) = said(check(recording(wrong)), "misread")
+    assert found.rows == (rows - 2,) and f"line {rows}" in found.evidence
+
+
 def test_time_going_backwards() -> None:
     values = stand()
     values["time_s"][8:] -= 20.0

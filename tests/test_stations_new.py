@@ -10,6 +10,7 @@ import pytest
 from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.new_folder import Wanted, write
+from bemt.rotors.case.propagate import propagate
 
 R = 0.127
 X = np.array([0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0])
@@ -99,3 +100,16 @@ def test_a_label_that_is_misspelt_is_no_name(tmp_path: Path) -> None:
     (tmp_path / "blade.csv").write_text(DIALECTS["shares"])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="label"):
         write(Wanted("10x0", str(tmp_path / "blade.csv"), diameter_mm=254.0), str(tmp_path / "mine"))
+
+
+def test_stations_from_the_tip_inwards_are_the_same_blade_and_two_stations_know_less_than_ten(tmp_path: Path) -> None:
+    x = np.linspace(0.15, 1.0, 10)
+    rows = [f"{r:.3f},{0.2 - 0.1 * r:.4f},{np.degrees(np.arctan2(0.16, r)):.3f}\n" for r in x]
+    bands = {}
+    for name, lines in {"up": rows, "down": rows[::-1], "two": [rows[0], rows[-1]]}.items():
+        (tmp_path / f"{name}.csv").write_text("r/R,c/R,beta_deg\n" + "".join(lines))
+        write(Wanted(name, str(tmp_path / f"{name}.csv"), diameter_mm=254.0, rpm=6000.0), str(tmp_path / name))
+        points = propagate(load_case(tmp_path / name), 6000.0, 0.0).points
+        bands[name] = points.thrust_N[0], points.u["thrust_N"][0] / points.thrust_N[0]
+    assert bands["down"] == pytest.approx(bands["up"], rel=1e-12)
+    assert bands["two"][1] > 1.2 * bands["up"][1]

@@ -17,6 +17,7 @@ from bemt.data import readers
 from bemt.data.readers.stations import read_stations
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import import_file
+from bemt.rotors.case.words import is_case
 from geometry.common import GeometryError
 from geometry.designation import parse_designation
 
@@ -267,3 +268,15 @@ def test_stations_in_doubt_are_refused_and_the_hint_is_right(name: str, tmp_path
     assert (
         np.allclose(x, X, rtol=1e-3) and np.allclose(c, C, rtol=1e-3) and np.allclose(np.degrees(beta), BETA, rtol=1e-3)
     )
+
+
+def test_a_case_is_told_from_a_recording_by_what_it_holds(tmp_path: Path) -> None:
+    """Both may have a table of the rotor; keys may be dotted."""
+    texts = {
+        "a": 'name = "x"\nrotor.blades = 2\n',
+        "b": "[rotor]\nblades = 2\n",
+        "c": '[recording]\nfile = "x"\n[rotor]\n',
+    }
+    for name, text in texts.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    assert [is_case(str(tmp_path / f"{name}.toml")) for name in texts] == [True, True, False]

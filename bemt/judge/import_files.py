@@ -128,7 +128,8 @@ def import_(
         seen = [wrote] if wrote else [*runs, *rest]
         sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
-    return Told(document, "\n".join([*lines, found.text(wrote)]), exit_code=found.exit_code)
+    text = "\n".join([*lines, found.text(wrote)])
+    return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 
 def words(given: Mapping[str, str]) -> list[str]:

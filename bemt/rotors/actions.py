@@ -162,10 +162,15 @@ def new(
     diameter_mm = diameter_mm if diameter_in is None else diameter_in * 25.4
     table, solid = (None if path is None else os.fspath(path) for path in (stations, scan))
     wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
-                               cells, campaign, None if reading is None else reading_text(reading))  # fmt: skip
-    folder, files = new_folder.write(wanted, None if out is None else os.fspath(out))
+                               cells, campaign, None if reading is None else reading_text(reading),
+                               diameter_in is not None)  # fmt: skip
+    folder, files, doubt = new_folder.write(wanted, None if out is None else os.fspath(out))
     typed = shlex.quote(folder.as_posix())
-    lines = [f"{folder.as_posix()}: {', '.join(files)}", f"next: bemt sweep {typed}"]
+    lines = [
+        f"{folder.as_posix()}: {', '.join(files)}",
+        *([f"! {doubt}"] if doubt else []),
+        f"next: bemt sweep {typed}",
+    ]
     lines += [f"      bemt drive {typed}"] if kv is not None else []
     lines += [f"      bemt cfd {typed}/cfd"] if campaign else []
     document = {"schema": "bemt.new/1", "folder": folder.as_posix(), "files": files}

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bemt.base import unit_errors
 from bemt.base.arrays import Array
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
 from bemt.rotors.conditioning import SESSION, Conditioned, ReferenceRun, condition, noise_of_run, scatter
-from bemt.rotors.latents import Prior
+from bemt.rotors.latents import Prior, Sensed
 from bemt.rotors.model import air_fields, air_of_points, beta75_deg, coefficients
 from bemt.rotors.population import WEIGHTS, population
 from bemt.rotors.predict import sense
@@ -22,6 +26,10 @@ if TYPE_CHECKING:
 
 # Advance ratio below which a point is at rest [1].
 _STILL = 0.01
+FACTOR = 3.0
+"""Load over that of the case, or under it, that is another rotor's [1]."""
+FAR = 4.0
+"""Standard deviations off what was known of the rotor from which on a reading is doubted [1]."""
 MOST_POINTS = 40
 """Points beyond this number are averaged with their neighbours in (J, rpm) [1]."""
 
@@ -35,6 +43,32 @@ class AsMeasured:
     reference: ReferenceRun  # Rows of the run, for predictions near them
     found: Conditioned  # Steps, convergence, evidence
     points: int  # Points of the run that were used [1]
+    times: dict[str, float]  # The run's loads over those of the case [1]
+    far: float  # Standard deviations by which its furthest reading lies off what was known of the rotor [1]
+
+    @property
+    def told(self) -> str:
+        """How large the run's loads are."""
+        return " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in self.times.items())
+
+    def check(self, where: str) -> None:
+        """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
+        word, ratio = next(iter(self.times.items()), ("", 1.0))
+        if 1.0 / FACTOR < abs(ratio) < FACTOR or self.far < FAR:
+            return
+        slips = [(e.factor, e.rarity, e.words) for e in unit_errors.errors(word.replace("thrust", "force"))]
+        slips += [(r.ratio**-2, r.rarity, f"speed: {r.words}") for r in unit_errors.speed_ratios()]
+        near = min(slips, key=lambda s: (math.log(max(abs(ratio), 1e-12) / s[0]) / 0.25) ** 2 + s[1])
+        hint = f"Look at units, speed, diameter and pitch. The nearest slip is {near[2]}"
+        raise InputError(
+            Fault(
+                where,
+                "",
+                f"{self.told} what the case gives",
+                f"loads of this rotor, within a factor of {FACTOR:g}",
+                hint,
+            )
+        )
 
 
 def _groups(rpm: Array, J: Array) -> list[NDArray[np.intp]]:
@@ -91,7 +125,24 @@ def as_measured(
     found = condition(
         lambda z: solve(z, rpm_, J_, points).reshape(-1) + bias, prior, target, noise, people.rest_sizes, WEIGHTS
     )
+    mine = np.tile(np.ones(rpm_.size, bool) if foreign is None else ~foreign, 2) & np.isfinite(
+        target + at.f.reshape(-1)
+    )
+    size = np.abs(at.f.reshape(-1)) * mine
+    rows = {word: mine & (np.arange(mine.size) // rpm_.size == k) for k, word in enumerate(("thrust", "torque"))}
+    times = {w: float(np.abs(target[r]).sum() / size[r].sum()) for w, r in rows.items() if size[r].sum() > 0.0}
+    far = _far(prior, at, target - at.f.reshape(-1) - bias, noise, mine)
     posterior = Prior(found.mean, found.cov, np.ones(1), np.ones(1), "reference")
     at = sense(solve, ready.diameter_m, beta75_deg(ready), rpm_, J_, Re, found.mean)  # as predictions will see it
     reference = ReferenceRun.given(at, noise, target, found)
-    return AsMeasured(prior, posterior, reference, found, int(keep.size))
+    return AsMeasured(prior, posterior, reference, found, int(keep.size), times, far)
+
+
+def _far(prior: Prior, at: Sensed, off: Array, noise: Array, mine: NDArray[np.bool_]) -> float:
+    """Largest of ``off``, readings less the case (2 P,), over its standard deviation, given the readings not `mine`."""
+    T = at.T.transpose(0, 2, 1).reshape(off.size, -1)
+    S = noise + T @ prior.cov @ T.T * float(prior.weights @ prior.sizes**2)
+    off, rest = off - T @ prior.mean, ~mine & np.isfinite(off)
+    gain = np.linalg.solve(S[np.ix_(rest, rest)], S[np.ix_(rest, mine)]).T
+    variance = np.diag(S)[mine] - np.einsum("ij,ij->i", gain, S[np.ix_(mine, rest)])
+    return float(np.max(np.abs(off[mine] - gain @ off[rest]) / np.sqrt(variance), initial=0.0))

@@ -319,7 +319,8 @@ def detect(path: str | os.PathLike[str]) -> str:
             place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
         if not kinds:
             hint = "Give --format (format = in a case) if its head is unusual"
-            place.refuse("", "content of no known format", f"one of {', '.join(known)}", hint)
+            expected = f"a table under a line of headings, or a file of one of the {len(known)} formats that are read"
+            place.refuse("", "content of no known format", expected, hint)
     if len(kinds) > 1:
         hint = " or ".join(f'format = "{kind}"' for kind in kinds)
         place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")

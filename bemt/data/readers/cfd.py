@@ -20,7 +20,7 @@ from bemt.base.arrays import Array
 from bemt.base.averaging import Mean, keep_last, steady_average
 from bemt.base.errors import Fault
 from bemt.base.tables import number_of
-from bemt.data.readers import SourceText, head_text, number
+from bemt.data.readers import SourceText, head_text, number, unit_text
 from bemt.data.readers.samples import Channel, dataset
 from bemt.physics.dataset import Dataset
 
@@ -94,6 +94,8 @@ def unit_of(text: str) -> units.Unit | None:
 
     >>> [unit_of(t).suffix for t in ("N m", "n-m", "rev min^-1", "radian s^-1", "kg m^-3", "m^2", "kg m s^-2")]
     ['Nm', 'Nm', 'rpm', 'rad_s', 'kg_m3', 'm2', 'N']
+    >>> [unit_of(t).suffix for t in ("N mm", "mN m", "lbf ft", "ft-lbf")]
+    ['Nmm', 'mNm', 'lbf_ft', 'lbf_ft']
     >>> unit_of("furlong") is None and unit_of("") is None
     True
     """
@@ -114,7 +116,8 @@ def unit_of(text: str) -> units.Unit | None:
             (under if below or size < 0 else over).append(base + tail)
         word = "_".join(["".join(over), "".join(under)]) if under else "".join(over)
         word = _MADE_OF.get(word, word)
-    return units.UNITS.get(word)
+    other = units.UNITS.get(word) or unit_text.unit_of(plain)
+    return other if isinstance(other, units.Unit) else None
 
 
 def si_unit(text: str) -> str | None:

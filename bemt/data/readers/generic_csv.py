@@ -72,7 +72,7 @@ def sniff(head: bytes | str) -> bool:
         return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(_numeric(c) for c in cells) for cells in split[1:])
-    return alike >= 0.8 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
+    return alike >= 0.5 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
 
 
 def _numeric(cell: str) -> bool:
@@ -102,12 +102,7 @@ def read(path: str | os.PathLike[str]) -> Dataset:
 def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     """Make channels of a split table."""
     build = Builder(table, KIND, kind="table")
-    heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
-    heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
-    if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
-        heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
-    heads = _apart(heads)
-    for k, head in enumerate(heads):
+    for k, head in enumerate(heads_of(table)):
         build.add(k, head, decimal)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
@@ -122,20 +117,34 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
         build.warnings.append("rpm: the file does not say whether mechanical or electrical; taken as written")
     if "time_s" in build.channels:
         build.flag_spikes(*(k for k, c in build.channels.items() if k != "time_s" and c.unit not in ("", "-")))
-    _only_ones(build)
+    only_ones(build)
     if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
         build.warnings.append(
             f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
         )
-    _electrical(build)
+    electrical(build)
     _several(build)
     build.check_magnitudes()
     loads = {"thrust_N", "torque_Nm"} & build.channels.keys()
     if loads and (speeds or {"time_s", "pulse_width_s", "throttle"} & build.channels.keys()):
         build.kind = "bench"
     return build.finish()
+
+
+_DRIVE = {"V": "voltage (V)", "A": "current (A)", "W": "power (W)"}
+
+
+def heads_of(table: SplitTable | NumberTable) -> list[Heading]:
+    """What the headings of all columns say, beside one another."""
+    heads = [heading(t) if t else Heading("", f"column_{k + 1}", None) for k, t in enumerate(table.headings)]
+    heads = heads or [Heading("", f"column_{k + 1}", None) for k in range(table.width)]
+    if any(head.name == "CT" for head in heads):  # beside a thrust coefficient, Cp is that of the power
+        heads = [replace(h, name={"Cp": "CP", "Cq": "CQ"}.get(h.name, h.name)) for h in heads]
+    if {"V", "A"} <= {head.text.upper() for head in heads}:  # the units of what a drive takes
+        heads = [replace(heading(_DRIVE.get(h.text.upper(), h.text)), text=h.text) if h.text else h for h in heads]
+    return _apart(heads)
 
 
 def _apart(heads: list[Heading]) -> list[Heading]:
@@ -166,7 +175,7 @@ _SHORT = {
 """Names that recordings know for the quantity."""
 
 
-def _only_ones(build: Builder) -> None:
+def only_ones(build: Builder) -> None:
     """A load that no column is headed for is that of the only column in its unit whose words leave it open."""
     for name, words in _ONLY.items():
         unit = name.rsplit("_", 1)[1]
@@ -187,7 +196,7 @@ def _only_ones(build: Builder) -> None:
             build.asks.append(f"--column {quantity}={shlex.quote(build.headings[most])}")
 
 
-def _electrical(build: Builder) -> None:
+def electrical(build: Builder) -> None:
     """Call a power that is voltage times current electrical: that of the shaft is less."""
     have = build.channels
     name = next((n for n in ("power_W", "P_W") if n in have), None)

@@ -35,7 +35,16 @@ from bemt.data.readers.headings import (
     surely_shaft_speed,
 )
 from bemt.data.readers.samples import Channel, clock_seconds, dataset, spikes
-from bemt.data.readers.split import MOST_ODD, SHEET_ERRORS, SplitTable, column_numbers, some, split_table, with_unit
+from bemt.data.readers.split import (
+    MOST_ODD,
+    MOST_ODD_OF_UNIT,
+    SHEET_ERRORS,
+    SplitTable,
+    column_numbers,
+    some,
+    split_table,
+    with_unit,
+)
 from bemt.physics.dataset import Dataset
 
 FULL_THROTTLE, LEAST_PERCENT = 1.05, 5.0
@@ -168,7 +177,8 @@ class Builder:
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")
-        if len(bad) > MOST_ODD * (len(values) - empty):
+        known = head.unit is not None and head.unit_name not in ("", "-")
+        if len(bad) > (MOST_ODD_OF_UNIT if known else MOST_ODD) * (len(values) - empty):
             return self._add_text(index, head, label, bad, len(values) - empty)
         name = self.free(head.name)
         if bad:
@@ -253,7 +263,7 @@ class Builder:
         slip = v.size and np.min(v) < COLDEST_PART  # degrees Celsius under a heading of kelvin, say
         # runs on a cold day and on a warm one are two airs; what warms within a run is a part
         run = self.channels["run"].values[known] if "run" in self.channels else np.zeros(v.size)
-        varies = max((float(np.ptp(v[run == k])) for k in np.unique(run)), default=0.0)
+        varies = max((float(np.ptp(v[run == k])) for k in np.unique(run[np.isfinite(run)])), default=0.0)
         if v.size and not slip and (np.max(v) > HOTTEST_AIR or varies > MOST_AIR_VARIES):
             label = self.rename("temperature_K", self.free("part_temperature_K"))
             span = f"{np.min(v) - 273.15:.0f} to {np.max(v) - 273.15:.0f} C"

@@ -21,7 +21,8 @@ from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
 from bemt.data.readers._large import large_table
-from bemt.data.readers.headings import Heading, heading, known
+from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
+from bemt.data.readers.headings import Heading, known
 from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import SplitTable, decimal_mark, some, split_table
@@ -303,6 +304,7 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     build = Builder(table, KIND)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
+    heads = heads_of(table)
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
         if k in places:
@@ -315,8 +317,11 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
                 build.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
             del build.unitless[rows:]
         else:
-            build.add(k, heading(text) if text else Heading("", f"column_{k + 1}", None), decimal)
+            build.add(k, heads[k], decimal)
     if not build.faults:
+        only_ones(build)
+        if "power" not in columns:
+            electrical(build)
         _derive(build, made.rotor.pole_pairs or 1)
     return build.finish()
 

@@ -82,6 +82,10 @@ HALF, TIMES = 3, 2.0
 """Neighbours on each side of a spike, and ranges of theirs that it leaves."""
 MISREAD = 2.5
 """Times that a speed may differ from what the load of its row needs, before it counts as misread. [1]"""
+LONE, LONE_SDS, LONE_SD = 1.5, 8.0, 0.03
+"""Factor, and robust standard deviations of at least so much, by which a single reading is off the others. [1]"""
+FEWEST_OF_CURVE, MOST_OF_CURVE, SAME_SPEED = 5, 400, 0.02
+"""Readings that make a curve, those of no table of points, and the share by which equal speeds differ. [1]"""
 MOST_RPM_PER_V = 8000.0
 """Speed over supply voltage that no usual motor reaches. [(rev/min)/V]"""
 _CLOCK = re.compile(r"(?:(\d{4})-(\d\d)-(\d\d)[ T])?(\d{1,2}):(\d\d):(\d\d)(?:\.(\d+))?(?:Z|[+-]\d\d:?\d\d)?")
@@ -162,6 +166,32 @@ def _far(v: Array, a: int, b: int, spread: float) -> NDArray[np.bool_]:
     if b == len(v):
         share[-1] = 1.0
     return np.maximum(part - hi, lo - part) > np.maximum(TIMES * (hi - lo), share * spread)
+
+
+def lone(speed: Array, load: Array) -> Array:
+    """Times that single readings of a load are what a smooth curve of the others gives, (N,); 1 where nothing is odd.
+
+    The curve is a power of the speed by the median of all slopes (Theil and Sen; Sen, Journal of the American
+    Statistical Association 63, 1968, p. 1379, not checked). Beyond the other speeds nothing is judged.
+
+    >>> lone(np.array([5.7, 5.7, 6.1, 6.8, 7.4]), np.array([350.0, 1350.0, 420.0, 500.0, 590.0])).round(1)
+    array([1. , 3.6, 1. , 1. , 1. ])
+    """
+    times = np.ones(speed.size)
+    if not FEWEST_OF_CURVE <= speed.size <= MOST_OF_CURVE:
+        return times
+    x, y = np.log(speed), np.log(load / speed**2)
+    dx, dy = x[:, None] - x, y[:, None] - y
+    apart = dx > SAME_SPEED
+    off = y - x * (np.median(dy[apart] / dx[apart]) if apart.any() else 0.0)
+    off = off - np.median(off)
+    odd = np.abs(off) > max(float(np.log(LONE)), LONE_SDS * max(1.4826 * float(np.median(np.abs(off))), LONE_SD))
+    if np.count_nonzero(odd) > max(1, speed.size // 10):
+        return times
+    others = ~np.eye(speed.size, dtype=bool)
+    odd &= np.any(others & (dx > -SAME_SPEED), axis=1) & np.any(others & (dx < SAME_SPEED), axis=1)
+    times[odd] = np.exp(off[odd])
+    return times
 
 
 def against_load(speed: Array, load: Array) -> Array:

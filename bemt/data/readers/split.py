@@ -28,8 +28,8 @@ SHEET_ERRORS = frozenset({"#div/0!", "#n/a", "#value!", "#ref!", "#num!", "#name
 """What a spreadsheet writes into a cell that it could not compute."""
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "-", "--", "\u2013", "\u2014", "null", "none"}) | SHEET_ERRORS
 """Cells that say "no value", in lower case."""
-MOST_ODD = 0.1
-"""Share of cells that are no numbers from which a column is text."""
+MOST_ODD, MOST_ODD_OF_UNIT = 0.1, 0.5
+"""Share of cells that are no numbers from which a column is text; one whose heading states a unit."""
 MISFIT_SHARE = 0.05
 """Share of lines of another length from which a file is refused."""
 _COMMA = re.compile(r"[+-]?(0|[1-9]\d{0,8}),\d+([eE][+-]?\d+)?")
@@ -163,12 +163,15 @@ def some(items: Iterable[object], limit: int = 5) -> str:
 def find_delimiter(lines: Sequence[str]) -> str:
     """Delimiter of some lines: the first of ``; tab , |`` that all of them have, else blanks.
 
+    Without any blank it is the first that the first line and most others have: some are damaged.
+
     >>> find_delimiter(["r;mm,x", "1,2"]), find_delimiter(["a;b", "1,5;2,5"]), find_delimiter(["1 2", "3 4"])
     (',', ';', ' ')
     """
     plain = [re.sub(r'"[^"]*"', "", line) for line in lines]
-    everywhere = [mark for mark in DELIMITERS if plain and all(mark in line for line in plain)]
-    return everywhere[0] if everywhere else " "
+    least = len(plain) if any(" " in line.strip() for line in plain) else len(plain) // 2 + 1
+    usual = [mark for mark in DELIMITERS if plain and mark in plain[0] and sum(mark in t for t in plain) >= least]
+    return max(usual, key=lambda mark: all(mark in t for t in plain), default=" ")
 
 
 def find_start(lines: Sequence[str]) -> tuple[int, str]:

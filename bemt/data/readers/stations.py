@@ -84,6 +84,8 @@ def _column(at: int, text: str, R: float) -> _Column | None:
 
 def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
     """Reason why a table of stations lacks a column."""
+    if any(h.rstrip(" )]").endswith("%") for h in headings):
+        return "Write what a share is of: r/R %, c/R % or c/D %"
     if bare := [h for h in headings if _meaning(h) in lacking]:
         return f"Write the units, such as {', '.join(f'{h} (mm)' for h in bare)}; shares of the tip radius are r/R, c/R"
     return _TWIST if "beta" in lacking else ""
@@ -125,6 +127,12 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
     if not source.faults and len(table) < 2:
         source.add("", number_of(len(table), "station"), "two or more")
     source.check()
+    if np.all(np.diff(columns[0]) < 0.0):  # from the tip inwards
+        columns = [v[::-1] for v in columns]
+    elif back := np.flatnonzero(np.diff(columns[0]) <= 0.0).tolist():
+        got = " after ".join(table.cell(i, places[0].at) for i in (back[0] + 1, back[0]))
+        source.add(f"{table.lines[back[0] + 1]}:{places[0].at + 1}", got, "radii that ascend from line to line")
+        source.check()
     x, c, beta = columns
     if wanted[2] == "pitch":
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))

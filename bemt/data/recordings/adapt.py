@@ -21,6 +21,7 @@ from bemt.data.readers import load_bytes, polars, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
+from bemt.data.recordings.cfd_files import EXPORT
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.physics.dataset import Dataset
@@ -132,10 +133,7 @@ def _finite(value: float) -> float | None:
 
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
-_EXPORT = (
-    "Fields and meshes hold no loads: write a report file of thrust and torque (Fluent), save the monitors as CSV "
-    "(STAR-CCM+), or use the function object forces (OpenFOAM)"
-)
+_EXPORT = f"Fields and meshes hold no loads. {EXPORT}"
 _MARKS: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
     (b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),

@@ -14,6 +14,7 @@ from bemt.base.averaging import MIN_ROWS, keep_last, relation, revolution_averag
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of
 from bemt.data import readers
+from bemt.data.readers.split import some
 from bemt.physics.dataset import Dataset
 
 PROGRAMS: Mapping[str, str] = {
@@ -24,6 +25,14 @@ PROGRAMS: Mapping[str, str] = {
 """Program by reader."""
 FIELDS = frozenset({"fluent_xy", "fluent_ascii", "cfd_post_csv"})
 """Readers whose files may hold values at points, and no loads."""
+EXPORT = (
+    "Write a report file of thrust and torque (Fluent), save the monitors as CSV (STAR-CCM+), or use the function "
+    "object forces (OpenFOAM)"
+)
+"""Where loads come from."""
+SEVERAL = (
+    "Several runs? Import each with --out, then give the .toml files together. A restart with its own clock: alone"
+)
 SCATTERED = 0.02
 """Spread of the means of single revolutions above which a load is not periodic. [1]"""
 
@@ -90,6 +99,7 @@ def read_run(paths: Sequence[Path]) -> tuple[list[tuple[str, Dataset]], list[Fau
 
 def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[str, Dataset]]:
     out: list[tuple[str, Dataset]] = []
+    others: list[str] = []
     for name, record in read:
         home = _home(name, record)
         at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
@@ -105,9 +115,7 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
             before, record, then, now = record, before, now, then
             how = relation(then, now)
         if how == "other clock":
-            got = f"the same columns as {Path(file).name} on another clock"
-            hint = "A restart with a clock of its own: give it alone"
-            faults.append(Fault(name, "", got, "parts of one history", hint))
+            others += [name]
             continue
         cut = now[0][0]
         kept = then[0] < cut
@@ -115,6 +123,9 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
         note = f"{Path(name).name} {how} {Path(file).name}: joined at step {cut:g}"
         notes = (*before.notes, note)
         out[at] = file, replace(before, values=values, u={}, flags=(), lines=(), texts={}, notes=notes)
+    if others:
+        got = f"the same columns in {some(others, 3)}, on another clock"
+        faults.append(Fault(out[0][0], "", got, "files of one run", SEVERAL))
     return out
 
 
@@ -142,7 +153,7 @@ def _other_bases(read: Sequence[tuple[str, Dataset]]) -> list[Fault]:
             shared = min(x[-1], y[-1]) - max(x[0], y[0])
             if shared < 0.5 * min(x[-1] - x[0], y[-1] - y[0]):
                 got = f"{kind} {y[0]:g} to {y[-1]:g}, where {Path(a).name} has {x[0]:g} to {x[-1]:g}"
-                faults.append(Fault(b, "", got, "files of one run, over the same steps", "Import each run by itself"))
+                faults.append(Fault(b, "", got, "files of one run, over the same steps", SEVERAL))
     return faults
 
 

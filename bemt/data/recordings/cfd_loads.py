@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,6 +41,12 @@ _WORDS: dict[str, str] = {
 }
 """Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
+_COEFFICIENT = re.compile(r"coeff|\bC[A-Z]\w*\b")
+_OTHER = {
+    "residuals": re.compile(r"residual|continuity|^res_|^(rms|max|bgs)\[", re.IGNORECASE),
+    "y+ of walls": re.compile(r"\by ?\+|y_?plus", re.IGNORECASE),
+}
+"""What a monitor may hold beside loads."""
 CELLS = re.compile(_WORDS["cells"], re.IGNORECASE)
 """Heading of the cells of a grid."""
 CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
@@ -204,14 +210,16 @@ class OpenRun:
 
     def sign(self, quantity: str, values: Array, others: Mapping[str, float]) -> float:
         """Sign of a load: as told, that of the whole for the duct's part, else the one that makes it positive."""
-        told = self.fact(quantity).sign
+        told, name = self.fact(quantity).sign, CHANNEL[quantity]
+        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
         if told is not None:
+            if told * middle < 0:
+                why = "a rotor that is driven by the flow" if quantity != "thrust" else "thrust backwards"
+                self.notes.append(f"{name} is {told * middle:.4g} by the sign that is stated, {told:+d}: {why}")
             return float(told)
         if quantity == "duct_thrust":
             return others.get("thrust", 1.0)
-        middle = np.nanmedian(values) if np.isfinite(values).any() else 0.0
         if middle < 0:
-            name = CHANNEL[quantity]
             self.notes.append(f"{name} is {middle:.4g} in the file: taken as positive (--sign {quantity}=1 keeps it)")
         return -1.0 if middle < 0 else 1.0
 
@@ -257,6 +265,24 @@ class OpenRun:
         if head.rpm is None:
             self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
         return np.array([math.nan if head.rpm is None else head.rpm])
+
+
+def other_than_loads(names: Iterable[str]) -> str:
+    """What columns of a monitor are, when they are no loads and nothing that may be one; else "".
+
+    >>> other_than_loads(["rms[Rho]", "rms[RhoE]"]), other_than_loads(["rms[Rho]", "CFx"]), other_than_loads(["lift"])
+    ('residuals', '', '')
+    """
+    own = list(names)
+    loads = (
+        _FORCE,
+        _MOMENT,
+        _COEFFICIENT,
+        *(re.compile(_WORDS[q], re.IGNORECASE) for q in ("thrust", "torque", "power")),
+    )
+    if any(pattern.search(name) for name in own for pattern in loads):
+        return ""
+    return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
 
 
 def _means(word: str, unit: Unit | None, quantity: str) -> bool:

@@ -20,10 +20,11 @@ from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
 from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of
-from bemt.data.recordings.cfd_files import PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
-from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones
+from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
+from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones, other_than_loads
 from bemt.data.recordings.cfd_setup import with_grid_floor
 from bemt.data.recordings.channels import moves
+from bemt.data.recordings.check import check
 from bemt.data.recordings.grid_study import COVERAGE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
@@ -176,6 +177,8 @@ def _nothing(work: OpenRun) -> None:
     if not work.complete or any(f.where != "rpm" for f in work.faults):
         return
     known = ", ".join(list(dict.fromkeys(c.name for c in work.columns))[:8]) or "none but the clock"
+    if what := other_than_loads(c.name for c in work.columns):
+        return work.fault(None, "", f"{what} ({known})", NO_LOAD, EXPORT)
     first = next((c.name for c in work.columns if not c.unit), "NAME")
     hint = f'Say which it is by its unit: --unit "{first}=N" for a thrust, "{first}=N m" for a torque'
     work.fault(None, "", f"columns {known}", NO_LOAD, hint)
@@ -321,6 +324,8 @@ def _dataset(
                        provenance, tuple(labels[i] for i in index) if labels else (),
                        notes=(*made.notes, f"{number_of((~keep).sum(), 'point')} without a load left out"))  # fmt: skip
         each = None if each is None else np.broadcast_to(each, (rows,))[index]
+    slips = (f"{f.evidence}. Suggestion: {f.correction}" for f in check(made) if f.severity != "note")
+    made = replace(made, notes=(*slips, *made.notes))
     if each is not None and np.unique(each).size > 1:
         return by_grid(made, each)
     return with_grid_floor(made, conditions.get("u_grid", math.nan))

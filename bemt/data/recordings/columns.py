@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
+from bemt.data.readers.samples import lone
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import MANY, Facts, Finding, check_for, zero_thrust_speed
 from bemt.physics import coefficients as co
@@ -102,6 +103,30 @@ def constant(facts: Facts) -> Iterator[Finding]:
             fix = "the sensor is stuck, or the column was filled in: leave it out or record it again"
             severity = "note" if name == "voltage_V" else "error"  # a set value of a supply
             yield Finding("constant_column", own, text, fix, (), severity)
+
+
+@check_for("misread")
+def misread(facts: Facts) -> Iterator[Finding]:
+    """A single load of a table of points at rest that lies far off the curve of the others."""
+    rpm = facts.get("rpm")
+    states = ("wall_distance_m", "tip_gap_m", "second_rotor_rad_s", "density_kg_m3", "pressure_Pa")
+    if rpm is None or facts.bare or "time_s" in facts.values or not facts.still.all():
+        return
+    if any(_varies(facts.values[k]) for k in states if k in facts.values):
+        return
+    for name in ("thrust_N", "torque_Nm"):
+        v = facts.get(name)
+        if v is None or not np.any(np.nan_to_num(v)):
+            continue
+        size = np.abs(np.nan_to_num(v))
+        rows = np.flatnonzero((np.nan_to_num(rpm) > 0.0) & (size > 0.05 * float(np.median(size[size > 0.0]))))
+        times = lone(rpm[rows], size[rows])
+        for i, off in zip(rows[times != 1.0].tolist(), times[times != 1.0].tolist(), strict=True):
+            text = (
+                f"{v[i]:.4g} in line {facts.lines[i]} is {off:.3g} times what the others give at {rpm[i]:.0f} rev/min"
+            )
+            fix = "mistyped, or a loose contact? Measure it again; `diagnose` leaves it out"
+            yield Finding("misread", facts.named(name), text, fix, (i,), "warning")
 
 
 @check_for("units_within")

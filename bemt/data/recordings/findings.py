@@ -54,6 +54,7 @@ class Facts:
     blades: int | None = None  # Blades
     ducted: bool = False  # Rotor in a duct
     bare: bool = False  # Recorded without a propeller: nothing is expected of its loads
+    settled: bool = False  # Rows are means of computed flows: one is enough
 
     def __len__(self) -> int:
         """Give the number of rows."""
@@ -166,6 +167,7 @@ def facts_of(
         diameter_m if diameter_m is not None else said.get("diameter_m"),
         pitch_m if pitch_m is not None else said.get("pitch_m"), blades if blades is not None else own,
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
+        source.kind == "cfd",
     )  # fmt: skip
 
 

@@ -34,6 +34,7 @@ from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputErr
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
+from bemt.data.readers.split import some
 from bemt.data.readers.uiuc_tables import NO_SPEED
 from bemt.data.recordings import cfd_run
 from bemt.data.recordings.adapt import (
@@ -48,7 +49,8 @@ from bemt.data.recordings.adapt import (
     reduction_document,
     reduction_of,
 )
-from bemt.data.recordings.cfd_files import FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
+from bemt.data.recordings.cfd_loads import other_than_loads
 from bemt.data.recordings.findings import Finding
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -197,6 +199,11 @@ def import_files(
             records[name] = import_file(name, format, choice)
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
+    exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
+    if exports and all(exports.values()) and not runs:
+        for name, what in exports.items():
+            errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
+        to_do = None
     told = {d.provenance["file"] for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told)]
     notes = _restart_notes(names, records)
@@ -309,11 +316,9 @@ class ImportedFile:
 
     @property
     def text(self) -> str:
-        """What is in it, for a terminal."""
-        if self.error is not None or self.record is None:
-            if not os.path.exists(self.path):
-                return str(self.error)
-            return f"{self.path}: refused\n  " + str(self.error).replace("\n", "\n  ")
+        """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
+        if self.record is None:
+            return ""
         lines, rows, plain = [self.title], [], []
         for name in self.record.values:
             unit, found = self.record.unit(name), self.means.get(name)
@@ -351,18 +356,24 @@ class Imported:
                 "runs": [cfd_run.document(d) for d in self.runs], "to_do": self.to_do}  # fmt: skip
 
     @property
+    def complaints(self) -> tuple[str, ...]:
+        """What could not be read and why, for the error stream."""
+        nothing = () if self.files or not self.to_do else (self.to_do,)
+        return (*(f.error for f in self.files if f.error is not None), *nothing)
+
+    @property
     def exit_code(self) -> int:
-        """Worst of all files: 3 when a reader failed, 2 when a file was refused, else 0."""
-        told = [f.error for f in self.files if f.error is not None]
+        """Worst of all files: 3 when a reader failed, 2 when a file was refused or nothing was read, else 0."""
+        told = self.complaints
         return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
 
     def text(self, wrote: str = "") -> str:
         """For a terminal, with what to do next with recordings of a rotor."""
         own = {name for run in self.runs for name in run.provenance["files"]}
-        shown = [f for f in self.files if f.format != RUN or f.error]
+        shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
         lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
-        if self.to_do:
+        if self.to_do and self.files:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
@@ -376,6 +387,11 @@ class Imported:
             return "\n".join([*lines, step])
         read = [(f.path, set(f.record.values)) for f in self.files if f.record]
         loaded = [path for path, channels in read if "rpm" in channels and _LOADS & channels]
+        bench = (f.record.values for f in self.files if f.record and f.record.kind == "bench")
+        if not loaded and any(_LOADS & set(values) for values in bench):
+            lines.append(
+                "Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"
+            )
         if loaded:
             first, *others = (shlex.quote(path) for path in loaded)
             lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")

@@ -155,7 +155,7 @@ def relations(facts: Facts) -> list[Relation]:
             v = np.exp(sum(p * np.log(q[k]) for k, p in powers.items())) * scale
         v = np.broadcast_to(v, rows.shape)[rows]
         v = v[np.isfinite(v) & (v > 0.0)]
-        if v.size < 3:
+        if v.size < (1 if facts.settled else 3):
             return
         value = float(np.median(v))
         span = np.percentile(v, [20.0, 80.0])

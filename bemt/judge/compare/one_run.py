@@ -1,4 +1,4 @@
-"""One CFD run and the model at its points: loads with both bands, the duct's share, what the audit of the run finds.
+"""One CFD run or recording and the model at its points: loads, both bands, the duct's share, the audit of the run.
 
 No physics is named: one point cannot tell causes apart. `bemt.diagnose` does, from several.
 """
@@ -9,6 +9,7 @@ import math
 import os
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt import __version__
+from bemt.base import unit_errors
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
@@ -27,9 +29,13 @@ from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.propeller import rotor_of
+from bemt.rotors.reference import STAND
 
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
+STAND_U = dict(zip(("thrust_N", "torque_Nm"), STAND.tolist(), strict=True))
+"""Standard uncertainty of a load that a stand does not state, over its size [1]."""
+_KIND = {"thrust_N": "force", "torque_Nm": "torque"}
 _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
@@ -56,7 +62,10 @@ class BothLoads(Documented):
     @property
     def percent(self) -> str:
         """Difference as a share of the run's value."""
-        return f"{100.0 * self.difference / self.cfd:+.0f} %" if self.cfd else "-"
+        if not self.cfd:
+            return "-"
+        ratio = self.bemt / self.cfd
+        return f"{100.0 * (ratio - 1.0):+.0f} %" if abs(ratio) < 10.0 else f"{number_text(ratio, 3)} times"
 
 
 class PointOfRun(Documented):
@@ -76,6 +85,7 @@ class RunComparison(Documented):
 
     run: str
     case: str
+    kind: str  # cfd, or bench for a recording
     conditions: Mapping[str, str]
     points: tuple[PointOfRun, ...]
     audit: tuple[AuditLine, ...]
@@ -120,7 +130,7 @@ def cfd_points(path: str, read: Dataset | None = None) -> tuple[Dataset, Dataset
 
 
 def compare_run(
-    path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None
+    path: str | os.PathLike[str] | Dataset, case: Any, progress: Callable[[str], None] | None = None, called: str = ""
 ) -> RunComparison:
     """Put one run (run.toml, a folder of exports, or a table of CFD points) and the model of a case side by side.
 
@@ -149,9 +159,15 @@ def compare_run(
         made, full["rpm"][rows], full["airspeed_m_s"][rows], full["density_kg_m3"][rows],
         angle_deg=_angle(full, rows, made, name), progress=step,
     ).points  # fmt: skip
+    computed = imported.kind == "cfd" or bool(conditions_of(imported))
+    if not computed and (open_u := [k for k in STAND_U if k in full and np.isnan(full.u[k][rows]).any()]):
+        usual = ", ".join(f"{k.rsplit('_', 1)[0]} {STAND_U[k]:.0%}" for k in open_u)
+        notes.insert(0, f"u of the recording: not stated; that of a stand which nobody calibrated, {usual}")
+        stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
+        full = replace(full, u={**full.u, **stand})
     out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
     lines: list[AuditLine] = []
-    if imported.kind == "cfd" or conditions_of(imported):
+    if computed:
         at = int(rows[0])
         lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, _pitch(made), made.ducted,
                            float(made.air().a_sound), at)]  # fmt: skip
@@ -159,11 +175,11 @@ def compare_run(
             flies = full["airspeed_m_s"][rows] > 0.5
             notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
     known = combined(lines)[1] if lines else math.nan
-    asked = made.path.as_posix() if isinstance(case, Case) else os.fspath(case)
+    asked = called or (made.path.as_posix() if isinstance(case, Case) else os.fspath(case))
     return RunComparison(
-        name, made.name, {k: ", ".join(v) for k, v in conditions_of(imported).items()}, out,
-        tuple(faults_first(lines)), known, dict(imported.provenance.get("averaged", {})), tuple(dict.fromkeys(notes)),
-        _sentence(out), _next(out, lines, name, asked),
+        name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
+        out, tuple(faults_first(lines)), known, dict(imported.provenance.get("averaged", {})),
+        tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording"), _next(out, lines, name, asked),
     )  # fmt: skip
 
 
@@ -221,7 +237,24 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
-def _sentence(points: Sequence[PointOfRun]) -> str:
+def _slip(name: str, load: BothLoads) -> str:
+    """What a difference looks like that is no physics; "" when nothing is near."""
+    if load.cfd * load.bemt < 0.0:
+        return f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
+    ratio = load.cfd / load.bemt if load.bemt else math.nan
+    if name not in _KIND or not ratio > 0.0 or 1.0 / _FAR < ratio < _FAR:
+        return ""
+    wide = _WIDE * math.hypot(load.u_both / load.bemt, 0.02)
+    near = [(e.rarity + (off / wide) ** 2, e) for e in unit_errors.errors(_KIND[name])
+            if (off := abs(math.log(ratio / e.factor))) < wide]  # fmt: skip
+    if not near:
+        return " First check unit, sector, zones and speed."
+    error = min(near, key=lambda item: item[0])[1]
+    size = max(error.factor, error.repair)
+    return f" About a factor of {size:.4g}, as of {error.actual} taken for {error.stated}: check the unit."
+
+
+def _sentence(points: Sequence[PointOfRun], who: str) -> str:
     every = [(k, load) for p in points for k, load in p.loads.items()]
     off = [(k, load) for k, load in every if load.verdict == "differs"]
     near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
@@ -230,15 +263,16 @@ def _sentence(points: Sequence[PointOfRun]) -> str:
     if off:
         k, load = max(off, key=lambda x: x[1].times)
         count = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        ratio = abs(load.bemt / load.cfd) if load.cfd else math.inf
-        tail += " First check unit, sector, zones and speed." if not 1.0 / _FAR < ratio < _FAR else ""
+        tail += "".join(dict.fromkeys(_slip(k, load) for k, load in off))
         size = f"{_LOADS[k].split(' [')[0]} of BEMT is {load.percent}, {load.times:.1f} times both bands together"
-        return f"CFD and BEMT differ{count}: {size}.{tail}"
+        return f"{who} and BEMT differ{count}: {size}.{tail}"
     if near:
         worst = dict(sorted(near, key=lambda item: item[1].times))  # of each load the farthest
         sizes = " and ".join(f"{load.percent} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
         return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
-    return f"CFD and BEMT agree within both bands.{tail}"
+    if lost == len(every):
+        return f"No value of {who} and BEMT can be compared.{tail}"
+    return f"{who} and BEMT agree within both bands.{tail}"
 
 
 def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, case: str) -> str:
@@ -259,8 +293,8 @@ def text(found: RunComparison, details: bool = False) -> str:
     told = found.conditions
     set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
     set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
-    stated = ", ".join(set_up) or "set-up not stated"
-    lines = [found.sentence, "", f"{Path(found.run).name} ({stated}) and case {found.case}"]
+    who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
+    lines = [found.sentence, "", f"{Path(found.run).name} ({', '.join(set_up) or bare}) and case {found.case}"]
     shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:
@@ -271,7 +305,7 @@ def text(found: RunComparison, details: bool = False) -> str:
                 f"{number_text(load.difference, 3)} ({load.percent})", number_text(load.times, 2), load.verdict,
             ])  # fmt: skip
             head = ["", ""]
-    lines.append(text_table(["rev/min", "V [m/s]", "", "CFD", "BEMT", "BEMT - CFD", "in u", ""], rows, (2, 7), "  "))
+    lines.append(text_table(["rev/min", "V [m/s]", "", who, "BEMT", f"BEMT - {who}", "in u", ""], rows, (2, 7), "  "))
     if len(shown) < len(found.points):
         lines.append(f"  ... {len(found.points) - len(shown)} more points (--details)")
     first = next(iter(found.points[0].loads.values()))

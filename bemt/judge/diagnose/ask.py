@@ -24,9 +24,12 @@ from bemt.judge.diagnose.along_blade import along as along_blade
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.chain import diagnose
 from bemt.judge.diagnose.document import document, text
+from bemt.judge.diagnose.figures_recording import first_picture
 from bemt.judge.diagnose.load import cases_of, load_all
+from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.suggest import Given
-from bemt.rotors.case import case_of
+from bemt.judge.loss import CLAIMS
+from bemt.rotors.case import Case, case_of
 from bemt.rotors.case.words import sorted_out
 from bemt.rotors.propeller import Propeller, rotor_of
 
@@ -78,6 +81,7 @@ class Answer:
     propeller: Propeller
     document: dict[str, Any]
     blade: dict[str, AlongBlade]
+    beside: str = ""  # That all readings lie inside the band of the case, where they do and no cause is claimed
 
     def __repr__(self) -> str:
         """Say the verdict in a line."""
@@ -100,12 +104,12 @@ class Answer:
     @property
     def text(self) -> str:
         """The answer as text, as on the command line."""
-        return "\n\n".join([text(self.diagnosis), *(c.text() for c in self.blade.values())])
+        return "\n\n".join([text(self.diagnosis, lead=self.beside), *(c.text() for c in self.blade.values())])
 
     @property
     def details(self) -> str:
         """All sentences, and the tables behind them."""
-        return "\n\n".join([text(self.diagnosis, details=True), *(c.text() for c in self.blade.values())])
+        return "\n\n".join([text(self.diagnosis, True, self.beside), *(c.text() for c in self.blade.values())])
 
     @property
     def improved(self) -> Propeller | None:
@@ -198,7 +202,7 @@ def diagnosed(
             raise
         # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
         seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
-        found = one_run.compare_run(seen, cases[0], progress)
+        found = one_run.compare_run(seen, cases[0], progress, given[0] if given and isinstance(given[0], str) else "")
         told = found.document() | {"verdict": "insufficient", "effects": []} | beside
         words = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
         return OnePoint(told, "\n\n".join([words, *(c.text() for c in blade.values())]))
@@ -206,7 +210,20 @@ def diagnosed(
     told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
         folder.write(target, answer, told, cases, figures=figures)
-    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade)
+    inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
+    return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
+
+
+def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
+    """That every reading lies inside the band of its case; "" where one does not, or there are several cases."""
+    own = [r for r in records if not r.reference]
+    (view, *more) = first_picture(own, cases)
+    counts = [view.inside(c)[:2] for c in view.channels]
+    return (
+        view.sentence.partition(";")[0].rstrip(".") + "."
+        if not more and all(n == total for n, total in counts) and any(t for _, t in counts)
+        else ""
+    )
 
 
 def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: Any, percent: float | None) -> None:

@@ -17,9 +17,9 @@ from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.confusion import nearest
 from bemt.judge.diagnose.locate import bare
 from bemt.judge.diagnose.posterior import LEAST
-from bemt.judge.diagnose.record import NO_SPEED
+from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.explanation import UNKNOWN, Explanation, Size
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -204,9 +204,12 @@ def _odds(told: Size) -> str:
 
 def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
-    decision, catalogue = d.decision, effects.catalogue()
+    decision, catalogue = d.said, effects.catalogue()
     lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
+    if len(d.problem.findings) > _FINDINGS:
+        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
+    lines += [f"Before any physics: {note}." for note in d.problem.notes if DROPPED in note]
     lines += [f"Model: {words}." for words in d.problem.validity]
     level = d.problem.level
     off = " and ".join(
@@ -216,8 +219,6 @@ def explanation(d: Diagnosis) -> list[str]:
     if alone and not d.problem.findings and level and min(abs(v) for v in level.values()) > _ANOTHER_ROTOR:
         lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
-    if len(d.problem.findings) > _FINDINGS:
-        lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     if decision.verdict == "none":
         lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
@@ -285,7 +286,7 @@ def _title(name: str) -> str:
 
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
-    said = d.decision
+    said = d.said
     titles = [_title(i) for i in said.effects]
     off = _off(d)
     if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
@@ -330,7 +331,7 @@ def _in_both(d: Diagnosis) -> str:
 def _guess(d: Diagnosis) -> str:
     """Title of the likeliest effect, where it is likely enough to be worth a look."""
     chance = d.found.probability.get(Explanation.of(*d.best.ids), 0.0) if d.best.ids else 0.0
-    if chance < _GUESS or chance < d.found.probability[UNKNOWN]:
+    if chance < max(_GUESS, d.found.probability[UNKNOWN], d.found.probability[NONE]):
         return ""
     return f"; best guess: {' and '.join(_title(i) for i in d.best.ids)} (probability {chance:.2f})"
 
@@ -379,10 +380,11 @@ def _share(v: float) -> str:
     return f"{v:+.1%}".replace("%", " %") if _PERCENT[0] < 1.0 + v < _PERCENT[1] else f"x{1.0 + v:.3g}"
 
 
-def text(d: Diagnosis, details: bool = False) -> str:
-    """The answer in twelve lines; with ``details`` all sentences, and the tables behind them."""
+def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
+    """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
     found = d.found
     first, *rest = explanation(d)
+    first = f"{lead} {first}".strip()
     # it explains little and takes lines
     last = [line for line in rest if line.startswith("Not tried: ")]
     said, steps = d.said, _next(d)

@@ -81,7 +81,7 @@ def load(
     if is_run(imported):
         run, gains = one_grid(imported)
         made = records.from_series(run, case, gains)
-        return replace(made, notes=(*made.notes, *imported.notes))
+        return replace(made, notes=(*made.notes, *imported.notes), computed=True)
     imported = _filled(imported, rpm, airspeed_m_s)
     speed_in_doubt(imported, path)
     _speed_missing(imported, path)
@@ -90,6 +90,11 @@ def load(
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
+    wrong = {(f.channel, i) for f in findings if f.id == "misread" for i in f.rows}
+    for name in {name for name, _ in wrong}:
+        v = np.array(imported[name])
+        v[[i for channel, i in wrong if channel == name]] = np.nan
+        imported = replace(imported, values={**imported.values, name: v})
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.provenance["format"] != "table"
@@ -108,7 +113,7 @@ def load(
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
-    return replace(made, findings=found, contradictions=broken, notes=notes)
+    return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd")
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:

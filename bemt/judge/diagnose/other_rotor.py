@@ -19,13 +19,12 @@ from bemt.base.units import INCH
 from bemt.judge.diagnose.blade import AsLabelled
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.effects.base import Effect, RotorBuild
+from bemt.rotors.as_measured import FACTOR
 
 if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.problem import Problem
 
-FACTOR = 3.0
-"""Thrust or torque over that of the case, or under it, from which on the question comes first [1]."""
 UNREPEATABLE = 0.10
 """Scatter of repeats, share of the reading, that no stand has: something that is not recorded changes [1]."""
 # What loads of the right rotor may be off by, natural logarithm; how unusual a slip is adds to its square.

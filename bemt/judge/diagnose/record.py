@@ -76,6 +76,7 @@ class Record:
     repeatability: float = np.nan
     electrical: bool = False  # Whether torque is electrical power over the indicated speed
     top_rpm: float = np.inf  # Fastest that the stand may run [rev/min]
+    computed: bool = False  # Whether the points are those of CFD
 
     def __len__(self) -> int:
         """Give the number of points."""
@@ -102,6 +103,8 @@ class Record:
 _AIR = ("rho", "mu", "a_sound", "temperature_K")
 NO_SPEED = "rpm: not recorded"
 """Start of the note of a recording that takes the speed of the case."""
+DROPPED = " were dropped"
+"""What the note of points that do not count holds."""
 
 
 def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[str, float]] | None = None) -> Record:
@@ -144,21 +147,24 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         full = extra["pwm_s"] > _FULL_THROTTLE
         if full.any() and not full.all():
             measured["rpm"][full] = np.nan
-            notes.append(f"{int(full.sum())} speeds at full throttle were dropped: the pulse width does not set them")
+            notes.append(f"{int(full.sum())} speeds at full throttle left out: the pulse width does not set them")
     loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
     keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
     kinks = _kinks(rpm, extra)
     if kinks.any():
-        notes.append(f"{int(kinks.sum())} points where the rotor starts or stops were dropped: no acceleration there")
+        notes.append(f"{int(kinks.sum())} points where the rotor starts or stops{DROPPED}: no acceleration there")
         for reading in measured.values():
             reading[kinks] = np.nan
     if (~keep).any():
-        notes.append(f"{int((~keep).sum())} of {n} points without speed or load were dropped")
+        notes.append(f"{int((~keep).sum())} of {n} points without speed or load{DROPPED}")
     again = _repeated(keep, [rpm, V, *measured.values(), *(v for k, v in extra.items() if k != "run")])
     if again.any():
         notes.append(f"{int(again.sum())} rows repeat others digit by digit: counted once")
         keep &= ~again
     if not keep.any():
+        if np.any(rpm < 0.0) and not np.any(rpm > 0.0):
+            told = f"a speed that is negative in all rows, down to {np.nanmin(rpm):g}"
+            raise InputError(Fault(series.name, "rpm", told, "a speed above 0", "Turn its sign in the file"))
         raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
     correlated = correlated or {}
     record = Record(
@@ -384,6 +390,7 @@ def merged(records: Sequence[Record]) -> Record:
         tuple(dict.fromkeys(f for r in records for f in r.contradictions)),
         max((r.repeatability for r in records if np.isfinite(r.repeatability)), default=np.nan),
         top_rpm=min(r.top_rpm for r in records),
+        computed=all(r.computed for r in records),
     ))  # fmt: skip
 
 

@@ -22,13 +22,11 @@ from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
 from bemt.judge.diagnose.folder import beside, elsewhere
 from bemt.judge.diagnose.load import cases_of, load
-from bemt.judge.diagnose.other_rotor import FACTOR
 from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 from bemt.rotors.as_measured import AsMeasured, as_measured
 from bemt.rotors.case import Case
 from bemt.rotors.case.as_built import posterior_document
-from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.reading import SETTLED
 from bemt.rotors.conditioning import SESSION
 from bemt.rotors.latents import NAMES, UNITS
@@ -73,24 +71,9 @@ def learn(
     gains: tuple[float, float],
 ) -> AsMeasured:  # fmt: skip
     """Condition the rotor of a case on thrust and torque coefficients ``y`` with uncertainties ``u``, two (P,) each."""
-    _this_rotor(case, paths, y, rpm, V, air)
-    return as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains)
-
-
-def _this_rotor(case: Case, paths: Sequence[str], y: Sequence[Any], rpm: Any, V: Any, air: Air) -> None:
-    """Refuse loads that no blade of the case's label has: they would move nothing, as if they agreed."""
-    model = prepare_case(case).solve(rpm, V, air)
-    ratios = {}
-    for word, key, measured in zip(("thrust", "torque"), ("CT", "CP"), y, strict=True):
-        both = np.isfinite(measured) & np.isfinite(model[key])
-        size = float(np.abs(model[key][both]).sum())
-        if size > 0.0:
-            ratios[word] = float(np.abs(measured[both]).sum()) / size
-    if ratios and not 1.0 / FACTOR < next(iter(ratios.values())) < FACTOR:
-        told = " and ".join(f"{word} {number_text(ratio, 3)} times" for word, ratio in ratios.items())
-        hint = "Look at units, diameter, pitch and speed; `bemt diagnose` ranks what explains it"
-        raise InputError(Fault(", ".join(paths), "", f"{told} what the case gives",
-                               f"loads of this rotor, within a factor of {FACTOR:g}", hint))  # fmt: skip
+    found = as_measured(case, rpm, V, air, y[0], y[1], u[0], u[1], gains)
+    found.check(", ".join(paths))
+    return found
 
 
 def write(

@@ -41,6 +41,8 @@ ROTOR = (
 
 # Largest advance ratio of a recording up to which it is one at rest: a draught is no wind.
 _AT_REST = 0.02
+# Tip Mach number from which incompressible flow is some per cent off.
+_COMPRESSIBLE = 0.3
 # Loads of a run and its reference that differ by such a share may be of days of different density.
 _DAYS = 0.03, 0.15
 
@@ -94,7 +96,7 @@ class Suggestion:
     before: float
     after: float
     # "run", "reference" (a run without the cause), "look" (a check or a correction without a run), "mend" (the
-    # recording), "air" (write it down), or "" when nothing is called for
+    # recording), "air" (write it down), "cfd" (compute again), or "" when nothing is called for
     kind: str = "run"
     commands: tuple[str, ...] = ()  # What to type then; after a check, if the effect is not there
     checks: str = ""  # Effect that a check looks for
@@ -191,6 +193,19 @@ def _extended(part: Part, option: _Option) -> Problem:
     return assemble((replace(part, record=record, flow=flow, _solved={}),))
 
 
+def _of_cfd(found: Evidence) -> Suggestion:
+    """What a study of CFD has for a next run: no stand, no other specimen, a set-up that may move the loads itself."""
+    part = found.problem.parts[0]
+    steps = ["a finer grid (cells x 2 or more)", "a larger domain"]
+    steps += ["compressible air"] if float(np.max(part.flow.M_tip)) > _COMPRESSIBLE else []
+    fastest = int(np.argmax(part.record.rpm))
+    point = {"rpm": float(part.record.rpm[fastest]), "airspeed_m_s": float(part.record.V[fastest])}
+    text = (
+        f"one point again, {point['rpm']:.0f} rev/min, with {', with '.join(steps)}: what moves the loads is the set-up"
+    )
+    return Suggestion(text, (point,), (), 0.0, 0.0, "cfd")
+
+
 def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
     """Operating points of a run, with what has to be set besides speed and airspeed."""
     rho = float(np.median(record.air.rho)) * option.change.get("rho", 1.0)
@@ -217,6 +232,8 @@ def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float)
 
     Nobody can take friction or compressibility away for a reference: a run that removes doubt is the other way.
     """
+    if found.problem.parts[0].record.computed:
+        return Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
     if _referenced(found):
         return weather(found) or Suggestion("no further run is needed", (), (), 0.0, 0.0, "")
     best = suggest(found, rivals, unknown, reference=True)
@@ -230,7 +247,8 @@ def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float)
 
 def mended(found: Evidence, what: str) -> Suggestion:
     """Put the recording right; where nothing is wrong with it, only a reference shows what else it may be."""
-    reference = None if _referenced(found) else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
+    known = _referenced(found) or found.problem.parts[0].record.computed
+    reference = None if known else Suggestion(REFERENCE, (), (), 0.0, 0.0, "reference")
     return Suggestion(what, (), (), 0.0, 0.0, "mend", otherwise=reference)
 
 
@@ -293,6 +311,8 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     """
     from scipy.special import ndtr
 
+    if found.problem.parts[0].record.computed:
+        return _of_cfd(found)
     hyper, problem = found.states[0].hyper, found.problem
     effect = [None if not r.effect else effect_of(r.effect, dict(r.settings)) for r in rivals]
     p = np.array([max(r.probability, _LEAST) for r in rivals])

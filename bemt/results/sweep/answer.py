@@ -21,6 +21,8 @@ from bemt.rotors.validity import kind, serious
 
 WIDTH, ROWS, SCREEN = 80, 20, 45
 """Columns of the screen, rows of the table and lines of the screen: the rest is counted."""
+NEAR_ZERO = 0.1
+"""Share of the largest recorded thrust below which a difference has no per cent [1]."""
 
 
 class _Thrust(NamedTuple):
@@ -80,6 +82,12 @@ def _agreement(c: Comparison) -> str:
     return words.get(c.state, c.state) + (" !" if c.doubts else "")
 
 
+def _percent(t: _Thrust) -> str:
+    """Behind a difference: per cent of the recorded value at its point, as everywhere; none near zero thrust."""
+    near_zero = t.share > 0.0 and abs(t.c.D) < NEAR_ZERO * abs(t.c.E) / t.share
+    return f" ({100.0 * t.c.E / abs(t.c.D):+.0f} %)" if t.c.D and not near_zero else ""
+
+
 def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
     header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
@@ -101,7 +109,7 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
             some: list[_Thrust | None] = [*own] or [None]
             for t in some:
                 told = ["-", "", ""] if t is None else [
-                    f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g} ({100 * t.share:.0f} %)",
+                    f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g}{_percent(t)}",
                     _agreement(t.c)]  # fmt: skip
                 body.append([_name(result.name) if first else "", *cells, *told])
                 cells, first = [""] * len(cells), False
@@ -111,8 +119,8 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     if left > 0 or len(body) > len(shown):
         lines.append(f"and {max(left, len(body) - len(shown))} more rows (--details shows all)")
     if found:
-        lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the largest")
-        lines.append("recorded value; u > X: they agree only if the recording's own u exceeds X N")
+        lines.append("±, u: one standard uncertainty (BEMT: inputs and model); %: of the recorded")
+        lines.append("value at that point; u > X: they agree only if the recording's own u exceeds X N")
         if any(t.c.doubts for t in found):
             lines.append("!: do not take it for agreement; the flag below says why")
     return lines

@@ -41,6 +41,7 @@ class CaseAsBuilt:
     prior: Prior  # Law of the latent numbers, after the reference run if there is one
     drawn: Array  # (K,) latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`]
     reference: ReferenceRun | None = None  # The run's rows
+    doubt: str = ""  # Why the readings may not be this rotor's
 
 
 def _stated(table: AsBuiltTable) -> Array:

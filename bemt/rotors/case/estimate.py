@@ -187,7 +187,7 @@ class RotorEstimate(Dataset):
     --------
     >>> from bemt import estimate
     >>> print(estimate("10x5", rpm=6000).text.splitlines()[-1])
-    for narrower bands give --chord-mm, --measured-pitch-in, --reading rpm=...,thrust_g=... (chord and pitch at 0.75 R)
+    for narrower bands give --chord-mm (at 0.75 R) or --reading rpm=...,thrust_g=...
     """
 
     given: Mapping[str, Any] = field(default_factory=dict)
@@ -209,11 +209,11 @@ class RotorEstimate(Dataset):
         if self.given["source"]:
             notes.append(f"as measured: {self.given['source']}")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
-        more = [f"--{key.replace('_', '-')}" for key in ("chord_mm", "measured_pitch_in") if self.given[key] is None]
+        more = ["--chord-mm (at 0.75 R)"] if self.given["chord_mm"] is None else []
         if self.given["reading"] is None:
             more.append("--reading rpm=...,thrust_g=...")
         if more and self.given["known_from"] == "label":
-            notes.append(f"for narrower bands give {', '.join(more)} (chord and pitch at 0.75 R)")
+            notes.append(f"for narrower bands give {' or '.join(more)}")
         return "\n".join([text_table(head, map(list, cells), left=()), *notes]) + "\n"
 
     def __str__(self) -> str:

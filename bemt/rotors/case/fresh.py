@@ -72,7 +72,7 @@ def read_label(label: str, blades: int | None = None) -> Designation:
         raise InputError(Fault("", "label", f"{type(label).__name__} {label!r:.40}", "a label, such as 10x5"))
     try:
         one = records().get(label.strip())
-        found = parse_designation(label) if one is None else one.designation
+        found = parse_designation(label, blades) if one is None else one.designation
     except GeometryError as error:
         raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
@@ -234,11 +234,12 @@ def _series(told: Designation | None, family: str | None) -> str:
 def stations_text(
     file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
     hub_ratio: float = 0.15, key: str = "stations", label: Designation | None = None, family: str | None = None,
-    motor: tuple[float, int] | None = None, name: str = "",
+    motor: tuple[float, int] | None = None, name: str = "", few: bool = False,
 ) -> str:  # fmt: skip
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
-    The population of measured rotors weighs the pitch of the label against the angles of the stations.
+    The population of measured rotors weighs the pitch of the label against the angles of the stations. Of ``few``
+    stations the shape between them is a guess, as that of a label is: the chord is an unknown, too.
     """
     section = section_of((label.blade_class if label else None) or class_of(family))
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
@@ -261,7 +262,13 @@ hub_ratio = {hub_ratio:.4g}
 [blade.section]
 camber = {section[0].value:g}
 thickness = 0.09
-{_tail(diameter_m, rpm, airspeed_m_s, motor, *section, *SURFACE, AIR)}"""
+{_tail(diameter_m, rpm, airspeed_m_s, motor, *([_between(diameter_m)] if few else []), *section, *SURFACE, AIR)}"""
+
+
+def _between(diameter_m: float) -> Unknown:
+    """Chord of a shape between few stations: as wide as that of a label."""
+    chord, why = label_chord(diameter_m), f"fewer than {_FEW} stations: the shape between them is a guess"
+    return Unknown("blade.chord_scale", 1.0, chord.low / chord.value, chord.high / chord.value, why)
 
 
 def fan_text(
@@ -315,12 +322,16 @@ recovery = 0.8
 {_operating(told, 0.0, why)}{drive}{ranges}{_blocks(*FAN, *SURFACE, AIR, *more)}"""
 
 
-def of_stations(file: Path, diameter_m: float) -> tuple[float, str]:
-    """Hub ratio and key of [blade] of a file of stations: a table in any dialect, or one of UIUC or APC."""
+_FEW = 5
+
+
+def of_stations(file: Path, diameter_m: float) -> tuple[float, str, bool]:
+    """Hub ratio, key of [blade] of a file of stations (a table in any dialect, or one of UIUC or APC), and if few."""
     from bemt.rotors.case.build import key_of, stations_in
 
     key = key_of(file)
-    return float(np.clip(stations_in(file, 0.5 * diameter_m, key)[0].min(), 0.05, 0.3)), key
+    x = stations_in(file, 0.5 * diameter_m, key)[0]
+    return float(np.clip(x.min(), 0.05, 0.3)), key, x.size < _FEW
 
 
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")

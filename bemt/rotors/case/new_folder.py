@@ -35,6 +35,7 @@ class Wanted:
     cells: int | None = None
     campaign: bool = False
     reading: str | None = None
+    inches: bool = False  # The diameter was given so
 
     @property
     def motor(self) -> tuple[float, int] | None:
@@ -63,13 +64,17 @@ level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 
 """
 
 
-def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
-    """Write a new case that can be solved; nothing is written unless all of it is sound. Gives folder and files."""
+def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], str]:
+    """Write a new case that can be solved; nothing is written unless all of it is sound.
+
+    Gives folder and files, and why a reading may not be this rotor's.
+    """
     faults = _faults(wanted)
     refuse(faults)
     files = _files(wanted)
     try:
         case = checked(files)
+        doubt = "" if wanted.reading is None else case.as_built().doubt
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
     if wanted.motor is not None and wanted.rpm is None:  # a guess so far
@@ -80,7 +85,7 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str]]:
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
     write_files(files, folder)
-    return folder, sorted(files)
+    return folder, sorted(files), doubt
 
 
 def _of_motor(fault: Fault, wanted: Wanted) -> Fault:
@@ -152,8 +157,11 @@ def _faults(w: Wanted) -> list[Fault]:
         )
     sized = w.stations is not None or w.fan
     if w.diameter_mm is not None and (not sized or not 5.0 <= w.diameter_mm <= 10000.0):
-        expected = "5 to 10000 mm" if sized else "nothing without --stations or --fan"
-        faults.append(Fault("", "--diameter-mm", f"{w.diameter_mm:g}", expected, "In m? Times 1000"))
+        unit, one = ("in", 25.4) if w.inches else ("mm", 1.0)
+        value, ends = w.diameter_mm / one, " to ".join(f"{end / one:.5g}" for end in (5.0, 10000.0))
+        expected = f"{ends} {unit}" if sized else "nothing without --stations or --fan"
+        hint = f"In m? Times {1e3 / one:.4g}" if sized and 5.0 <= value * 1e3 <= 1e4 else ""
+        faults.append(Fault("", f"--diameter-{unit}", f"{value:g}", expected, hint))
     if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
         faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
     if w.reading is not None and (w.fan or w.stations is not None or w.scan is not None):
@@ -179,9 +187,11 @@ def _files(w: Wanted) -> dict[str, bytes]:
         file = Path(w.stations)
         told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
-        hub, key = fresh.of_stations(file, D)
+        hub, key, few = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
-        text = fresh.stations_text(file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name)
+        text = fresh.stations_text(
+            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, few
+        )
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}
 

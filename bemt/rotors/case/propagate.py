@@ -400,8 +400,8 @@ def validity_of(case: Case, J: Array, Re75: Array, M_tip: Array) -> tuple[Array,
             known = Validity.of_rotors((known, own))
         factor, words = known.at(*size, J / _zero_thrust_J(case), Re75, M_tip)
     tip = ((f"supersonic tip: Mach {m:.2f}, beyond section theory",) if m >= 1.0 else () for m in M_tip)
-    swept = swept_words(case.rotor().blade)
-    return factor, tuple((*a, *b, *swept) for a, b in zip(words, tip, strict=True))
+    whole = (*swept_words(case.rotor().blade), *filter(None, [case.as_built().doubt]))
+    return factor, tuple((*a, *b, *whole) for a, b in zip(words, tip, strict=True))
 
 
 SHARE = 0.02

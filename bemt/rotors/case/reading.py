@@ -17,7 +17,7 @@ import numpy as np
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import UNITS, split_suffix
 from bemt.physics.air import Air
-from bemt.rotors.as_measured import as_measured
+from bemt.rotors.as_measured import FAR, as_measured
 from bemt.rotors.case.as_built import MOVED, CaseAsBuilt, as_built_of
 from bemt.rotors.conditioning import SESSION, apart
 from bemt.rotors.measured import records
@@ -172,7 +172,11 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
     found = as_measured(
         base, rpm, V, Air.from_density(), y[0], y[1], u[0], u[1], others=apart(D), theirs=~mine, prior=prior
     )
-    return CaseAsBuilt(replace(found.posterior, known_from="reference"), found.posterior.mean, found.reference)
+    found.check(f"reading {text!r}")
+    known_as = replace(found.posterior, known_from="reference")
+    off = f"{found.far:.2g} standard deviations off what is known of this rotor: {found.told} what the case gives"
+    doubt = f"reading {text!r}: {off}. Unit, speed or label?" if found.far > FAR else ""
+    return CaseAsBuilt(known_as, found.posterior.mean, found.reference, doubt)
 
 
 def _source_before(case: Case) -> str | None:

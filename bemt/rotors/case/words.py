@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,17 @@ def is_case(path: str) -> bool:
     file = Path(path)
     if file.is_dir():
         return (file / "case.toml").is_file() or any(file.glob("*/case.toml"))
-    return file.name == "case.toml" or (file.suffix == ".toml" and file.is_file() and b"[rotor]" in file.read_bytes())
+    return file.name == "case.toml" or (file.suffix == ".toml" and file.is_file() and _of_rotor(file))
+
+
+def _of_rotor(file: Path) -> bool:
+    """Whether a TOML file describes a rotor, and not what was recorded of one."""
+    text = file.read_text(encoding="utf-8", errors="replace")
+    try:
+        keys = set(tomllib.loads(text))
+    except tomllib.TOMLDecodeError:  # said where it is read
+        keys = set(re.findall(r"^\s*\[*(\w+)", text, re.MULTILINE))
+    return "rotor" in keys and not {"recording", "run", "grids"} & keys
 
 
 def sorted_out(cases: list[Any], recordings: list[Any]) -> tuple[list[Any], list[Any]]:
