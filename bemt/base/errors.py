@@ -97,7 +97,18 @@ class InputError(ValueError):
 
 
 def refuse(faults: Iterable[Fault]) -> None:
-    """Raise `InputError` with all faults that were found; nothing happens where there are none."""
+    """Raise all faults that were found; nothing happens where there are none.
+
+    Parameters
+    ----------
+    faults : iterable of Fault
+        What was found.
+
+    Raises
+    ------
+    InputError
+        With all of them.
+    """
     if found := tuple(faults):
         raise InputError(found)
 
