@@ -28,8 +28,8 @@ from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.conditioning import STAND
 from bemt.rotors.propeller import rotor_of
-from bemt.rotors.reference import STAND
 
 SCHEMA = "bemt.run-comparison/1"
 _LOADS = {"thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "duct_share": "duct's share"}
@@ -315,8 +315,8 @@ def text(found: RunComparison, details: bool = False) -> str:
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
     lines += ["", "Audit of the CFD run"] if found.audit else []
     for line in found.audit if details else found.audit[:7]:
-        bare = line.finding.endswith("not stated") and line.consequence == "unknown"
-        words = "not stated" if bare else ": ".join(filter(None, (line.finding, line.consequence)))
+        unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
+        words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
         lead = f"  {line.status:11s}"
         lines.append(_filled(f"{line.topic}: {words}", lead, " " * len(lead)))
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))

@@ -24,7 +24,6 @@ from bemt.judge.diagnose.along_blade import along as along_blade
 from bemt.judge.diagnose.answer import Diagnosis
 from bemt.judge.diagnose.chain import diagnose
 from bemt.judge.diagnose.document import document, text
-from bemt.judge.diagnose.figures_recording import first_picture
 from bemt.judge.diagnose.load import cases_of, load_all
 from bemt.judge.diagnose.record import Record
 from bemt.judge.diagnose.suggest import Given
@@ -217,7 +216,7 @@ def diagnosed(
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
     """That every reading lies inside the band of its case; "" where one does not, or there are several cases."""
     own = [r for r in records if not r.reference]
-    (view, *more) = first_picture(own, cases)
+    (view, *more) = pictures.first_picture(own, cases)
     counts = [view.inside(c)[:2] for c in view.channels]
     return (
         view.sentence.partition(";")[0].rstrip(".") + "."
