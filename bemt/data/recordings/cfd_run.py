@@ -89,7 +89,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
 
     One point, or one for each design point, from files relative to `folder`; runs of one condition on several grids
     (``[[grids]]``, or rows of unlike cells) are one point. ``provenance``: ``conditions``, ``averaged``, ``drift``,
-    ``studies`` (`cfd_study.by_grid`). InputError with everything that has to be said first: units, zones, speed.
+    ``studies`` (`grid_study.by_grid`). InputError with everything that has to be said first: units, zones, speed.
     """
     if run.grids:
         return _grids(run, folder, name)
