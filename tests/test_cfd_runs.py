@@ -571,9 +571,9 @@ def test_a_bench_is_no_cfd_and_has_the_u_of_a_stand(put: Callable[..., Path]) ->
 
     file = put("bench.csv", "rpm,thrust_gf\n6000,500\n7000,690\n")
     found = one_run.compare_run(str(file), "10x5")
-    for point in found["points"]:
-        assert point["loads"]["thrust_N"]["u_cfd"] == pytest.approx(0.05 * point["loads"]["thrust_N"]["cfd"])
-    assert "CFD" not in one_run.text(found) and any("u of the recording: not stated" in n for n in found["notes"])
+    for load in (point.loads["thrust_N"] for point in found.points):
+        assert load.u_cfd == pytest.approx(0.05 * load.cfd)
+    assert "CFD" not in one_run.text(found) and any("u of the recording: not stated" in n for n in found.notes)
 
 
 def test_diagnose_takes_exports_with_what_they_do_not_say(

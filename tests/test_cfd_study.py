@@ -17,7 +17,7 @@ from bemt.data.recordings.cfd_run import assemble, run_at
 from bemt.data.recordings.cfd_setup import grid_floor
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.grid_study import are_grids, by_grid, together
-from bemt.data.recordings.load import as_dataset, document, import_file
+from bemt.data.recordings.load import as_dataset, import_file, import_files
 from bemt.judge.actions import compare
 from bemt.judge.diagnose.load import load_all
 from bemt.judge.import_files import import_
@@ -166,7 +166,7 @@ def test_three_runs_are_one_study_by_every_way_to_say_so(tmp_path: Path, runs: l
         is_the_study(assemble(run))
         path = write_run(run, str(tmp_path / f"study_{k}.toml"))
         is_the_study(import_file(path))
-        assert document([str(path)])["runs"][0]["studies"]
+        assert import_files([str(path)]).document()["runs"][0]["studies"]
     is_the_study(together([import_file(r) for r in runs]))
     lines = [f"6000,{T},{0.015 * T},{n:.0f}" for n, T in GRIDS.items()]
     (tmp_path / "t.csv").write_text("rpm,thrust [N],torque [Nm],cells\n" + "\n".join(lines) + "\n")

@@ -239,6 +239,7 @@ def picture(change: RunChange, doc: ComparedRuns) -> bytes:
 def title(doc: ComparedRuns) -> str:
     """Both files, with the rows that were chosen, and the answer.
 
+    >>> from bemt.judge.compare.change_document import Densities
     >>> files, rows = ("mon/a.csv", "tue/a.csv"), {"A": (), "B": ("rotor=left",)}
     >>> print(title(ComparedRuns("unknown", (), None, None, Densities(None, None, None), recordings=files, rows=rows)))
     A: mon/a.csv

@@ -231,9 +231,9 @@ class Problem:
     def stretch(self) -> Array:
         """Readings over the baseline for channels in other units, else 1, (M,): errors are shares of what is read."""
         out = np.ones_like(self.y)
-        for k in np.unique(self.rotor):
+        for k in np.unique(self.part):
             for c in np.unique(self.channel):
-                mine = (self.rotor == k) & (self.channel == c) & self.free
+                mine = (self.part == k) & (self.channel == c)
                 if mine.any():
                     ratio = float(np.median(np.abs(self.y[mine]) / np.maximum(np.abs(self.f0[mine]), 1e-12)))
                     out[mine] = 1.0 if 1.0 / _SLIPPED < ratio < _SLIPPED else ratio
