@@ -9,7 +9,6 @@ import pytest
 from diagnosing import case, points, recording
 
 import bemt
-from bemt import propeller
 from bemt.app.cli import main
 from bemt.base.errors import EXIT_OK
 from bemt.physics.dataset import Dataset
@@ -41,7 +40,7 @@ def test_diagnose_compare_and_the_library_agree(
         assert main([*words, "--case", CASE, "--json"]) == EXIT_OK
         doc = json.loads(capsys.readouterr().out)
         said.append((doc["verdict"], tuple(doc["effects"]), round(doc["probability"], 6)))
-    answer = bemt.diagnose(b, propeller(CASE), reference=a)
+    answer = bemt.diagnose(b, bemt.load(CASE), reference=a)
     assert said[0] == said[1]
     assert said[0][:2] == (answer.verdict, answer.effects)
     if change == (1.0, 1.0):
