@@ -84,7 +84,10 @@ TRUE = {"prop_8x5_pipe": {"duct"}, "prop_8x5_duct": {"duct"}, "prop_8x5_pitch": 
 
 @pytest.mark.slow
 def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
-    """Every converged run beside its case, with or without effects of the Mach number as it was run."""
+    """Every converged run beside its case, with or without effects of the Mach number as it was run.
+
+    What is named are effects that these loads cannot tell apart: wrong is a name without the true one among them.
+    """
     said = {}
     for path in sorted((project / "reports" / "cfd").glob("*/radial.csv")):
         campaign = load_campaign(path.with_name("campaign.toml"))
@@ -94,7 +97,8 @@ def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
         for solved, off in (("compressible", []), ("incompressible", ["compressibility", "drag_divergence"])):
             case = campaign.case.replaced({"model.effects_off": off})
             for run, found in along(case, path).items():
-                if solver_of[run] == solved and not set(found.named) <= TRUE.get(path.parent.name, set()):
+                true = TRUE.get(path.parent.name, set())
+                if solver_of[run] == solved and found.named and not true & set(found.named):
                     said[f"{path.parent.name} {run}"] = found.named
     assert not said
 

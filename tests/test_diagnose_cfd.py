@@ -63,15 +63,7 @@ QUESTIONS = {
 }  # fmt: skip
 
 
-FAINT = pytest.mark.xfail(strict=True, reason="the plate changes thrust by under 2 %: none")
-OTHER_LAW = pytest.mark.xfail(strict=True, reason="something smooth fits better than the law of the duct: unknown")
-
-
-@pytest.mark.parametrize(
-    "cause",
-    ["compressibility", "pitch_offset", pytest.param("ground_effect", marks=FAINT),
-     pytest.param("duct", marks=OTHER_LAW)],
-)  # fmt: skip
+@pytest.mark.parametrize("cause", ["compressibility", "pitch_offset", "ground_effect", "duct"])
 def test_what_a_campaign_has_is_told(cause: str) -> None:
     answer = told(ABSOLUTE, *QUESTIONS[cause]())
     assert cause in answer.said.effects, document.text(answer)

@@ -11,6 +11,7 @@ from bemt.judge.compare import drive_laws
 from bemt.judge.diagnose import record
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
+from bemt.physics.effects.air_density import AirDensity
 from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ ALWAYS = 9.0
 _SAME = 0.1
 EVIDENT = 0.2
 """Weight of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
+RECORDED = 0.3
+"""Weight of a wrong density where thermometer and barometer stand in every file: declared [1]."""
 CHANGED = 50.0
 """Weight of what the user says he changed: said, weighed, checked [1]."""
 
@@ -50,6 +53,8 @@ def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
             return LEFT_OUT
         if i in on and not cls.evident:
             return PRESENT if not shown else BOTH if i in everywhere else ELSE
+        if i == AirDensity.id and all(p.record.air_recorded for p in problem.parts):
+            return RECORDED
         # between two recordings the change is often one that was made and is known
         rest = EVIDENT if cls.evident and not shown else 1.0
         return LEFT_OUT if i in usual and (not shown or i in problem.shared) else rest

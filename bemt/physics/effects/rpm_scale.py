@@ -8,7 +8,8 @@ from fractions import Fraction
 from bemt.base import unit_errors
 from bemt.physics.effects.base import Effect, Flow, Parameter
 
-_EPS = tuple(e / 400.0 for e in range(-16, 17) if e)
+# Small errors, and the step to the next: close together where most counters err.
+_STEPS = {e / 400.0: 1.0 if abs(e) <= 6 else 2.0 for e in range(-40, 41) if e and (abs(e) <= 6 or not e % 2)}
 # Rarer ones are left to the scaling laws; nearer ones (11 : 12) are within what the level of a model may be off.
 _RATIOS = unit_errors.speed_ratios(rarest=1.0, nearest=Fraction(8, 7))
 
@@ -20,8 +21,9 @@ class RpmScale(Effect):
     Notes
     -----
     Electronic speed controllers count electrical revolutions (pole pairs times mechanical), optical tachometers count
-    blades. A wrong setting gives a rational factor (`bemt.base.unit_errors`, declared). ``eps``: clock error of cheap
-    counters, +-1 % (declared). The rotor turns at the indicated speed over the factor.
+    blades. A wrong setting gives a rational factor (`bemt.base.unit_errors`, declared). ``eps``: clock of a cheap
+    counter, +-1 %, and pulses lost or counted twice, up to 10 % (declared). The rotor turns at the indicated speed over
+    the factor.
     """
 
     factor: float = 1.0
@@ -40,7 +42,7 @@ class RpmScale(Effect):
     discrete = ("factor",)
     parameters = (
         Parameter("factor", "1", 1.0 / 24.0, 24.0, "pole pairs and blade counts", 0, 1.0),
-        Parameter("eps", "1", -0.04, 0.04, "declared, clock of a counter", 0, 0.0, 0.01),
+        Parameter("eps", "1", -0.1, 0.1, "declared, clock and pulses of a counter", 0, 0.0, 0.01),
     )
     on_by_default = False
 
@@ -50,9 +52,9 @@ class RpmScale(Effect):
 
     def variants(self) -> tuple[dict[str, float], ...]:
         """Small errors, then the rational factors."""
-        small = [{"factor": 1.0, "eps": e} for e in _EPS]
+        small = [{"factor": 1.0, "eps": e} for e in _STEPS]
         return (*small, *({"factor": f, "eps": 0.0} for f in sorted(r.ratio for r in _RATIOS)))
 
     def odds(self) -> float:
-        """Relative frequency of the ratio."""
-        return next((r.weight for r in _RATIOS if r.ratio == self.factor), 1.0)
+        """Relative frequency of the ratio, or step between small errors."""
+        return next((r.weight for r in _RATIOS if r.ratio == self.factor), _STEPS.get(self.eps, 1.0))

@@ -205,8 +205,13 @@ def _usual(log: FlightLog) -> Array:
     """Log of the drives at their usual: the median of twenty means over the flight, so a spin of seconds is none."""
     drive = log.drive
     assert drive is not None
-    parts = np.array([p.mean(axis=0) for p in np.array_split(drive[log.flying], 20)])
-    return np.asarray(np.log(np.maximum(np.median(parts, axis=0), 1e-9)), dtype=float)
+    return np.asarray(np.log(np.maximum(_by_stretches(drive[log.flying]), 1e-9)), dtype=float)
+
+
+def _by_stretches(rows: Array) -> Array:
+    """Median of the means of twenty stretches of a flight, (P, k) to (k,)."""
+    stretches = np.array_split(rows, min(20, len(rows)))
+    return np.asarray(np.median([s.mean(axis=0) for s in stretches], axis=0), dtype=float)
 
 
 def _demand(log: FlightLog) -> tuple[float, ...]:
@@ -214,8 +219,7 @@ def _demand(log: FlightLog) -> tuple[float, ...]:
     if log.torque is None or not log.flying.any():
         return ()
     torque = log.torque[log.flying]
-    usual = np.median([p.mean(axis=0) for p in np.array_split(torque, 20)], axis=0)
-    return (*map(float, usual), float(np.mean(np.abs(torque[:, 2]) > _NEAR_LIMIT)))
+    return (*map(float, _by_stretches(torque)), float(np.mean(np.abs(torque[:, 2]) > _NEAR_LIMIT)))
 
 
 def _windy(log: FlightLog, healthy: Sequence[FlightLog], air: Wind) -> bool:
