@@ -15,7 +15,7 @@ from bemt.base.document import Documented
 from bemt.base.tables import or_null
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
 from bemt.judge.compare.matched import LOADS
-from bemt.judge.compare.recordings import IN_WIND, RunChange
+from bemt.judge.compare.recordings import AS_RECORDED, IN_WIND, RunChange
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.judge.explanation import Size
 from bemt.physics.effects import catalogue
@@ -94,7 +94,7 @@ _FIRST = 5.0
 # Change of a load that days of one site can make, and from which on it is worth a thermometer, in ln.
 _DAY, _SEEN = 0.12, 0.03
 # Start of a verdict that rests on what both recordings state.
-_TOLD = ("density as recorded", "by the thermometers", "voltage as recorded")
+_TOLD = (*AS_RECORDED, "voltage as recorded")
 # Scatter of readings at one speed, share, that no stand has: something else changes from reading to reading.
 _RESTLESS = 0.10
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from bemt.base.tables import number_text, text_table
 from bemt.judge.compare.change_document import ComparedRuns, RankedCause
 from bemt.judge.compare.drive_laws import FAMILY, law
-from bemt.judge.compare.recordings import ERROR_IN, IN_WIND, NOTHING_SHARED, OTHER_STAND, REVERSED
+from bemt.judge.compare.recordings import AS_RECORDED, ERROR_IN, IN_WIND, NOTHING_SHARED, OTHER_STAND, REVERSED
 from bemt.judge.compare.smooth_change import Ratio
 from bemt.physics.effects import catalogue
 
@@ -115,6 +115,8 @@ def headline(doc: ComparedRuns) -> str:
         return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
     if doc.rule == REVERSED:
         return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
+    if effects == ["air_density"] and doc.rule.startswith(AS_RECORDED):
+        return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
     if len(effects) == 1:
         lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
         return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."

@@ -23,6 +23,8 @@ from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
+AS_RECORDED = ("density as recorded", "by the thermometers")
+"""Starts of the reason of a density that both files state."""
 ERROR_IN = "error in "
 """Start of a note on what cannot be so in A or B."""
 # Recorded densities are this good: a barometer, a thermometer and nobody's humidity, share.
@@ -166,8 +168,8 @@ class RunChange:
             return ""
         if unsure:
             warm = f"{self.a.temperature_K - ZERO_CELSIUS:.1f} to {self.b.temperature_K - ZERO_CELSIUS:.1f} C"
-            return f"by the thermometers, {warm}, and one pressure; the coefficients agree"
-        return f"density as recorded, {self.a.density:.4g} to {self.b.density:.4g} kg/m3; the coefficients agree"
+            return f"{AS_RECORDED[1]}, {warm}, and one pressure; the coefficients agree"
+        return f"{AS_RECORDED[0]}, {self.a.density:.4g} to {self.b.density:.4g} kg/m3; the coefficients agree"
 
     @property
     def by_proxy(self) -> bool:
