@@ -35,7 +35,7 @@ from bemt.judge.proof import (
 )
 from bemt.judge.proof.items import Bench, Item
 from bemt.judge.proof.rows import Entry, Estimate, Key, Ranked, Step, ToldAnswer
-from bemt.judge.proof.stand import Stand, covariance, full_scales, record
+from bemt.judge.proof.stand import StandErrors, covariance, full_scales, record
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
 
@@ -221,8 +221,8 @@ def test_no_strength_is_no_cause(rig: rigs.Rig, ducted: rigs.Rig, name: str) -> 
     if name in ("unit_slip", "duct"):  # nothing of a unit is still a unit
         assert np.any(bench.signature(some, cause)["thrust_N"]) or np.any(bench.signature(some, cause)["torque_Nm"])
         return
-    world, stand = causes.applied(bench.plain(), Stand(), cause.make(0.0, on, bench.rows, rng))
-    without_world, without_stand = causes.applied(bench.plain(), Stand(), cause.without)
+    world, stand = causes.applied(bench.plain(), StandErrors(), cause.make(0.0, on, bench.rows, rng))
+    without_world, without_stand = causes.applied(bench.plain(), StandErrors(), cause.without)
     if name == "ground_effect":
         without_world = replace(without_world, ground=0.0)
     a, b = bench.measure(world, stand)[1], bench.measure(without_world, without_stand)[1]
@@ -235,14 +235,14 @@ def test_no_strength_is_no_cause(rig: rigs.Rig, ducted: rigs.Rig, name: str) -> 
 
 def test_fault_of_one_cell_leaves_the_other_alone(rig: rigs.Rig) -> None:
     bench = Bench.draw(rig, "static_narrow", np.random.default_rng(1))
-    loads, base = bench.measure(bench.plain(), Stand())
+    loads, base = bench.measure(bench.plain(), StandErrors())
     for name, other in (("thrust_gain", "torque_Nm"), ("thrust_zero", "torque_Nm"), ("torque_gain", "thrust_N"),
                         ("torque_zero", "thrust_N"), ("thrust_drift", "torque_Nm")):  # fmt: skip
-        _, got = bench.measure(bench.plain(), Stand(**{name: 0.05}))
+        _, got = bench.measure(bench.plain(), StandErrors(**{name: 0.05}))
         assert got[other] == pytest.approx(base[other], rel=1e-4)
         mine = "thrust_N" if other == "torque_Nm" else "torque_Nm"
         assert not np.allclose(got[mine], base[mine], rtol=3e-3)
-    zero = bench.measure(bench.plain(), Stand(thrust_zero=0.05))[1]["thrust_N"] - base["thrust_N"]
+    zero = bench.measure(bench.plain(), StandErrors(thrust_zero=0.05))[1]["thrust_N"] - base["thrust_N"]
     assert zero == pytest.approx(0.05 * full_scales(loads)[0], rel=1e-2)
 
 
@@ -253,7 +253,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
     empty = np.zeros((n, 1))
     still = truth.TrueAnswer(ones, ones, ones > 0, empty, empty, empty, ones, ones, ones, ones, ones)
     loads = truth_world.TrueLoads(ones, ones, ones, ones, still)
-    stand = Stand(noise=0.01, session=0.01, step=1e-6)
+    stand = StandErrors(noise=0.01, session=0.01, step=1e-6)
     rng = np.random.default_rng(3)
     sample = np.array([record(loads, rows, 0.1, None, stand, rng)["thrust_N"] for _ in range(6000)])
     wanted = covariance(ones, rows.run, 1.2, stand)
@@ -265,7 +265,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
 # The promise of the sealing: the key is fixed before the diagnosis, which sees recording and case only; and the score
 
 
-TINY = draw.Size(
+TINY = draw.ProofSize(
     {"single": 2, "pair": 0, "null": 1, "mismatch": 1, "unlisted": 0, "sensor": 2, "underpowered": 1},
     ((False, ("static_narrow",)),),
 )
@@ -746,9 +746,9 @@ def bench() -> Bench:
 def test_two_truths_agree_where_both_hold(bench: Bench) -> None:
     """Vortex rotor and momentum theory share sections only; a lightly loaded rotor is the same to both."""
     pytest.importorskip("wisdem.ccblade.ccblade", reason="optional peer wisdem is not installed")
-    theirs, _ = bench.measure(bench.plain(), Stand())
+    theirs, _ = bench.measure(bench.plain(), StandErrors())
     vortex = Bench(replace(bench.rig, rotor=replace(bench.rig.rotor, code="vortex")), bench.plan, bench.rows)
-    ours, _ = vortex.measure(vortex.plain(), Stand())
+    ours, _ = vortex.measure(vortex.plain(), StandErrors())
     J = bench.rows.airspeed / (bench.rows.rpm / 60.0 * 2.0 * bench.rig.rotor.radius)
     assert np.all(np.isnan(theirs.thrust[J == 0.0])) and np.all(np.isfinite(theirs.thrust[J > 0.05]))
     flying = J > 0.15
@@ -773,11 +773,12 @@ def test_a_flow_that_it_does_not_know_is_refused(bench: Bench, world: dict[str, 
 def test_without_the_extra_it_says_so(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "wisdem.ccblade.ccblade", None)
     with pytest.raises(InputError, match="wisdem"):
-        bench.measure(bench.plain(), Stand())
+        bench.measure(bench.plain(), StandErrors())
 
 
 @pytest.mark.slow
 def test_the_items_of_a_seed_do_not_depend_on_the_number_of_processes() -> None:
-    size = draw.Size({**TINY.items, "underpowered": 0}, ((False, ("static_sweep",)), (False, ("static_sweep", "wall"))))
+    plans = ((False, ("static_sweep",)), (False, ("static_sweep", "wall")))
+    size = draw.ProofSize({**TINY.items, "underpowered": 0}, plans)
     one, two = (list(draw.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
     assert [(i.files, i.reference) for i in one] == [(i.files, i.reference) for i in two]

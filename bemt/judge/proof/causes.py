@@ -1,7 +1,7 @@
 """Causes that an item may conceal, by the ids of the effects; how strong, in which plans, what the baseline leaves out.
 
-A cause is a change of the truth's `World`, of its sections or of its `Stand`.  ``without`` is the same truth with the
-cause taken away, for the causes that every real rotor has (Reynolds number, Mach number, duct ...); the others are
+A cause is a change of the truth's `World`, of its sections or of the `StandErrors`.  ``without`` is the same truth with
+the cause taken away, for the causes that every real rotor has (Reynolds number, Mach number, duct ...); the others are
 absent by default.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from bemt.base import unit_errors
 from bemt.judge.proof.rigs import DUCTED_PLANS, OPEN_PLANS, UNDERPOWERED, Rig
-from bemt.judge.proof.stand import Stand
+from bemt.judge.proof.stand import StandErrors
 from bemt.judge.proof.truth_world import Conditions, World
 
 _FLIGHT = ("grid_shuffled", "grid_ordered", "two_air", "single_line")
@@ -27,7 +27,7 @@ _ANY = tuple(dict.fromkeys((*_SETTLED, "wall", "gap")))
 class Change:
     """What a cause changes."""
 
-    # Fields of `World`, `SectionPhysics` and `Stand` with their values
+    # Fields of `World`, `SectionPhysics` and `StandErrors` with their values
     world: Mapping[str, Any] = field(default_factory=dict)
     section: Mapping[str, Any] = field(default_factory=dict)
     stand: Mapping[str, Any] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class Cause:
         return not self.without.section
 
 
-def applied(world: World, stand: Stand, change: Change) -> tuple[World, Stand]:
+def applied(world: World, stand: StandErrors, change: Change) -> tuple[World, StandErrors]:
     """World and stand with a change."""
     section = replace(world.section, **dict(change.section)) if change.section else world.section
     return replace(world, section=section, **dict(change.world)), replace(stand, **dict(change.stand))

@@ -21,7 +21,7 @@ _GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
 
 
 @dataclass(frozen=True)
-class Size:
+class ProofSize:
     """Counts of a run of the proof."""
 
     items: dict[str, int]  # Items of each set. [-]
@@ -31,7 +31,7 @@ class Size:
 
 _OPEN, _DUCTED, _POOR = rigs.OPEN_PLANS, rigs.DUCTED_PLANS, rigs.UNDERPOWERED
 SIZES = {
-    "small": Size(
+    "small": ProofSize(
         {"single": 16, "pair": 3, "null": 5, "mismatch": 3, "unlisted": 5, "sensor": 6, "underpowered": 3},
         (
             (False, ("grid_shuffled", "endurance", "static_sweep", "static_narrow")),
@@ -39,18 +39,18 @@ SIZES = {
             (True, ("grid_shuffled", "gap")),
         ),
     ),
-    "full": Size(
+    "full": ProofSize(
         {"single": 240, "pair": 60, "null": 70, "mismatch": 35, "unlisted": 80, "sensor": 80, "underpowered": 40},
         (*((False, (*_OPEN, *_POOR)),) * 6, *((True, (*_DUCTED, "static_narrow")),) * 4),
     ),
-    "stand": Size(  # what a pulse width can do: settled points, no endurance
+    "stand": ProofSize(  # what a pulse width can do: settled points, no endurance
         {"single": 20, "pair": 10, "null": 8, "mismatch": 0, "unlisted": 10, "sensor": 12, "underpowered": 0},
         (
             *((False, ("static_sweep", "grid_shuffled", "grid_ordered", "wall")),) * 4,
             *((True, ("static_sweep", "grid_shuffled", "gap")),) * 3,
         ),
     ),
-    "ccblade": Size(
+    "ccblade": ProofSize(
         {"single": 30, "pair": 6, "null": 10, "mismatch": 4, "unlisted": 6, "sensor": 12, "underpowered": 0},
         ((False, _GRIDS),) * 3,
         "ccblade",
@@ -59,7 +59,7 @@ SIZES = {
 """Runs of the proof by name."""
 
 
-def benches(size: Size, seeds: np.random.SeedSequence) -> list[Bench]:
+def benches(size: ProofSize, seeds: np.random.SeedSequence) -> list[Bench]:
     """Draw rigs and their plans."""
     out = []
     for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
@@ -94,7 +94,7 @@ class Drawn:
 
 
 def draw_items(
-    size: Size, seed: int, known: Collection[str], standard: Collection[str],
+    size: ProofSize, seed: int, known: Collection[str], standard: Collection[str],
     tell: Callable[[int, int], None] = lambda i, n: None, jobs: int = 1,
 ) -> Iterator[Item]:  # fmt: skip
     """Draw and measure all items of a run, in mixed order; the same items whatever the number of processes."""
@@ -129,7 +129,7 @@ def _of_bench(work: tuple[Bench, list[Drawn], Collection[str], Collection[str]])
     return [make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard) for d in drawn]
 
 
-def _drawn(size: Size, seed: int) -> tuple[list[Bench], list[Drawn]]:
+def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
     """Benches, and all items in mixed order."""
     first, second = np.random.SeedSequence(seed).spawn(2)
     found = benches(size, first)

@@ -13,7 +13,7 @@ from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, applied
 from bemt.judge.proof.rigs import Rig, conditions, extended
 from bemt.judge.proof.rows import Entry, TrueValue
 from bemt.judge.proof.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.judge.proof.stand import Stand, full_scales, record
+from bemt.judge.proof.stand import StandErrors, full_scales, record
 from bemt.judge.proof.truth import TrueAnswer
 from bemt.judge.proof.truth_ccblade import EXPRESSIBLE
 from bemt.judge.proof.truth_section import SectionPhysics
@@ -53,7 +53,7 @@ class Bench:
         return World(ground=1.0 if self.plan == "wall" else 0.0)
 
     def measure(
-        self, world: World, stand: Stand, rng: np.random.Generator | None = None, ducted: bool = True,
+        self, world: World, stand: StandErrors, rng: np.random.Generator | None = None, ducted: bool = True,
         scales: tuple[float, float] | None = None,
     ) -> tuple[TrueLoads, dict[str, Array]]:  # fmt: skip
         """Real loads and what the stand reads."""
@@ -66,7 +66,7 @@ class Bench:
 
     def signature(self, change: Change, cause: Cause) -> dict[str, Array]:
         """Readings with a cause less those without it, noise apart."""
-        quiet = Stand()
+        quiet = StandErrors()
         without_world, without_stand = applied(self.plain(), quiet, cause.without)
         if cause.id == "ground_effect":
             without_world = replace(without_world, ground=0.0)
@@ -95,7 +95,7 @@ class Bench:
     def tangents(self) -> list[dict[str, Array]]:
         """Differences of the readings for one standard deviation of each nuisance; kept. [units of the channels]"""
         if not self._tangents:
-            quiet, world = Stand(), self.plain()
+            quiet, world = StandErrors(), self.plain()
             base = self.measure(world, quiet)[1]
             rows = replace(self.rows, rpm=self.rows.rpm * (1.0 + FREEDOM["rpm"]))
             faster = Bench(self.rig, self.plan, rows, _starts=self._starts)
@@ -116,10 +116,10 @@ class Item:
     reference: str = ""
 
 
-def _quality(rng: np.random.Generator, quiet: bool) -> Stand:
+def _quality(rng: np.random.Generator, quiet: bool) -> StandErrors:
     if quiet:
-        return Stand(noise=0.001, floor=0.0002, session=0.0, rpm_noise=0.0001, airspeed_noise=0.01)
-    return Stand(
+        return StandErrors(noise=0.001, floor=0.0002, session=0.0, rpm_noise=0.0001, airspeed_noise=0.01)
+    return StandErrors(
         noise=float(rng.uniform(0.003, 0.010)), floor=float(rng.uniform(0.0005, 0.0015)),
         share=float(rng.uniform(0.3, 0.8)), memory=float(rng.uniform(0.4, 0.85)),
         session=float(rng.uniform(0.0, 0.004)), airspeed_noise=float(rng.uniform(0.02, 0.08)),
@@ -133,9 +133,9 @@ class Hidden:
     causes: list[Cause]
     changes: list[Change]
     world: World
-    stand: Stand
+    stand: StandErrors
     own_world: World
-    own_stand: Stand
+    own_stand: StandErrors
     stated: bool
     referenced: bool
     rng: np.random.Generator
@@ -211,9 +211,9 @@ def make_item(
     if referenced and reference:
         files["reference.csv"] = reference
 
-    base = Stand(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
+    base = StandErrors(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
     signed = [bench.signature(ch, c) for ch, c in zip(changes, causes, strict=True)]
-    plain_loads, plain_columns = bench.measure(bench.plain(), Stand())
+    plain_loads, plain_columns = bench.measure(bench.plain(), StandErrors())
     electric: dict[str, Array] = {
         n: plain_columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in plain_columns
     }
@@ -238,7 +238,7 @@ def make_item(
 
 
 def _shown(
-    bench: Bench, real: TrueLoads, columns: dict[str, Array], stand: Stand, air_known: bool,
+    bench: Bench, real: TrueLoads, columns: dict[str, Array], stand: StandErrors, air_known: bool,
     rng: np.random.Generator, stated: bool,
 ) -> dict[str, Array]:  # fmt: skip
     """Columns of a recording, uncertainties among them where they are stated."""
@@ -298,7 +298,7 @@ def _measured_again(
 
 
 def _reference(
-    bench: Bench, causes: Sequence[Cause], world: World, stand: Stand, air_known: bool, rng: np.random.Generator,
+    bench: Bench, causes: Sequence[Cause], world: World, stand: StandErrors, air_known: bool, rng: np.random.Generator,
     stated: bool,
 ) -> str:  # fmt: skip
     """The same rotor at the same points on another day, without some causes; "" where it has no solution."""

@@ -29,7 +29,7 @@ from bemt.judge.proof.items import Bench
 from bemt.judge.proof.rigs import extended
 from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ToldAnswer
 from bemt.judge.proof.separation import yardstick
-from bemt.judge.proof.stand import Stand
+from bemt.judge.proof.stand import StandErrors
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -259,9 +259,9 @@ def resolves(bench: Bench, entry: Entry, answer: ToldAnswer) -> bool | None:
         return None
     cause = CAUSES[name]
     change = cause.make(entry.strengths[0], bench.rig, bench.rows, np.random.default_rng(entry.seed))
-    plain, columns = more.measure(more.plain(), Stand())
+    plain, columns = more.measure(more.plain(), StandErrors())
     electric = {str(n): columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in columns}
-    rule = yardstick(plain, more.rows.run, Stand(**entry.stand), more.tangents(), electric)
+    rule = yardstick(plain, more.rows.run, StandErrors(**entry.stand), more.tangents(), electric)
     rng = np.random.default_rng(0)
     others = {i: rule.stack(more.signature(able[i].make(1.0, more.rig, more.rows, rng), able[i])) for i in rivals}
     own = rule.stack(more.signature(change, cause))

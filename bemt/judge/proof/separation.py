@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import Whitener, whitener
-from bemt.judge.proof.stand import Stand, covariance, full_scales
+from bemt.judge.proof.stand import StandErrors, covariance, full_scales
 from bemt.judge.proof.truth_world import TrueLoads, World
 
 # One standard deviation of what nobody knows of a blade and a stand (DIAGNOSIS 2.2): pitch [deg], drag level, lift
@@ -67,7 +67,7 @@ def freedom(world: World) -> dict[str, World]:
 
 
 def yardstick(
-    loads: TrueLoads, run: NDArray[np.int64], stand: Stand, tangents: Sequence[Mapping[str, Array]],
+    loads: TrueLoads, run: NDArray[np.int64], stand: StandErrors, tangents: Sequence[Mapping[str, Array]],
     electric: Mapping[str, Array],
 ) -> Yardstick:  # fmt: skip
     """Build the yardstick of a recording."""

@@ -30,7 +30,7 @@ class StandMotor:
 
 
 @dataclass(frozen=True)
-class Stand:
+class StandErrors:
     """Quality of the stand, and its faults."""
 
     # Relative noise of a reading, and noise over full scale. [-]
@@ -65,11 +65,11 @@ class Stand:
     battery_sag: float = 0.0  # Share of the open-circuit voltage lost at the end of a long run. [-]
 
 
-def _sigma(true: Array, scale: float, stand: Stand) -> Array:
+def _sigma(true: Array, scale: float, stand: StandErrors) -> Array:
     return np.asarray(np.hypot(stand.noise * np.abs(true), stand.floor * scale))
 
 
-def covariance(true: Array, run: NDArray[np.int64], scale: float, stand: Stand) -> Array:
+def covariance(true: Array, run: NDArray[np.int64], scale: float, stand: StandErrors) -> Array:
     """Covariance of the readings of one channel, (P, P)."""
     s = _sigma(true, scale, stand)
     i = np.arange(true.size)
@@ -80,7 +80,7 @@ def covariance(true: Array, run: NDArray[np.int64], scale: float, stand: Stand) 
     return np.asarray(both + np.outer(true, true) * stand.session**2 * same + step * np.eye(true.size))
 
 
-def _noise(s: Array, run: NDArray[np.int64], stand: Stand, rng: np.random.Generator) -> Array:
+def _noise(s: Array, run: NDArray[np.int64], stand: StandErrors, rng: np.random.Generator) -> Array:
     """First-order autoregressive noise within a run, plus white noise."""
     kick = rng.standard_normal(s.size)
     out = np.empty(s.size)
@@ -91,7 +91,7 @@ def _noise(s: Array, run: NDArray[np.int64], stand: Stand, rng: np.random.Genera
 
 
 def _channel(
-    true: Array, c: Conditions, scale: float, stand: Stand, drift: float, gain: float, zero: float,
+    true: Array, c: Conditions, scale: float, stand: StandErrors, drift: float, gain: float, zero: float,
     rng: np.random.Generator | None,
 ) -> Array:  # fmt: skip
     out = (1.0 + gain) * true + zero * scale + drift * scale * c.time / (c.time + stand.drift_time)
@@ -107,7 +107,7 @@ def _channel(
 
 
 def record(
-    loads: TrueLoads, c: Conditions, radius: float, motor: StandMotor | None, stand: Stand,
+    loads: TrueLoads, c: Conditions, radius: float, motor: StandMotor | None, stand: StandErrors,
     rng: np.random.Generator | None, scales: tuple[float, float] | None = None,
 ) -> dict[str, Array]:  # fmt: skip
     """Readings of all instruments."""

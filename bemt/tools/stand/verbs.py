@@ -33,7 +33,7 @@ class Stopped(Exception):
 
 
 @dataclass(frozen=True)
-class Row:
+class SettledRow:
     """A settled point: mean of each channel, and the scatter of its samples."""
 
     mean: Mapping[str, float]
@@ -160,7 +160,7 @@ class Stand:
             if len(seen) == len(speeds) >= 5 and max(speeds) - min(speeds) <= _STEADY * max(speeds):
                 return
 
-    def row(self) -> Row:
+    def row(self) -> SettledRow:
         """Read a row: the mean of the next samples."""
         rows: dict[float, dict[str, float]] = {}
         since = time.monotonic()
@@ -174,9 +174,9 @@ class Stand:
         columns = {n: [row.get(n, math.nan) for row in taken] for n in names}
         mean = {n: sum(v) / len(v) for n, v in columns.items()}
         spread = {n: math.sqrt(sum((x - mean[n]) ** 2 for x in v) / max(len(v) - 1, 1)) for n, v in columns.items()}
-        return Row(mean, spread, self.us, len(taken), time.monotonic() - self.began)
+        return SettledRow(mean, spread, self.us, len(taken), time.monotonic() - self.began)
 
-    def at_speed(self, rpm: float) -> Row:
+    def at_speed(self, rpm: float) -> SettledRow:
         """Find the pulse width of a speed from what was read so far, and read a row there. [rev/min]"""
         low, high = self.limits.stop_us, self.limits.largest_us
         row = None
