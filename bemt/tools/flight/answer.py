@@ -156,49 +156,62 @@ def answer_on(
     for h in healthy:
         faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
     refuse(faults)
-    if layout:
-        log = replace(log, layout=layout)
-    log, healthy = checked(log), [checked(replace(h, layout=layout or h.layout)) for h in healthy]
+    log = checked(replace(log, layout=layout or log.layout))
+    healthy = [checked(replace(h, layout=layout or h.layout)) for h in healthy]
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
-    found, air = identify(log, mass_kg), wind(log, healthy)
+    found, air, mine = identify(log, mass_kg), wind(log, healthy), features(log)
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
-    mine, changed, days = features(log), change_in(log, placed), sessions(log, healthy, stated_days, day)
+    changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
     if mine is None:
-        why = "the log shows no flight with all motors running"
-        if not log.rotors:
-            why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
-        said = Decision("insufficient", (), NONE, 1.0, why)
-        step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
-               "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
-        judged = FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
+        judged = _not_flown(log)
     else:
-        kept = [(x, k) for k, h in enumerate(healthy) if (x := features(h)) is not None]
+        flown = [(k, x) for k, h in enumerate(healthy) if (x := features(h)) is not None]
         upset = [bool(shaken(calm[k], [*calm[:k], *calm[k + 1 :]])) or change_in(healthy[k], placed) is not None
-                 for _, k in kept]  # fmt: skip
+                 for k, _ in flown]  # fmt: skip
         beside = BesideBalance(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
         )  # fmt: skip
-        judged = judge(mine, [x for x, _ in kept], placed, _windy(log, healthy, air), beside,
-                       [days.days[k] for _, k in kept], days.day)  # fmt: skip
-    mass = None
-    if healthy_mass_kg is not None and found.weight_per_drive is not None:
-        same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
-        known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
-        if known:
-            mass = _mass(log, found.weight_per_drive, known, healthy_mass_kg)
+        judged = judge(mine, [x for _, x in flown], placed, _windy(log, healthy, air), beside,
+                       [days.days[k] for k, _ in flown], days.day)  # fmt: skip
     balance: tuple[float, ...] = ()
-    limited: tuple[float, ...] = ()
     if mine is not None and placed is not None:
         balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
-    if log.command is not None and log.command_unit == "1" and log.flying.any():
-        limited = tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
     return FlightAnswer(
-        log, found, judged, air, balance, limited, changed, shake, moved,
-        turned, inflow(log), mass, simulator=simulator_constants(log, found), curve=thrust_curve(log), days=days,
-        demand=_demand(log),
+        log, found, judged, air, balance, _limited(log), changed, shake, moved, turned, inflow(log),
+        _by_healthy(log, found, healthy, healthy_mass_kg), simulator=simulator_constants(log, found),
+        curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
+
+
+def _not_flown(log: FlightLog) -> FlightVerdict:
+    """Verdict on a log without a flight that could be judged."""
+    why = "the log shows no flight with all motors running"
+    if not log.rotors:
+        why = f"no output of {f'any of the {log.stated_rotors}' if log.stated_rotors else 'the'} motors was logged"
+    step = "log a flight of 10 s or more with the commands of the motors (ArduPilot RCOU or RATE, PX4 " \
+           "actuator_motors, a Crazyflie's motor.m1 to m4)"  # fmt: skip
+    said = Decision("insufficient", (), NONE, 1.0, why)
+    return FlightVerdict(said, np.zeros(0), Suggestion(step, (), (), 0.0, 0.0, "run"))
+
+
+def _by_healthy(
+    log: FlightLog, found: Identified, healthy: Sequence[FlightLog], mass_kg: float | None
+) -> Constant | None:  # fmt: skip
+    """Mass by healthy flights of a known one, where their drive was logged in the same way."""
+    if mass_kg is None or found.weight_per_drive is None:
+        return None
+    same = [h for h in healthy if (h.rpm is None) == (log.rpm is None)]
+    known = [(h, w) for h in same if (w := identify(h).weight_per_drive) is not None]
+    return _mass(log, found.weight_per_drive, known, mass_kg) if known else None
+
+
+def _limited(log: FlightLog) -> tuple[float, ...]:
+    """Share of the time that each motor is at its limit [1]."""
+    if log.command is None or log.command_unit != "1" or not log.flying.any():
+        return ()
+    return tuple(map(float, np.mean(log.command[log.flying] > _FULL, axis=0)))
 
 
 def _usual(log: FlightLog) -> Array:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
 from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
-from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, column, joined, scaled
 
 KIND = "ArduPilot DataFlash"
 _HEAD, _FORMATS, _FORMAT_SIZE, _CHUNK = b"\xa3\x95", 128, 89, 1 << 20
@@ -186,57 +186,60 @@ def _made(name: str, found: dict[str, dict[str, NDArray[Any]]], ends: str) -> Fl
         t = 1e-6 * columns["TimeUS"][pick].astype(float)
         return (t, np.stack([columns[k][pick].astype(float) for k in keys], axis=1)) if t.size > 1 else None
 
-    def flipped(source: Source | None) -> Source | None:
-        return None if source is None else (source[0], source[1] * _FLIP)
-
     def whole(key: str, usual: float) -> float:
         value = params.get(key, usual)
         return value if np.isfinite(value) else usual
 
-    motors = sorted(
-        (i, n) for n in range(1, 15) if (i := _FUNCTIONS.get(int(whole(f"SERVO{n}_FUNCTION", 0.0)), -1)) >= 0
-    )
-    channels = [n for _, n in motors] or _moving(found.get("RCOU", {}))
-    command = take("RCOU", tuple(f"C{n}" for n in channels)) if channels else None
-    low, high = whole("MOT_PWM_MIN", 1000.0), whole("MOT_PWM_MAX", 2000.0)
-    if command is not None:
-        low, high = (low, high) if high - low >= 100.0 else (1000.0, 2000.0)
-        command = command[0], np.clip((command[1] - low) / (high - low), 0.0, None)
-    frame = (int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0)))
-    layout = _FRAMES.get(frame, "")
-    stated = len(LAYOUTS[layout].split()) if layout and "FRAME_CLASS" in params else 0
-    rate, said = take("RATE", ("ROut", "POut", "YOut", "AOut")), ""
-    thrust = (rate[0], rate[1][:, 3:]) if rate else take("CTUN", ("ThO",)) or take("MOTB", ("ThrAvMx",))
-    if command is None and rate is not None and stated:
-        placed = layout_of(layout, stated)
-        assert placed is not None
-        command, said = (rate[0], mixed(placed, rate[1][:, 3], rate[1][:, :3], (0.5, 0.5, 0.5))), "RATE"
-        channels = list(range(1, stated + 1))
-    hover = whole("MOT_THST_HOVER", 0.0)
-    if thrust is not None and thrust[1].size and not np.nanmax(thrust[1]) > _IDLE * hover:
-        thrust = thrust[0], 0.0 * thrust[1]
+    layout = _FRAMES.get((int(whole("FRAME_CLASS", 1.0)), int(whole("FRAME_TYPE", 1.0))), "")
+    places = len(LAYOUTS[layout].split()) if layout else 0
+    stated = places if "FRAME_CLASS" in params else 0
+    rate = take("RATE", ("ROut", "POut", "YOut", "AOut"))
+    command, channels, said = _command(found.get("RCOU", {}), take, whole, rate, layout if stated else "")
+    thrust = column(rate, slice(3, None)) or take("CTUN", ("ThO",)) or take("MOTB", ("ThrAvMx",))
+    if thrust is not None and not np.nanmax(thrust[1], initial=0.0) > _IDLE * whole("MOT_THST_HOVER", 0.0):
+        thrust = scaled(thrust, 0.0)
     speeds, currents = _of_escs(found.get("ESC", {}), channels, take)
     att, battery = take("ATT", ("Roll", "Pitch", "Yaw")), take("BAT", ("Volt", "Curr"))
     axis = (att[0], _thrust_axis(np.radians(att[1]))) if att else None
     state = "XKF1" if "XKF1" in found else "NKF1"
-    acceleration = flipped(take("IMU", _IMU[3:]))
+    acceleration = scaled(take("IMU", _IMU[3:]), _FLIP)
     sources = {
         "command": command, "rpm": speeds, "current": currents, "acceleration": acceleration,
-        "rates": flipped(take("IMU", _IMU[:3])), "upright": (axis[0], axis[1][:, 2]) if axis else None, "axis": axis,
-        "velocity": flipped(take(state, ("VN", "VE", "VD"))), "position": flipped(take(state, ("PN", "PE", "PD"))),
-        "voltage": (battery[0], battery[1][:, 0]) if battery else None,
-        "battery_current": (battery[0], battery[1][:, 1]) if battery else None,
-        "thrust": (thrust[0], thrust[1][:, 0]) if thrust else None,
-        "torque": (rate[0], rate[1][:, :3]) if rate else None, "vibe": take("VIBE", ("VibeX", "VibeY", "VibeZ")),
+        "rates": scaled(take("IMU", _IMU[:3]), _FLIP), "upright": column(axis, 2), "axis": axis,
+        "velocity": scaled(take(state, ("VN", "VE", "VD")), _FLIP),
+        "position": scaled(take(state, ("PN", "PE", "PD")), _FLIP),
+        "voltage": column(battery, 0), "battery_current": column(battery, 1), "thrust": column(thrust, 0),
+        "torque": column(rate, slice(3)), "vibe": take("VIBE", ("VibeX", "VibeY", "VibeZ")),
     }  # fmt: skip
-    B = len(channels)
-    layout = layout if layout and len(LAYOUTS[layout].split()) == B else ""
-    main = "command" if command else "rpm" if speeds else "acceleration" if acceleration else "vibe"
-    raw = _bursts(found) or acceleration
+    main = next((k for k in ("command", "rpm", "acceleration") if sources[k]), "vibe")
     curve = ("MOT_THST_EXPO", "MOT_THST_HOVER", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
     kept = {k: params[k] for k in curve if np.isfinite(params.get(k, np.nan))}
-    return joined(name, KIND, sources, main, raw=raw, layout=layout, ends=ends, mixed=said, date=_date(found),
-                  parameters=kept, stated_rotors=stated)  # fmt: skip
+    return joined(name, KIND, sources, main, raw=_bursts(found) or acceleration, ends=ends, mixed=said,
+                  layout=layout if places == len(channels) else "", date=_date(found), parameters=kept,
+                  stated_rotors=stated)  # fmt: skip
+
+
+def _command(
+    outputs: dict[str, NDArray[Any]], take: Callable[..., Source | None], whole: Callable[[str, float], float],
+    rate: Source | None, layout: str,
+) -> tuple[Source | None, list[int], str]:  # fmt: skip
+    """Commands of the motors, shares of full; their channels; RATE where they are mixed from its demands."""
+    motors = sorted(
+        (i, n) for n in range(1, 15) if (i := _FUNCTIONS.get(int(whole(f"SERVO{n}_FUNCTION", 0.0)), -1)) >= 0
+    )
+    channels = [n for _, n in motors] or _moving(outputs)
+    command = take("RCOU", tuple(f"C{n}" for n in channels)) if channels else None
+    if command is not None:
+        low, high = whole("MOT_PWM_MIN", 1000.0), whole("MOT_PWM_MAX", 2000.0)
+        low, high = (low, high) if high - low >= 100.0 else (1000.0, 2000.0)
+        return (command[0], np.clip((command[1] - low) / (high - low), 0.0, None)), channels, ""
+    if rate is None or not layout:
+        return None, channels, ""
+    count = len(LAYOUTS[layout].split())
+    placed = layout_of(layout, count)
+    assert placed is not None
+    mix = mixed(placed, rate[1][:, 3], rate[1][:, :3], (0.5, 0.5, 0.5))
+    return (rate[0], mix), list(range(1, count + 1)), "RATE"
 
 
 def _of_escs(

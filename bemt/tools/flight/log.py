@@ -146,6 +146,16 @@ class Stretches(Generic[T]):
                 self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
 
 
+def scaled(source: Source | None, by: float | Array) -> Source | None:
+    """Values times a factor, or one for each column."""
+    return None if source is None else (source[0], source[1] * by)
+
+
+def column(source: Source | None, which: int | slice) -> Source | None:
+    """Some columns of the values."""
+    return None if source is None else (source[0], source[1][:, which])
+
+
 def joined(
     file: str, kind: str, sources: Mapping[str, Source | None], main: str, raw: Source | None = None, **more: Any
 ) -> FlightLog:

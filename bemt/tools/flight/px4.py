@@ -14,14 +14,14 @@ import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
 from bemt.tools.flight.layout import LAYOUTS, layout_of, layout_text, mixed
-from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, joined, thrust_axis
+from bemt.tools.flight.log import SPARSE, FlightLog, Source, Stretches, column, joined, scaled, thrust_axis
 
 KIND = "PX4 ULog"
 _TOPICS = ["actuator_motors", "actuator_outputs", "esc_status", "sensor_combined", "vehicle_attitude",
@@ -108,54 +108,68 @@ def _made(name: str, found: Any) -> FlightLog:
         )
 
     params = {k: float(v) for k, v in found.initial_parameters.items() if isinstance(v, int | float)}
-    command, unit = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control"))), "1"
-    demanded = command is not None
-    if command is None:
-        there = _numbered(tables, "actuator_outputs", "output")
-        command, unit = _active(take("actuator_outputs", _assigned(params, there) or there)), "us"
-        low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
-        if command is not None and np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
-            command, unit = (command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)), "1"
-    thrust, torque, said = *_demand(take), ""
-    if command is None and thrust is not None and torque is not None:
-        # The older mixers scale each geometry in a way of its own; that of four rotors is known.
-        placed = layout_of(_layout(params, 4), 4) if "actuator_controls_0" in tables else None
-        if placed is not None and params.get("CA_ROTOR_COUNT", 4.0) == 4.0:
-            command, unit = (thrust[0], mixed(placed, thrust[1], torque[1], (_X, _X, 1.0))), "1"
-            said = "actuator_controls_0"
-    B = command[1].shape[1] if command else 0
+    thrust, torque = _demand(take)
+    command = _command(tables, params, take, thrust, torque)
+    B = 0 if command.source is None else command.source[1].shape[1]
     escs = _escs(tables.get("esc_status", {}), B)
     speeds = take("esc_status", [f"esc[{i}].esc_rpm" for i in escs])
-    if speeds is not None and not np.any(speeds[1]):
-        speeds = None
-    if speeds is not None:
-        speeds = (speeds[0], np.abs(speeds[1]))  # the sign is the turning in a simulator
-    if B == 0:
-        speeds = _active(speeds)
-    currents = take("esc_status", [f"esc[{i}].esc_current" for i in escs])
+    # the sign is the turning in a simulator
+    speeds = (speeds[0], np.abs(speeds[1])) if speeds is not None and np.any(speeds[1]) else None
+    speeds = _active(speeds) if B == 0 else speeds
     q = take("vehicle_attitude", [f"q[{i}]" for i in range(4)])
     axis = (q[0], thrust_axis(q[1]) * _AXIS) if q else None
-    xyz, vel = take("vehicle_local_position", list("xyz")), take("vehicle_local_position", ["vx", "vy", "vz"])
-    acc = take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)])
-    gyro = take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)])
-    volt, amp = take("battery_status", ["voltage_v"]), take("battery_status", ["current_a"])
+    acceleration = scaled(take("sensor_combined", [f"accelerometer_m_s2[{i}]" for i in range(3)]), _FLIP)
     sources: dict[str, Source | None] = {
-        "command": command, "rpm": speeds, "current": currents,
-        "acceleration": (acc[0], acc[1] * _FLIP) if acc else None,
-        "rates": (gyro[0], gyro[1] * _FLIP) if gyro else None, "upright": (axis[0], axis[1][:, 2]) if axis else None,
-        "axis": axis, "velocity": (vel[0], vel[1] * _FLIP) if vel else None,
-        "position": (xyz[0], xyz[1] * _FLIP) if xyz else None, "voltage": (volt[0], volt[1][:, 0]) if volt else None,
-        "battery_current": (amp[0], amp[1][:, 0]) if amp else None, "thrust": thrust, "torque": torque,
+        "command": command.source, "rpm": speeds,
+        "current": take("esc_status", [f"esc[{i}].esc_current" for i in escs]),
+        "acceleration": acceleration, "axis": axis, "upright": column(axis, 2),
+        "rates": scaled(take("sensor_combined", [f"gyro_rad[{i}]" for i in range(3)]), _FLIP),
+        "velocity": scaled(take("vehicle_local_position", ["vx", "vy", "vz"]), _FLIP),
+        "position": scaled(take("vehicle_local_position", list("xyz")), _FLIP),
+        "voltage": column(take("battery_status", ["voltage_v"]), 0),
+        "battery_current": column(take("battery_status", ["current_a"]), 0), "thrust": thrust, "torque": torque,
     }  # fmt: skip
     last = max((float(d["timestamp"][-1]) for d in tables.values() if len(d.get("timestamp", ()))), default=0.0)
     ends = f"damaged; the last readable sample is at {last * 1e-6:.1f} s" if found.file_corruption else ""
-    layout = _layout(params, B)
-    main = "command" if command else "rpm" if speeds else "acceleration" if acc else "thrust"
-    raw = _bursts(tables.get("sensor_accel_fifo", {})) or sources["acceleration"]
+    main = next((k for k in ("command", "rpm", "acceleration") if sources[k]), "thrust")
     kept = {k: params[k] for k in ("THR_MDL_FAC", "MPC_THR_HOVER") if np.isfinite(params.get(k, np.nan))}
-    kept |= {"demanded": 1.0} if demanded else {}
-    return joined(name, KIND, sources, main, raw=raw, command_unit=unit, layout=layout, ends=ends, mixed=said,
+    kept |= {"demanded": 1.0} if command.demanded else {}
+    return joined(name, KIND, sources, main, raw=_bursts(tables.get("sensor_accel_fifo", {})) or acceleration,
+                  command_unit=command.unit, layout=_layout(params, B), ends=ends, mixed=command.mixed,
                   date=_date(take), parameters=kept, stated_rotors=_stated(params))  # fmt: skip
+
+
+class _Command(NamedTuple):
+    """Commands of the motors."""
+
+    source: Source | None
+    unit: str = "1"  # Shares of full, or microseconds
+    demanded: bool = False  # Whether they are the demands of the control allocation
+    mixed: str = ""  # Topic of the demanded torques that they were mixed from
+
+
+def _command(
+    tables: dict[str, dict[str, Array]], params: dict[str, float], take: Callable[[str, list[str]], Source | None],
+    thrust: Source | None, torque: Source | None,
+) -> _Command:  # fmt: skip
+    """Commands as logged: demands, outputs, else what the demands of a quadrotor come to."""
+    command = _active(take("actuator_motors", _numbered(tables, "actuator_motors", "control")))
+    if command is not None:
+        return _Command(command, demanded=True)
+    there = _numbered(tables, "actuator_outputs", "output")
+    command = _active(take("actuator_outputs", _assigned(params, there) or there))
+    if command is not None:
+        low, high = params.get("PWM_MIN", 1000.0), params.get("PWM_MAX", 2000.0)
+        if np.nanmin(command[1]) >= 700.0 and np.nanmax(command[1]) <= 2300.0 < high + 800.0:
+            return _Command((command[0], np.clip((command[1] - low) / max(high - low, 100.0), 0.0, None)))
+        return _Command(command, "us")
+    # The older mixers scale each geometry in a way of its own; that of four rotors is known.
+    four = "actuator_controls_0" in tables and params.get("CA_ROTOR_COUNT", 4.0) == 4.0
+    placed = layout_of(_layout(params, 4), 4) if four else None
+    if thrust is None or torque is None or placed is None:
+        return _Command(None, "us")
+    mix = mixed(placed, thrust[1], torque[1], (_X, _X, 1.0))
+    return _Command((thrust[0], mix), mixed="actuator_controls_0")
 
 
 def _demand(take: Callable[[str, list[str]], Source | None]) -> tuple[Source | None, Source | None]:
