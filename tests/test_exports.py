@@ -943,19 +943,9 @@ def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, sch
         export_case(Job(case, solid=COARSE), out, ["stl"])
 
 
-def _script(name: str, project: Path):
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location(name, project / f"docs/{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_a_qprop_file_gives_its_loads_in_the_equations_of_qprop(project: Path) -> None:
     """Not our reader: the swirl, stall and drag of QPROP itself; near in flight, within its straight lift at rest."""
-    for _, _, V, thrust, torque in _script("qprop_equations", project).compared():
+    for _, _, V, thrust, torque in script(project, "qprop_equations").compared():
         assert abs(thrust) <= (10.0 if V == 0.0 else 7.0) and abs(torque) <= 6.0
 
 
