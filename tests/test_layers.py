@@ -412,21 +412,14 @@ def test_a_planted_fault_is_found(
     assert f"{module}: {complaint}" in {re.sub(r":\d+: ", ": ", text) for text in after} - known
 
 
-@pytest.mark.parametrize(
-    ("package", "line", "complaint"),
-    [
-        (
-            "bemt.base",
-            "from bemt.app import cli",
-            "bemt.base.given:1: bemt.app.cli is not below it",
-        ),
-        (
-            "bemt.judge.proof",
-            "from bemt.physics.bem import solver",
-            "bemt.judge.proof.truth:1: must not see bemt.physics.bem.solver",
-        ),
-    ],
-)
+BROUGHT = [
+    ("bemt.base", "from bemt.app import cli", "bemt.base.given:1: bemt.app.cli is not below it"),
+    ("bemt.judge.proof", "from bemt.physics.bem import solver",
+     "bemt.judge.proof.truth:1: must not see bemt.physics.bem.solver"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("package", "line", "complaint"), BROUGHT)
 def test_what_a_package_brings_along_counts(tree: dict[str, str], package: str, line: str, complaint: str) -> None:
     assert complaint in set(violations({**tree, package: line})) - set(violations(tree))
 
