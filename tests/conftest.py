@@ -85,6 +85,7 @@ def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Mesh a rotor that is bit for bit one that was meshed before no second time; a command reads its case anew."""
     from bemt.tools.cfd.openfoam import write
     from bemt.tools.exports import printing
+    from geometry import export
     from geometry.mesh import build
 
     def once(rotor: Rotor, duct: Duct | None = None, options: Options | None = None) -> MeshModel:
@@ -93,8 +94,8 @@ def equal_solids_once(monkeypatch: pytest.MonkeyPatch) -> None:
             _SOLIDS[key] = build(rotor, duct, options)
         return _SOLIDS[key]
 
-    monkeypatch.setattr(write, "build", once)
-    monkeypatch.setattr(printing, "build", once)
+    for module in (write, printing, export):
+        monkeypatch.setattr(module, "build", once)
 
 
 @pytest.fixture(scope="session")

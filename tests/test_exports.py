@@ -41,6 +41,7 @@ from geometry.slicing import find_rotor
 NUMBERS = [word for word in target_ids() if word not in ("stl", "obj", "step", "flow", "openfoam")]
 LOADS = [word for word in NUMBERS if exports()[word].kind == "loads"]
 TABLES = ("jsbsim", "mujoco", "table", "fmu")
+ONE_SOLID = pytest.mark.usefixtures("equal_solids_once")
 
 
 @pytest.fixture(scope="module")
@@ -207,6 +208,7 @@ def test_a_target_that_cannot_hold_what_is_asked_is_refused(
         assert "duct" in capsys.readouterr().err
 
 
+@ONE_SOLID
 def test_a_refused_target_refuses_no_other(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case, out = str(project / "cases/prop_10x5"), tmp_path / "o"
     assert main(["export", case, "--out", str(out), "--format", "dfdc", "table", "su2-disk", "rotorpy"]) == 2
@@ -220,6 +222,7 @@ def test_a_refused_target_refuses_no_other(project: Path, tmp_path: Path, capsys
     assert sorted(path.name for path in (tmp_path / "p").iterdir()) == ["manifest.json", "table"]
 
 
+@ONE_SOLID
 def test_another_format_keeps_what_is_there_and_says_what_is_stale(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -613,6 +616,7 @@ def propeller() -> Rotor:
     return Rotor(helix(0.15, 0.1, anchors=naca4(0.04, 0.4, 0.12)), 3, -1)
 
 
+@ONE_SOLID
 def test_files_are_closed_named_and_state_their_unit(propeller: Rotor, tmp_path: Path) -> None:
     import trimesh
 
@@ -646,6 +650,7 @@ def test_files_are_closed_named_and_state_their_unit(propeller: Rotor, tmp_path:
     assert np.hypot(blade[:, 0], blade[:, 1]).max() == pytest.approx(0.075, rel=1e-6)
 
 
+@ONE_SOLID
 def test_metres_are_a_thousandth(propeller: Rotor, tmp_path: Path) -> None:
     for unit in ("mm", "m"):
         export(propeller, None, tmp_path / unit, ["stl"], name="p", unit=unit, options=COARSE)
@@ -738,6 +743,7 @@ def test_a_scan_becomes_a_new_case_with_its_unknowns(
     assert (out / "case.toml").read_bytes() == before
 
 
+@ONE_SOLID
 def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> None:
     try:
         import cadquery  # noqa: F401
@@ -759,6 +765,7 @@ def test_step_is_written_read_back_and_cut(propeller: Rotor, tmp_path: Path) -> 
     assert found.R == pytest.approx(0.075, rel=2e-4)
 
 
+@ONE_SOLID
 def test_the_unit_is_asked_for_not_guessed(
     propeller: Rotor, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -788,6 +795,7 @@ def test_a_broken_file_is_an_input_error(
     assert "expected" in capsys.readouterr().err
 
 
+@ONE_SOLID
 def test_export_command_prints_one_document(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "o"
     assert main(["export", str(project / "cases/prop_8x5"), "--out", str(out), "--format", "openfoam", "--json"]) == 0
@@ -815,6 +823,7 @@ def copies(project: Path, folder: Path, names: dict[str, str]) -> Path:
     return folder
 
 
+@ONE_SOLID
 def test_cases_of_one_name_are_refused_before_anything_is_written(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -872,6 +881,7 @@ def test_all_faults_of_the_options_are_told_at_once(
     assert not (tmp_path / "o").exists()
 
 
+@ONE_SOLID
 def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, tmp_path: Path) -> None:
     case = load_case(project / "cases" / "prop_8x5")
     mine = {"notes.txt": b"mine", "mine.obj": b"mine", "constant/triSurface/mine.stl": b"mine"}
@@ -907,6 +917,7 @@ def test_an_earlier_export_leaves_nothing_that_no_manifest_lists(project: Path, 
     assert edited.read_text() == "my own edit", "not what the manifest lists any more"
 
 
+@ONE_SOLID
 @pytest.mark.parametrize("schema", ["geometry.export/1", "another/1"])
 def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, schema: str) -> None:
     """A manifest is a file that anybody may have written."""
@@ -932,19 +943,9 @@ def test_a_manifest_removes_nothing_elsewhere(project: Path, tmp_path: Path, sch
         export_case(Job(case, solid=COARSE), out, ["stl"])
 
 
-def _script(name: str, project: Path):
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location(name, project / f"docs/{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_a_qprop_file_gives_its_loads_in_the_equations_of_qprop(project: Path) -> None:
     """Not our reader: the swirl, stall and drag of QPROP itself; near in flight, within its straight lift at rest."""
-    for _, _, V, thrust, torque in _script("qprop_equations", project).compared():
+    for _, _, V, thrust, torque in script(project, "qprop_equations").compared():
         assert abs(thrust) <= (10.0 if V == 0.0 else 7.0) and abs(torque) <= 6.0
 
 

@@ -15,7 +15,7 @@ from bemt.tools.flight.actions import fly
 from bemt.tools.flight.answer import answer_on
 from bemt.tools.flight.balance import DAY, SESSION, axes_of, features, healthy_flight
 from bemt.tools.flight.identify import identify
-from bemt.tools.flight.judge import judge
+from bemt.tools.flight.judge import judge, posterior
 from bemt.tools.flight.layout import LAYOUTS, layout_of, mixed
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.read import kind_of, read_log
@@ -170,9 +170,9 @@ def test_healthy_flights_of_other_days_are_accused_as_rarely_as_stated() -> None
         days = rng.normal(size=(4, 3)) * SESSION
         calm = [back @ (days[k // 3] + 0.006 * rng.normal(size=3)) for k in range(9)]
         x = back @ (days[3] + 0.006 * rng.normal(size=3))
-        known = judge(x, calm, layout, days=[k // 3 for k in range(9)], day=None)
+        known = posterior(x, np.array(calm), layout, days=[k // 3 for k in range(9)], day=None)
         hits += known.said.verdict in ("named", "class", "unknown")
-        open_hits += judge(x, calm[:3], layout, day="").said.verdict == "named"
+        open_hits += posterior(x, np.array(calm[:3]), layout, day="").said.verdict == "named"
     assert hits <= 6 and open_hits <= 6
 
 

@@ -27,21 +27,37 @@ DIAGNOSE = ["diagnose", "reports/diagnosis/cfd_plate.csv", "--reference", "repor
             "--case", "cases/prop_8x5", "--json"]  # fmt: skip
 
 
-def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """One command of the package in a folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "bemt", *words], cwd=folder, capture_output=True, text=True, timeout=600
-    )
+SESSION = """
+import io, json, runpy, sys
+from contextlib import redirect_stderr, redirect_stdout
+out = []
+for words in json.loads(sys.argv[1]):
+    sys.argv, code = ["bemt", *words], 0
+    with redirect_stdout(io.StringIO()) as said, redirect_stderr(io.StringIO()) as warned:
+        try:
+            runpy.run_module("bemt", run_name="__main__")
+        except SystemExit as stop:
+            code = stop.code or 0
+    out.append((code, said.getvalue(), warned.getvalue()))
+print(json.dumps(out))
+"""
 
 
-def without(tool: str, project: Path, folder: Path) -> Path:
-    """The package with its cases as links, one tool left out."""
-    tools = folder / "bemt" / "tools"
-    tools.mkdir(parents=True)
+def run(folder: Path, *commands: list[str]) -> list[tuple[int, str, str]]:
+    """Exit code, answer and errors of commands of the package in a folder, one after the other in a process."""
+    call = [sys.executable, "-c", SESSION, json.dumps(commands)]
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    return [(code, said, warned) for code, said, warned in json.loads(done.stdout)]
+
+
+def without(tools: set[str], project: Path, folder: Path) -> Path:
+    """The package with its cases as links, some tools left out."""
+    (folder / "bemt" / "tools").mkdir(parents=True)
     for source, target, left_out in (
         (project, folder, {"bemt"}),
         (project / "bemt", folder / "bemt", {"tools", "__pycache__"}),
-        (project / "bemt" / "tools", tools, {tool, "__pycache__"}),
+        (project / "bemt" / "tools", folder / "bemt" / "tools", {*tools, "__pycache__"}),
     ):
         for path in source.iterdir():
             if path.name not in left_out and not path.name.startswith("."):
@@ -49,18 +65,25 @@ def without(tool: str, project: Path, folder: Path) -> Path:
     return folder
 
 
-def answers(folder: Path) -> tuple[list[object], object, list[str]]:
-    """Rows of a sweep, the ranking of a diagnosis, the notes on tools."""
-    swept, told = (json.loads(run(folder, *words).stdout) for words in (SWEEP, DIAGNOSE))
-    notes = [note for case in swept["cases"] for note in case["notes"] if "not installed" in note]
-    assert swept["exit_code"] == 0 and told["schema"].startswith("bemt.diagnosis/")
-    return [case["rows"] for case in swept["cases"]], told["ranking"], notes
+def sentence(tool: str) -> str:
+    return f"The {tool} tool is not installed: put the folder bemt/tools/{tool} back"
+
+
+def rows_and_notes(swept: str) -> tuple[list[object], list[str]]:
+    """Rows of a sweep, and what it notes on tools."""
+    document = json.loads(swept)
+    assert document["exit_code"] == 0
+    notes = [note for case in document["cases"] for note in case["notes"] if "not installed" in note]
+    return [case["rows"] for case in document["cases"]], notes
 
 
 @pytest.fixture(scope="module")
-def whole(project: Path) -> tuple[list[object], object, list[str]]:
-    """The same with all tools."""
-    return answers(project)
+def whole(project: Path) -> tuple[list[object], object]:
+    """Rows and ranking with all tools."""
+    swept, told = run(project, SWEEP, DIAGNOSE)
+    rows, notes = rows_and_notes(swept[1])
+    assert not notes
+    return rows, json.loads(told[1])["ranking"]
 
 
 def test_each_tool_of_the_package_is_known(project: Path) -> None:
@@ -68,25 +91,43 @@ def test_each_tool_of_the_package_is_known(project: Path) -> None:
     assert folders == set(plugins.TOOLS) == set(CALLS)
 
 
-@pytest.mark.parametrize("tool", sorted(plugins.TOOLS))
-def test_the_rest_runs_on_without_a_tool(
-    tool: str, project: Path, tmp_path: Path, whole: tuple[list[object], object, list[str]]
+ALL = sorted(plugins.TOOLS)
+
+
+@pytest.mark.parametrize("tools", [ALL, *(pytest.param([one], marks=pytest.mark.slow) for one in ALL)], ids="-".join)
+def test_the_rest_runs_on_without_tools(
+    tools: list[str], project: Path, tmp_path: Path, whole: tuple[list[object], object]
 ) -> None:
-    folder = without(tool, project, tmp_path)
-    sentence = f"The {tool} tool is not installed: put the folder bemt/tools/{tool} back"
-    assert run(folder, "--help").returncode == 0
-    rows, ranking, notes = answers(folder)
-    assert (rows, ranking) == whole[:2] and whole[2] == []
-    assert len(notes) == (tool == "drive") and all(sentence in note for note in notes), "said where a case has a drive"
-    done = run(folder, "report", "cases/prop_8x5", "--out", "report")
-    assert done.returncode == 0 and (folder / "report" / "report.html").is_file(), done.stderr
-    done = run(folder, *CALLS[tool])
-    assert done.returncode == 2 and done.stderr.startswith(sentence) and len(done.stderr.splitlines()) == 1
+    """All at once, as a rule; each alone, when there is time."""
+    folder = without(set(tools), project, tmp_path)
+    report = ["report", "cases/prop_8x5", "--out", "report"]
+    assert run(folder, ["--help"])[0][0] == 0, "in a process that knows no other command"
+    swept, told, reported, *calls = run(folder, SWEEP, DIAGNOSE, report, *(CALLS[tool] for tool in tools))
+    rows, notes = rows_and_notes(swept[1])
+    assert (rows, json.loads(told[1])["ranking"]) == whole
+    assert len(notes) == ("drive" in tools), "said where a case has a drive"
+    assert all(sentence("drive") in note for note in notes)
+    assert reported[0] == 0 and (folder / "report" / "report.html").is_file(), reported[2]
+    for tool, (code, _, warned) in zip(tools, calls, strict=True):
+        assert code == 2 and warned.startswith(sentence(tool)) and len(warned.splitlines()) == 1
+
+
+@pytest.mark.parametrize("tool", ALL)
+def test_without_one_tool_a_sweep_goes_on_and_what_is_missed_is_named(
+    tool: str, project: Path, tmp_path: Path, whole: tuple[list[object], object]
+) -> None:
+    folder = without({tool}, project, tmp_path)
+    helped, missed, swept = run(folder, ["--help"], CALLS[tool], SWEEP[:1] + SWEEP[2:])
+    assert helped[0] == 0
+    assert missed[0] == 2 and missed[2].startswith(sentence(tool)) and len(missed[2].splitlines()) == 1
+    rows, notes = rows_and_notes(swept[1])
+    assert rows == whole[0][1:] and len(notes) == (tool == "drive") and all(sentence("drive") in n for n in notes)
 
 
 def test_a_target_of_another_tool_is_missed_by_name(project: Path, tmp_path: Path) -> None:
-    folder = without("cfd", project, tmp_path)
-    done = run(folder, "export", "cases/prop_8x5", "--out", "out", "--format", "openfoam")
-    assert done.returncode == 2 and "The cfd tool is not installed" in done.stderr
-    done = run(folder, "export", "cases/prop_8x5", "--out", "out", "--format", "qprop", "--level", "5")
-    assert done.returncode == 2 and "--level: got 5; expected nothing with the format qprop" in done.stderr
+    export = ["export", "cases/prop_8x5", "--out", "out", "--format"]
+    (code, _, foam), (other, _, level) = run(
+        without({"cfd"}, project, tmp_path), [*export, "openfoam"], [*export, "qprop", "--level", "5"]
+    )
+    assert (code, other) == (2, 2) and "The cfd tool is not installed" in foam
+    assert "--level: got 5; expected nothing with the format qprop" in level

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -287,6 +288,13 @@ def law_of(effect: Effect | type[Effect], solved: bool = True) -> tuple[str, ...
     return ("J",) if effect.inviscid else tuple(_FLOW)
 
 
+@lru_cache(maxsize=64)
+def _modes(points: int, axes: tuple[tuple[bytes, float], ...]) -> Array:
+    """Modes over coordinates, given as bytes with their length scales: every cause and form asks for the same few."""
+    kernel = smooth(*((np.frombuffer(x), length) for x, length in axes)) if axes else np.ones((points, points))
+    return modes(kernel, 0.02)
+
+
 def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[str] = tuple(_FLOW)) -> Array:
     """Modes of a smooth function of unit variance, each channel for itself, (M, q) [1]."""
     axes = []
@@ -294,8 +302,7 @@ def smooth_modes(problem: Problem, besides: Sequence[str] = (), flow: Sequence[s
         if name in (*flow, *besides) and name in problem.covariates:
             x = problem.covariates[name]
             x = np.log(x) if name in _LOGARITHMIC else x
-            axes.append((x, _FORM_LENGTH * max(float(np.ptp(x)), least)))
-    P = problem.covariates["rpm"].size
-    found = modes(smooth(*axes) if axes else np.ones((P, P)), 0.02)[problem.point]
+            axes.append((np.asarray(x, dtype=float).tobytes(), _FORM_LENGTH * max(float(np.ptp(x)), least)))
+    found = _modes(problem.covariates["rpm"].size, tuple(axes))[problem.point]
     channels = np.unique(problem.channel)
     return np.concatenate([np.where((problem.channel == c)[:, None], found, 0.0) for c in channels], axis=1)
