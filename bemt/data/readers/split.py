@@ -311,34 +311,40 @@ def _without_ends(
     return kept
 
 
+def _used_lines(source: SourceText, lines: Sequence[str]) -> tuple[list[tuple[int, str]], list[str]]:
+    """Lines of a table with their numbers, without comments and empty ones, and notes on these; none is refused."""
+    text = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
+    used = [(i, t) for i, t in text if t.strip(" \t;,|")]
+    if not used:
+        source.refuse("", "no data", "a heading line and rows of numbers")
+    longest = max(used, key=lambda line: len(line[1]))
+    if len(longest[1]) > LONGEST:
+        source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
+    comments, bare = sum(map(is_comment, lines)), [i for i, t in text if not t.strip(" \t;,|")]
+    notes = [f"{comments} comment lines left out"] if comments else []
+    return used, notes + (
+        [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    )
+
+
 def split_table(
     source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
 ) -> SplitTable:
     """Split a file into rows of equal length; refused where more lines than a share of them have another length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
-    comments = sum(map(is_comment, lines))
-    bare = [i for i, t in used if not t.strip(" \t;,|")]
-    used = [(i, t) for i, t in used if t.strip(" \t;,|")]
-    if not used:
-        source.refuse("", "no data", "a heading line and rows of numbers")
-    if (longest := max(used, key=lambda line: len(line[1]))) and len(longest[1]) > LONGEST:
-        source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
-    notes = [f"{comments} comment lines left out"] if comments else []
-    notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    used, notes = _used_lines(source, lines)
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
     labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
-    if start:
+    if start and not _EXCEL.fullmatch(used[0][1]):
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
-        notes += (
-            [] if _EXCEL.fullmatch(used[0][1]) else [f"{number_of(start, 'line')} above the headings left out: {above}"]
-        )
-        used = used[start:]
+        notes.append(f"{number_of(start, 'line')} above the headings left out: {above}")
+    used = used[start:]
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
-        notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
+        comments = sum(map(is_comment, lines)) - 1
+        notes[:1] = [f"{comments} comment lines left out"] if comments else []
         notes.append(f"the headings are the comment in line {said[0]}")
     top, first = split[0]
     if header is None:
