@@ -14,9 +14,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Any
 
-from bemt.base.foam_text import dictionary, vector
+from bemt.base.foam_text import Entries, dictionary, vector
 from bemt.tools.cfd.openfoam.settings import PIPE_RADIUS, Settings
 
 SURFACE_LEVEL = 6
@@ -222,13 +221,13 @@ def lines(s: Settings) -> str:
     return points + rows
 
 
-def _cylinder(low: float, high: float, radius: float) -> dict[str, Any]:
+def _cylinder(low: float, high: float, radius: float) -> dict[str, object]:
     return {"type": "searchableCylinder", "point1": vector(0, 0, low), "point2": vector(0, 0, high), "radius": radius}
 
 
-def _tips(s: Settings) -> dict[str, dict[str, Any]]:
+def _tips(s: Settings) -> dict[str, Entries]:
     """Boxes round the clearance of every blade in the domain."""
-    out = {}
+    out: dict[str, Entries] = {}
     inside = s.B // s.sectors
     depth = max(s.gap, 0.01 * s.R)
     wide = 2 * s.R * math.sin(min(s.blades.tip_half_angle + 0.02, 1.2))
@@ -249,7 +248,7 @@ def _tips(s: Settings) -> dict[str, dict[str, Any]]:
 def snappy(s: Settings) -> str:
     """Write ``snappyHexMeshDict``."""
     R, cell = s.R, s.base_cell
-    geometry: dict[str, Any] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
+    geometry: dict[str, object] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
     thick = 0.12 * R
     if s.plate_z is not None:
         geometry["plate"] = _cylinder(s.plate_z - thick, s.plate_z, s.plate_radius)
@@ -312,7 +311,7 @@ def topo_set(s: Settings) -> str:
     """Write ``topoSetDict``: the cells that turn."""
     radius, low, high = mrf_zone(s)
     where = {"p1": vector(0, 0, low), "p2": vector(0, 0, high), "radius": radius}
-    actions: list[dict[str, Any]] = [
+    actions: list[Entries] = [
         {"name": "turning", "type": "cellSet", "action": "new", "source": "cylinderToCell", **where},
         {"name": "turning", "type": "cellZoneSet", "action": "new", "source": "setToCellZone", "set": "turning"},
     ]
