@@ -97,30 +97,11 @@ def read_cfd_post_csv(path: str | os.PathLike[str]) -> Dataset:
     lines = [(k, text) for k, text in lines if not text.startswith("#")]
     if lines and _lists_expressions([text for _, text in lines[:2]]):
         return _expressions(source, lines)
-    data: list[tuple[str, list[ExportRow]]] = []
-    section, name = "", ""
-    skipped: set[str] = set()
-    mark = ","
-    for line, text in lines:
-        match = _SECTION.fullmatch(text.rstrip(",;"))
-        if match and match[1] in ("Name", "Data", "Lines", "Faces", "Spatial Fields", "Parameters"):
-            section = match[1]
-            if section == "Data":
-                data.append((name or "data", []))
-        elif section == "Name":
-            name = text.rstrip(",;")
-        elif section == "Data":
-            if not data[-1][1]:
-                mark = ";" if ";" in text else "\t" if "\t" in text and "," not in text else ","
-            data[-1][1].append(ExportRow(line, cells_of(text, mark)))
-        elif section:
-            skipped.add(section)
-        else:
-            source.refuse(line, repr(text[:60]), "[Name] or [Data]", "Is the head cut?")
+    data, skipped = _data_blocks(source, lines)
     if not any(rows for _, rows in data):
         source.refuse("", "no data", "a section [Data] with headings and rows")
     notes = [f"section {', '.join(sorted(skipped))} not read"] if skipped else []
-    records = [(block, _block(source, rows, mark != ",")) for block, rows in data if rows]
+    records = [(block, _block(source, rows)) for block, rows in data if rows]
     if len(records) == 1:
         block, record = records[0]
         return replace(record, provenance={**record.provenance, "name": block}, notes=(*notes, *record.notes))
@@ -153,13 +134,39 @@ def _expressions(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
     return dataset(CFD_POST_CSV, "cfd", channels, no_units(columns), {**source.about, "clock": "none"})
 
 
-def _block(source: SourceText, rows: list[ExportRow], commas: bool) -> Dataset:
+def _data_blocks(
+    source: SourceText, lines: list[tuple[int, str]]
+) -> tuple[list[tuple[str, list[tuple[int, str]]]], set[str]]:
+    """Lines of each section [Data], under the name of the section [Name] before it; sections that are not read."""
+    data: list[tuple[str, list[tuple[int, str]]]] = []
+    section, name = "", ""
+    skipped: set[str] = set()
+    for line, text in lines:
+        match = _SECTION.fullmatch(text.rstrip(",;"))
+        if match and match[1] in ("Name", "Data", "Lines", "Faces", "Spatial Fields", "Parameters"):
+            section = match[1]
+            data += [(name or "data", [])] if section == "Data" else []
+        elif section == "Name":
+            name = text.rstrip(",;")
+        elif section == "Data":
+            data[-1][1].append((line, text))
+        elif section:
+            skipped.add(section)
+        else:
+            source.refuse(line, repr(text[:60]), "[Name] or [Data]", "Is the head cut?")
+    return data, skipped
+
+
+def _block(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
+    head = lines[0][1]
+    mark = ";" if ";" in head else "\t" if "\t" in head and "," not in head else ","
+    rows = [ExportRow(line, cells_of(text, mark)) for line, text in lines]
     columns = [_heading(cell) for cell in rows[0].cells]
     if all(re.fullmatch(r"[-+.\deE]+", cell) for cell in rows[0].cells):
         got = f"numbers ({', '.join(rows[0].cells[:4])})"
         source.refuse(rows[0].line, got, "headings such as X [ m ]", "Is the head cut?")
     body = [row for row in rows[1:] if row.cells != rows[0].cells]
-    table = numeric_table(source, columns, body, commas=commas)
+    table = numeric_table(source, columns, body, commas=mark != ",")
     notes = [f"headings repeated {len(rows) - 1 - len(body)} times"] if len(body) < len(rows) - 1 else []
     build = history if columns[0].role == "time" else fields
     return build(CFD_POST_CSV, source, columns, table, [*notes, *no_units(columns)])

@@ -187,7 +187,6 @@ def numeric_table(
     source: SourceText, columns: Sequence[Column], rows: Sequence[ExportRow], commas: bool = True
 ) -> ExportTable:
     """Turn the cells of a table into numbers, by its header."""
-    width = len(columns)
     warnings: list[str] = []
     cut = _maybe_cut(source, rows)
     if cut and len(rows) > 1:
@@ -195,39 +194,21 @@ def numeric_table(
         rows = rows[:-1]
     elif cut:
         warnings.append(f"line {rows[-1].line}: the only row has no line end and may be cut")
-    has_comma = commas and any(_COMMA.fullmatch(cell) for row in rows for cell in row.cells)
-    has_point = has_comma and any("." in cell and _value(cell, False) is not None for row in rows for cell in row.cells)
-    comma = has_comma and not has_point
+    comma = commas and _decimal_commas(rows)
     good: dict[int, list[float]] = {}
     bad: list[Fault] = []
-    widths: Counter[int] = Counter()
-    for k, row in enumerate(rows):
+    for row in rows:
         values = [_value(cell, comma) for cell in row.cells]
-        if len(values) == width and None not in values:
+        if len(values) == len(columns) and None not in values:
             good[row.line] = [v for v in values if v is not None]
             continue
-        if len(values) != width:
-            widths[len(values)] += 1
-            names = ", ".join(column.name for column in columns[:8])
-            fault = source.fault(row.line, number_of(len(values), "column"), f"{width} as in the header ({names})")
-        else:
-            at = values.index(None)
-            fault = source.fault(f"{row.line}:{at + 1}", repr(row.cells[at][:40]), "a number")
-        if k == len(rows) - 1 and len(rows) > 1 and not cut:
+        fault = _misfit(source, columns, row, values)
+        if row is rows[-1] and len(rows) > 1 and not cut:
             warnings.append(f"line {row.line}: last row is cut or damaged ({fault.got}); left out")
         else:
             bad.append(fault)
     if not good or len(bad) > max(2, 0.05 * len(rows)):
-        if not bad:
-            bad.append(source.fault("", "no rows of numbers", "one row or more", "Is the file cut?"))
-        if widths and widths.most_common(1)[0][1] > 0.5 * len(rows):
-            got = f"rows of {widths.most_common(1)[0][0]} columns"
-            hint = "A column was dropped or added; export the file again"
-            source.refuse(rows[0].line, got, f"{width} as in the header", hint)
-        source.faults += bad[:5]
-        if len(bad) > 5:
-            source.add("", f"{len(bad) - 5} more damaged rows", "rows as in the header")
-        source.check()
+        _refuse_rows(source, columns, rows, bad)
     warnings += [f"line {f.where}: got {f.got}, expected {f.expected}; row left out" for f in bad[:10]]
     if len(bad) > 10:
         warnings.append(f"{len(bad) - 10} more damaged rows left out")
@@ -238,6 +219,35 @@ def numeric_table(
         if missing:
             warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
     return ExportTable(array, tuple(good), tuple(warnings))
+
+
+def _decimal_commas(rows: Sequence[ExportRow]) -> bool:
+    """Whether numbers of a table have decimal commas, and none a point."""
+    if not any(_COMMA.fullmatch(cell) for row in rows for cell in row.cells):
+        return False
+    return not any("." in cell and _value(cell, False) is not None for row in rows for cell in row.cells)
+
+
+def _misfit(source: SourceText, columns: Sequence[Column], row: ExportRow, values: list[float | None]) -> Fault:
+    """What is wrong with a row: it has too many or few cells, or one that is no number."""
+    if len(values) != len(columns):
+        names = ", ".join(column.name for column in columns[:8])
+        return source.fault(row.line, number_of(len(values), "column"), f"{len(columns)} as in the header ({names})")
+    at = values.index(None)
+    return source.fault(f"{row.line}:{at + 1}", repr(row.cells[at][:40]), "a number")
+
+
+def _refuse_rows(source: SourceText, columns: Sequence[Column], rows: Sequence[ExportRow], bad: list[Fault]) -> None:
+    """Refuse a table most of whose rows have one other width, or that has no good rows or too many bad ones."""
+    widths = Counter(len(row.cells) for row in rows if len(row.cells) != len(columns))
+    most, often = widths.most_common(1)[0] if widths else (0, 0)
+    if often > 0.5 * len(rows):
+        hint = "A column was dropped or added; export the file again"
+        source.refuse(rows[0].line, f"rows of {most} columns", f"{len(columns)} as in the header", hint)
+    source.faults += bad[:5] or [source.fault("", "no rows of numbers", "one row or more", "Is the file cut?")]
+    if len(bad) > 5:
+        source.add("", f"{len(bad) - 5} more damaged rows", "rows as in the header")
+    source.check()
 
 
 def _spikes(column: Column, values: Array) -> list[str]:

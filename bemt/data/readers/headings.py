@@ -96,6 +96,7 @@ _AROUND = {
     "umgebung", "umgebungstemperatur", "umgebungsdruck", "raumtemperatur", "ambiante", "ambiente",
 }  # fmt: skip
 """Words that make a temperature, pressure, humidity or density that of the air around the rotor."""
+_ELECTRICAL = re.compile(r"(?=.*rpm).*[(\[]\s*(erpm|electrical)\s*[)\]]\s*", re.IGNORECASE)
 _SEA_LEVEL = "a pressure reduced to sea level: give that of the station (QFE)"
 
 
@@ -146,10 +147,14 @@ def in_usual_unit(text: str, base: str, unit: str) -> Heading:
     goes = unit_for(found.unit.dimension, said[1].strip())
     if goes is None:
         return replace(found, unit=None, doubt=f"{said[1].strip()!r} is no unit of it")
-    made = goes[0]
-    if made.dimension == "angular_speed" and made.suffix != "rpm":
-        made = units.Unit("", "angular_speed", made.factor / units.RPM)
-    return replace(found, unit=made)
+    return replace(found, unit=_in_rpm(goes[0]))
+
+
+def _in_rpm(unit: units.Unit) -> units.Unit:
+    """Unit of a speed of rotation that gives rev/min; any other as it is."""
+    if unit.dimension != "angular_speed" or unit.suffix == "rpm":
+        return unit
+    return units.Unit("", "angular_speed", unit.factor / units.RPM)
 
 
 def _channel(base: str, unit: units.Unit) -> str:
@@ -253,29 +258,34 @@ def heading(text: str) -> Heading:
     uncertainty = text.startswith("u_") and _by_words(text[2:]) is not None  # u_inf is none
     if not uncertainty and (by_words := _by_words(text)) is not None:
         return by_words
-    unit = WEIGHTS.get(parts[2]) if parts else None
-    if parts and unit and _THRUSTS.fullmatch(plain(parts[1])):
-        found = heading(f"{parts[1]} ({unit})")
-        told = f"{text!r} is read as {FORCES[unit]}: 1 {parts[2]} weighs {units.UNITS[unit].factor:.4g} N"
-        return replace(found, text=text, told=told)
-    if parts and parts[2] in ("Hz", "1/s") and (said := _spoken(parts[1])[1]) & _TURNS and "electrical" not in said:
-        turns = units.Unit("", "angular_speed", 60.0)
-        return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
-    if parts and re.fullmatch(r"[gG]/W", parts[2]):
-        return replace(_heading(f"{parts[1]} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
-    if parts and (qualified := _QUALIFIED.fullmatch(plain(parts[1]))):
-        name = next(word for word in qualified.groups() if word)
-        unit = weight_of(parts[2]) if name == "torque" else ""
-        found = _heading(f"{name} ({unit or parts[2]})")
-        if found.unit is not None and unit:
-            told = f"{text!r} is read as {unit.replace(' ', ' times ')}: a weight, as stands mean it"
-            return replace(found, text=text, told=told)
-        if found.unit is not None:
-            return replace(found, text=text)
+    if parts and (as_stands := _as_stands_mean(text, parts[1], parts[2])) is not None:
+        return as_stands
     found = _heading(text)
     if found.unit is None and not found.doubt and not text.isascii() and quantities(words := english(text)):
         return replace(found, name=slug(" ".join(dict.fromkeys(words))))
     return found
+
+
+def _as_stands_mean(text: str, base: str, stated: str) -> Heading | None:
+    """Heading with a unit as stands mean it: a mass for its weight, hertz for turns; None: any other."""
+    unit = WEIGHTS.get(stated)
+    if unit and _THRUSTS.fullmatch(plain(base)):
+        told = f"{text!r} is read as {FORCES[unit]}: 1 {stated} weighs {units.UNITS[unit].factor:.4g} N"
+        return replace(heading(f"{base} ({unit})"), text=text, told=told)
+    if stated in ("Hz", "1/s") and (said := _spoken(base)[1]) & _TURNS and "electrical" not in said:
+        turns = units.Unit("", "angular_speed", 60.0)
+        return Heading(text, "rpm", turns, told=f"{text!r} is read as revolutions per second")
+    if stated in ("g/W", "G/W"):
+        return replace(_heading(f"{base} (gf/W)"), text=text, told=f"{text!r} is read as gf/W")
+    if not (qualified := _QUALIFIED.fullmatch(plain(base))):
+        return None
+    name = next(word for word in qualified.groups() if word)
+    weight = weight_of(stated) if name == "torque" else ""
+    found = _heading(f"{name} ({weight or stated})")
+    told = (
+        f"{text!r} is read as {weight.replace(' ', ' times ')}: a weight, as stands mean it" if weight else found.told
+    )
+    return None if found.unit is None else replace(found, text=text, told=told)
 
 
 @lru_cache(maxsize=4096)
@@ -333,8 +343,7 @@ def _by_words(text: str) -> Heading | None:
                 if made.suffix == "rad_s":  # an angular speed is the reduction's to convert
                     turns = units.Unit("", "angular_speed", 1.0 / units.RPM)
                     return Heading(text, "rpm", turns) if words == ["rotation", "speed"] else None
-                made = made if made.suffix == "rpm" else units.Unit("", "angular_speed", made.factor / units.RPM)
-                return Heading(text, "rpm", made)
+                return Heading(text, "rpm", _in_rpm(made))
             return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
 
@@ -374,6 +383,29 @@ def _of_the_air(base: str, unit: units.Unit) -> str:
     return ""
 
 
+def _name_and_unit(text: str) -> tuple[str, units.Unit | None, str]:
+    """Name, unit and doubt of a heading, from its brackets if they hold a unit."""
+    found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
+    stated = unit_of(found[2]) if found else ""
+    if not found or stated == "":
+        return _without_brackets(re.split(r"[(\[=]", text)[0].strip(), text)
+    return (found[1], stated, "") if isinstance(stated, units.Unit) else (found[1], None, f"{found[2]!r} is {stated}")
+
+
+def _by_suffix(core: str, text: str) -> tuple[str, units.Unit | None, str] | None:
+    """Name, unit and doubt of a heading that ends in the suffix of a unit; None without one."""
+    name, suffix = units.split_suffix(core)
+    if suffix is None:
+        return None
+    mass = suffix.dimension == "mass"
+    goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
+    if goes is not None and not mass and suffix.dimension not in goes:
+        return text, None, f"{suffix.suffix!r} does not go with {name}"
+    if mass and not re.search(r"weight|mass", name, re.IGNORECASE):
+        return text, None, f"{suffix.suffix!r} is {TWO_MEANINGS[suffix.suffix]}"
+    return (name, suffix, "") if name or mass else None
+
+
 def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str]:
     """Name, unit and doubt of a heading that has no unit in brackets."""
     if alone := _ALONE.get(core.lower()):
@@ -381,49 +413,36 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
     if (ending := _tail(core)) is not None:
         name, stated = ending
         return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)
-    name, suffix = units.split_suffix(core)
-    goes = _GOES.get(name.split("_")[-1].lower() if len(name) > 1 else name)
     if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
         return core, units.UNITS["rpm"], ""
-    if suffix is not None and goes is not None and suffix.dimension not in (*goes, "mass"):
-        return text, None, f"{suffix.suffix!r} does not go with {name}"
-    if suffix is not None and suffix.dimension == "mass" and not re.search(r"weight|mass", name, re.IGNORECASE):
-        return text, None, f"{suffix.suffix!r} is {TWO_MEANINGS[suffix.suffix]}"
-    if suffix is not None and (name or suffix.dimension == "mass"):
-        return name, suffix, ""
-    pure = units.Unit("", "none", 1.0)
-    if _PURE.fullmatch(core) and ("rotor convention" not in text or core.endswith("_rotor")):
+    if (by_suffix := _by_suffix(core, text)) is not None:
+        return by_suffix
+    rotor, pure = "rotor convention" in text, units.Unit("", "none", 1.0)
+    if rotor and core in ("CT", "CP", "CQ"):
+        return f"{core}_rotor", pure, ""
+    if _PURE.fullmatch(core) and (not rotor or core.endswith("_rotor")):
         return _PURE_NAMES.get(core, core), pure, ""
     if re.fullmatch(r"\w+/[NAVWKCF]", core):
         return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
-    if "rotor convention" in text and core in ("CT", "CP", "CQ"):
-        return f"{core}_rotor", pure, ""
     if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
         return core, units.UNITS["rpm"], ""
-    return text, None, ""
+    return ("rpm", units.UNITS["rpm"], "") if unit_of(core) == units.UNITS["rpm"] else (text, None, "")  # U/min, 1/min
+
+
+def _small(first: str, text: str) -> str:
+    """Text with a small letter where a word as in `first` begins."""
+    return re.sub(first, lambda word: word[0].lower(), text)
 
 
 def _heading(text: str) -> Heading:
     if either := _either(text):
         return Heading(text, slug(text), None, either)
-    base, unit, doubt = text, None, ""
-    found = re.fullmatch(r"(.*?)\s*[\(\[]\s*([^()\[\]]*?)\s*[\)\]]\s*", text)
-    if found:
-        stated = unit_of(found[2])
-        if isinstance(stated, units.Unit):
-            base, unit = found[1], stated
-        elif stated:
-            base, doubt = found[1], f"{found[2]!r} is {stated}"
-    core = re.split(r"[(\[=]", base)[0].strip() if unit is None and not doubt else base
-    if found and (found[2].strip().lower() in ("erpm", "electrical") and "rpm" in text.lower()):
+    if _ELECTRICAL.fullmatch(text):
         return Heading(text, "electrical_rpm", units.UNITS["rpm"])
-    if unit is None and not doubt:
-        base, unit, doubt = _without_brackets(core, text)
+    base, unit, doubt = _name_and_unit(text)
     word = _WORDS.get(base.lower().replace("_", " "))
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):
-        unit, doubt = units.Unit("m_s2", "acceleration", units.G0), ""
-    if unit is None and not doubt and unit_of(core) == units.UNITS["rpm"]:
-        base, unit = "rpm", units.UNITS["rpm"]  # U/min, 1/min
+        unit = units.Unit("m_s2", "acceleration", units.G0)
     if unit is None:
         return Heading(text, slug(text) or "column", None, doubt)
     if around := _of_the_air(base, unit):
@@ -433,13 +452,9 @@ def _heading(text: str) -> Heading:
     if unit.offset and base.startswith("u_"):  # an uncertainty in Celsius is one in kelvin
         unit = units.Unit(unit.suffix, unit.dimension, unit.factor)
     if word and word[1] == unit.dimension:
-        base = word[0]
-        if unit.dimension == "angular_speed" and unit.suffix != "rpm":
-            unit = units.Unit("", "angular_speed", unit.factor / units.RPM)
+        base, unit = word[0], _in_rpm(unit)
     if unit.dimension == "angular_speed" and unit.suffix in ("rpm", ""):
-        flat = re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE)
-        flat = re.sub(r"^[A-Z][a-z]{2,}$", lambda word: word[0].lower(), flat)
+        flat = _small(r"^[A-Z][a-z]{2,}$", re.sub(r"^(speed|n)$|_?rpm_?", "", slug(base), flags=re.IGNORECASE))
         flat = "electrical" if flat.lower() == "e" else flat
         return Heading(text, f"{flat}_rpm" if flat else "rpm", unit)
-    base = re.sub(r"\b[A-Z][a-z]{2,}", lambda word: word[0].lower(), base)
-    return Heading(text, _channel(slug(base), unit), unit)
+    return Heading(text, _channel(slug(_small(r"\b[A-Z][a-z]{2,}", base)), unit), unit)

@@ -174,6 +174,13 @@ def find_delimiter(lines: Sequence[str]) -> str:
     return max(usual, key=lambda mark: all(mark in t for t in plain), default=" ")
 
 
+def _heads(names: Sequence[str], rows: Iterable[Sequence[str]]) -> bool:
+    """Whether cells are the headings of rows with numbers that are as long."""
+    if any(number(c) is not None for c in names) or sum(map(bool, names)) < max(2, len(names) - 1) or _is_units(names):
+        return False
+    return all(len(cells) == len(names) and any(number(c) is not None for c in cells) for cells in rows)
+
+
 def find_start(lines: Sequence[str]) -> tuple[int, str]:
     """Line of the headings and delimiter of a table that may have lines of text above it.
 
@@ -193,14 +200,10 @@ def find_start(lines: Sequence[str]) -> tuple[int, str]:
         mark = find_delimiter(lines[start : start + 3])
         if mark == " ":
             continue
-        above = [split_line(line, mark) for line in lines[:start]]
-        names, *body = ([c for c in split_line(line, mark)] for line in lines[start : start + 3])
-        width = len(names)
-        if any(len(cells) >= width for cells in above):
+        names, *body = (split_line(line, mark) for line in lines[start : start + 3])
+        if any(len(split_line(line, mark)) >= len(names) for line in lines[:start]):
             break
-        said = not any(number(c) is not None for c in names) and sum(map(bool, names)) >= max(2, width - 1)
-        rows = all(len(cells) == width and any(number(c) is not None for c in cells) for cells in body)
-        if said and rows and not _is_units(names):
+        if _heads(names, body):
             return start, mark
     usual = find_delimiter(lines[:5])
     return _below_a_block(lines, usual) or (0, usual)
@@ -230,28 +233,28 @@ def _named(cells: Sequence[str]) -> float:
     return sum(bool(quantities(english(re.split(r"[(\[]", cell)[0]))) for cell in full) / max(len(full), 1)
 
 
+def _headings_above(split: Sequence[Sequence[str]], first: int, wide: float) -> list[int]:
+    """Lines of words right above a row that are as wide: four at most, from the first that names quantities."""
+    top = first
+    while top and first - top < 4 and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])):
+        top -= 1
+    told = [k for k in range(top, first) if not _is_units(split[k])]
+    while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
+        del told[0]
+    return told
+
+
 def _below_a_block(lines: Sequence[str], usual: str) -> tuple[int, str] | None:
     """Headings right above the first two rows of numbers, below titles as wide as the table; None: as usual."""
     for mark in dict.fromkeys((usual, *DELIMITERS, " ")):
         split = [split_line(line, mark) for line in lines]
-        if mark == " ":
-            rows = [_is_row(cells) for cells in split]
-            split = [
-                cells if row else re.split(r"\s{2,}", line.strip())
-                for cells, row, line in zip(split, rows, lines, strict=True)
-            ]
+        if mark == " ":  # headings of several words
+            split = [c if _is_row(c) else re.split(r"\s{2,}", t.strip()) for c, t in zip(split, lines, strict=True)]
         first = next((k for k in range(len(split) - 1) if _is_row(split[k]) and _is_row(split[k + 1])), 0)
         if not first:
             continue
         wide = max(2.0, 0.6 * sum(map(bool, split[first])))
-        top = first
-        while (
-            top and sum(map(bool, split[top - 1])) >= wide and not any(map(_reads, split[top - 1])) and first - top < 4
-        ):
-            top -= 1
-        told = [k for k in range(top, first) if not _is_units(split[k])]
-        while len(told) > 1 and _named(split[told[0]]) < 0.5 <= max(_named(split[k]) for k in told[1:]):
-            del told[0]
+        told = _headings_above(split, first, wide)
         whole = told and all(len(split[k]) >= len(split[first]) for k in told)  # a cut line of headings is none
         if whole and not any(_is_row(row) and sum(map(bool, row)) >= wide for row in split[: told[0]]):
             return told[0], mark
@@ -311,43 +314,47 @@ def _without_ends(
     return kept
 
 
+def _used_lines(source: SourceText, lines: Sequence[str]) -> tuple[list[tuple[int, str]], list[str]]:
+    """Lines of a table with their numbers, without comments and empty ones, and notes on these; none is refused."""
+    text = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
+    used = [(i, t) for i, t in text if t.strip(" \t;,|")]
+    if not used:
+        source.refuse("", "no data", "a heading line and rows of numbers")
+    longest = max(used, key=lambda line: len(line[1]))
+    if len(longest[1]) > LONGEST:
+        source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
+    comments, bare = sum(map(is_comment, lines)), [i for i, t in text if not t.strip(" \t;,|")]
+    notes = [f"{comments} comment lines left out"] if comments else []
+    return used, notes + (
+        [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    )
+
+
 def split_table(
     source: SourceText, delimiter: str | None = None, header: bool | None = None, most_misfits: float = MISFIT_SHARE
 ) -> SplitTable:
     """Split a file into rows of equal length; refused where more lines than a share of them have another length."""
     lines = source.text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    used = [(i, t) for i, t in enumerate(lines, 1) if t.strip() and not is_comment(t)]
-    comments = sum(map(is_comment, lines))
-    bare = [i for i, t in used if not t.strip(" \t;,|")]
-    used = [(i, t) for i, t in used if t.strip(" \t;,|")]
-    if not used:
-        source.refuse("", "no data", "a heading line and rows of numbers")
-    if (longest := max(used, key=lambda line: len(line[1]))) and len(longest[1]) > LONGEST:
-        source.refuse(longest[0], f"a line of {len(longest[1])} characters", f"a table of lines of at most {LONGEST}")
-    notes = [f"{comments} comment lines left out"] if comments else []
-    notes += [f"{number_of(len(bare), 'line')} of empty cells left out (line {some(bare)})"] if bare else []
+    used, notes = _used_lines(source, lines)
     start, mark = find_start([t for _, t in used[:60]]) if delimiter is None and header is not False else (0, delimiter)
     mark = mark or find_delimiter([t for _, t in used[:5]])
     labview = next((split_line(t, mark) for _, t in used[:start] if t.startswith("Y_Unit_Label")), [])
-    if start:
+    if start and not _EXCEL.fullmatch(used[0][1]):
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
-        notes += (
-            [] if _EXCEL.fullmatch(used[0][1]) else [f"{number_of(start, 'line')} above the headings left out: {above}"]
-        )
-        used = used[start:]
+        notes.append(f"{number_of(start, 'line')} above the headings left out: {above}")
+    used = used[start:]
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
-        notes[:1] = [f"{comments - 1} comment lines left out"] if comments > 1 else []
+        comments = sum(map(is_comment, lines)) - 1
+        notes[:1] = [f"{comments} comment lines left out"] if comments else []
         notes.append(f"the headings are the comment in line {said[0]}")
     top, first = split[0]
     if header is None:
         header = not any(number(c) is not None for c in first)
     if header and len(split) > 1 and top == used[0][0]:
         first = heading_cells(used[0][1], mark, len(split[1][1]))
-    if labview:  # units of the channels, which stand behind the time
-        first = _with_units(first, [*["s"][: len(first)], *labview[1:]])
-        first[0] = first[0].replace("X_Value", "Time")
+    first = _of_labview(first, labview)
     closed = not lines[-1]
     names, body = _below(first, split, closed, notes) if header else ([], split)
     width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
@@ -359,6 +366,14 @@ def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:
     """Headings with the units that another line has for them."""
     filled = [*units_, *[""] * len(names)]
     return [f"{name} ({unit})" if unit else name for name, unit in zip(names, filled, strict=False)]
+
+
+def _of_labview(names: list[str], labels: Sequence[str]) -> list[str]:
+    """Headings with the units of the channels, which stand behind the time; as they are without such a line."""
+    if not labels:
+        return names
+    first, *others = _with_units(names, [*["s"][: len(names)], *labels[1:]])
+    return [first.replace("X_Value", "Time"), *others]
 
 
 def _below(

@@ -16,7 +16,6 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault
-from bemt.base.units import Unit
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
 from bemt.data.readers.headings import channel_of, may_be_shaft_speed, meanings
@@ -29,7 +28,10 @@ DUCT = re.compile(r"duct|shroud|nozzle|nacelle|casing|housing|\bring\b|\blip\b|k
 _NET = ("net", "total", "")
 _FORCE = re.compile(r"force_total(?:_([xyz]))?(?:_N)?( along .*)?|C(?:F)([xyz])")
 _MOMENT = re.compile(r"moment_total(?:_([xyz]))?(?:_Nm)?( along .*)?|C(?:M)([xyz])")
-_PART = re.compile(r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)")  # parts of a total
+_ASIDE = re.compile(
+    r"(force|moment)_(pressure|viscous|porous|internal)(_|\b)|center_of_pressure|(force|moment)_coefficient"
+)
+"""Columns beside a total: its parts, where it acts, the same once more."""
 _WORDS: dict[str, str] = {
     "thrust": r"thrust|\bforce|^f[xyz]?$|axial[_ -]?load|schub|traction|empuje",
     "torque": r"torque|moment|^m[xyz]?$|couple|drehmoment|par[_ ]motor",
@@ -51,6 +53,8 @@ CELLS = re.compile(_WORDS["cells"], re.IGNORECASE)
 """Heading of the cells of a grid."""
 CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
 """Channel of a load."""
+_VECTOR = {"thrust": "force", "torque": "moment"}
+_TOTAL = re.compile(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", re.IGNORECASE)
 _MEANT = CHANNEL | {"airspeed": "airspeed_m_s", "density": "density_kg_m3"}
 _DISK = re.compile(r"(Disk\d+)_(Force|Moment|Power)(?:_([xyz]))?")  # Flow360: BET and actuator disks
 
@@ -77,9 +81,7 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
     out = []
     for name in record.values:
-        if name in clock or name.startswith(("center_of_pressure", "force_coefficient", "moment_coefficient")):
-            continue
-        if _PART.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):
+        if name in clock or _ASIDE.match(name) or (form == "flow360_forces" and re.match(r"Disk\d+_Blade", name)):
             continue
         if form == "flow360_forces" and (m := _DISK.fullmatch(name)):
             part, axis = m[2].lower().replace("power", ""), m[3] or ""
@@ -121,6 +123,16 @@ class OpenRun:
         """Note a fault of a column's file, or of the run."""
         self.faults.append(Fault(self.name if at is None else at.file, where, got, expected, hint))
 
+    @property
+    def told(self) -> list[Fault]:
+        """Its faults, each once."""
+        return list(dict.fromkeys(self.faults))
+
+    def is_duct(self, zone: str) -> bool:
+        """Whether a zone is the duct: as stated, else by its name."""
+        stated = self.run.run.duct_zones
+        return zone in stated if stated is not None else bool(DUCT.search(zone))
+
     def fact(self, quantity: str) -> RunColumn:
         """What the user said of a quantity."""
         return getattr(self.run.columns, quantity) or RunColumn()
@@ -134,26 +146,10 @@ class OpenRun:
                 known = ", ".join(dict.fromkeys(c.name for c in self.columns)) or "none"
                 self.fault(None, f"columns.{quantity}.column", repr(told), f"one of {known}")
             return hits
-        dimension = QUANTITIES[quantity][0]
         taken = {getattr(self.run.columns, q).column for q in QUANTITIES if getattr(self.run.columns, q) is not None}
-        out = []
-        for c in self.columns:
-            unit = unit_of(c.unit)
-            if c.name in taken or c.stem in taken or c.axis or (unit is not None and unit.dimension != dimension):
-                continue
-            if _NOT.search(c.stem) and unit is None:
-                continue
-            word = re.sub(r"[-_ ](op|rfile)$", "", c.stem)
-            word = word.removesuffix(f"_{c.unit}") if c.unit else word
-            if quantity == "rpm":
-                fits = may_be_shaft_speed(word) or unit is not None
-            else:
-                part = {"thrust": "force", "torque": "moment"}.get(quantity)
-                words = quantity in _WORDS and re.search(_WORDS[quantity], word, re.IGNORECASE) is not None
-                fits = (c.part == part if c.part else words) or _means(word, unit, quantity)
-            if fits:
-                out.append(c)
-        return _recorded(out)
+        return _recorded(
+            [c for c in self.columns if not (c.name in taken or c.stem in taken or c.axis) and _fits(c, quantity)]
+        )
 
     def si(self, quantity: str, c: LoadColumn) -> Array | None:
         """Values of a column in SI (rev/min for a speed); a missing unit is a fault."""
@@ -237,34 +233,31 @@ class OpenRun:
 
     def speed(self) -> Array:
         """Speed of rotation, (N,), from the files or as given."""
-        head = self.run.run
-        own = self.named("rpm")
-        told = self.fact("rpm")
-        if own and head.rpm is not None and told.column is None:
-            stated = [c for c in own if unit_of(c.unit) is not None]
-            own = stated or [
-                c for c in own if np.unique(c.record[c.name]).size > 1 and c.record.provenance.get("clock") == "none"
-            ]
-            if own:
-                v = np.unique(own[0].record[own[0].name])
-                got = f"--rpm {head.rpm:g}, where {own[0].name} has {', '.join(f'{x:g}' for x in v[:4])}"
-                usual = '--unit rpm=rpm, or --unit rpm="rad/s", says its unit' if not stated else "Leave out --rpm"
-                self.fault(own[0], own[0].name, got, "one source of the speed", usual)
+        head, told, own = self.run.run, self.fact("rpm"), self.named("rpm")
         if own and (head.rpm is None or told.column is not None):
             self.used |= {c.name for c in own}
-        if own and head.rpm is None:
-            values = self.si("rpm", own[0])
-            if values is not None:
-                found = (
-                    settled(values, own[0].record, math.nan, None)
-                    if own[0].record.provenance.get("clock") != "time"
-                    else None
-                )
-                return np.abs(found.values if isinstance(found, Settled) else values[-1:])
-            return np.array([math.nan])
-        if head.rpm is None:
+        if head.rpm is not None:
+            if told.column is None:
+                self._another_speed(own, head.rpm)
+            return np.array([head.rpm])
+        if not own:
             self.fault(None, "rpm", "no speed of rotation", "rev/min of the run", "--rpm N; run.toml: [run] rpm = N")
-        return np.array([math.nan if head.rpm is None else head.rpm])
+            return np.array([math.nan])
+        values, record = self.si("rpm", own[0]), own[0].record
+        if values is None:
+            return np.array([math.nan])
+        found = None if record.provenance.get("clock") == "time" else settled(values, record, math.nan, None)
+        return np.abs(found.values if isinstance(found, Settled) else values[-1:])
+
+    def _another_speed(self, own: Sequence[LoadColumn], rpm: float) -> None:
+        """Note a fault where columns give a speed beside the stated one [rev/min]: by their unit, or as they vary."""
+        stated = [c for c in own if unit_of(c.unit) is not None]
+        for c in stated or own:
+            v = np.unique(c.record[c.name])
+            if stated or (v.size > 1 and c.record.provenance.get("clock") == "none"):
+                got = f"--rpm {rpm:g}, where {c.name} has {', '.join(f'{x:g}' for x in v[:4])}"
+                usual = "Leave out --rpm" if stated else '--unit rpm=rpm, or --unit rpm="rad/s", says its unit'
+                return self.fault(c, c.name, got, "one source of the speed", usual)
 
 
 def other_than_loads(names: Iterable[str]) -> str:
@@ -285,12 +278,23 @@ def other_than_loads(names: Iterable[str]) -> str:
     return next((what for what, pattern in _OTHER.items() if any(map(pattern.search, own))), "")
 
 
-def _means(word: str, unit: Unit | None, quantity: str) -> bool:
-    """Whether a heading means a quantity in the words of any recording; without a unit only what nothing else is."""
-    if unit is not None:
-        name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
-        return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
-    return quantity in ("airspeed", "density") and quantity in meanings(word)
+def _fits(c: LoadColumn, quantity: str) -> bool:
+    """Whether a column may be a quantity, by its unit and by the words of its heading."""
+    unit = unit_of(c.unit)
+    if (unit is None and _NOT.search(c.stem)) or (unit is not None and unit.dimension != QUANTITIES[quantity][0]):
+        return False
+    word = re.sub(r"[-_ ](op|rfile)$", "", c.stem)
+    word = word.removesuffix(f"_{c.unit}") if c.unit else word
+    if quantity == "rpm":
+        return may_be_shaft_speed(word) or unit is not None
+    if c.part and c.part == _VECTOR.get(quantity):
+        return True
+    if not c.part and quantity in _WORDS and re.search(_WORDS[quantity], word, re.IGNORECASE):
+        return True
+    if unit is None:  # in the words of any recording only what nothing else is
+        return quantity in ("airspeed", "density") and quantity in meanings(word)
+    name = channel_of(word.upper() if len(word) == 1 and word != "n" else word, unit.suffix)
+    return {"P_W": "power_W"}.get(name, name) == _MEANT.get(quantity)  # CFD has no electrical power
 
 
 def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColumn]) -> str:
@@ -310,26 +314,27 @@ def _axis(run: OpenRun, forces: Sequence[LoadColumn], moments: Sequence[LoadColu
     return axis
 
 
+def _along_shaft(run: OpenRun, quantity: str) -> list[LoadColumn]:
+    """Components of the forces or moments along the shaft, which are the thrust and the torque."""
+    vectors = {p: _recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
+    own, zones = vectors.get(_VECTOR.get(quantity, ""), []), run.run.run.zones
+    if not own:
+        return []
+    axis = _axis(run, [c for c in vectors["force"] if not zones or c.zone in zones], vectors["moment"])
+    run.notes.append(f"{quantity} along {axis}" + (", the largest force" if not run.run.run.axis else ""))
+    return [c for c in own if c.axis == axis]
+
+
 def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
     """Columns of a load by their zone."""
-    part = {"thrust": "force", "torque": "moment"}.get(quantity, "")
-    vectors = {p: _recorded([c for c in run.columns if c.part == p and c.axis]) for p in ("force", "moment")}
     found = run.named(quantity)
-    if not found and part and vectors[part] and run.fact(quantity).column is None:
-        zones = run.run.run.zones
-        forces = [c for c in vectors["force"] if not zones or c.zone in zones]
-        axis = _axis(run, forces, vectors["moment"])
-        found = [c for c in vectors[part] if c.axis == axis]
-        run.notes.append(f"{quantity} along {axis}" + (", the largest force" if not run.run.run.axis else ""))
-    total = [
-        c
-        for c in found
-        if re.fullmatch(r"(total[-_ ]?)?(thrust|torque)([-_ ](total|op))*", c.stem, re.IGNORECASE) and not c.zone
-    ]
-    several = len({(f.stem, f.zone) for f in found}) > 1
-    labels = [c.zone or (c.stem if several and c is not next(iter(total), None) else "") for c in found]
-    out: dict[str, LoadColumn] = {}
+    if not found and run.fact(quantity).column is None:
+        found = _along_shaft(run, quantity)
     run.used |= {c.name for c in found}
+    total = next((c for c in found if not c.zone and _TOTAL.fullmatch(c.stem)), None)
+    several = len({(f.stem, f.zone) for f in found}) > 1
+    labels = [c.zone or (c.stem if several and c is not total else "") for c in found]
+    out: dict[str, LoadColumn] = {}
     twice = 0
     for label, c in zip(labels, found, strict=True):
         twice += label in out
@@ -341,27 +346,32 @@ def by_zone(run: OpenRun, quantity: str) -> dict[str, LoadColumn]:
     return out
 
 
+def _stated_zones(run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn], zones: Sequence[str]) -> list[str]:
+    """Zones that the user names and a load has; a duct needs no torque."""
+    torque, known, absent = quantity == "torque", [z for z in zones if z in pool], [z for z in zones if z not in pool]
+    if "Net" in zones and len(zones) > 1:
+        run.fault(None, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
+    if torque and not known and list(pool) == [""]:
+        return [""]
+    if torque and known:
+        bare = [z for z in absent if not DUCT.search(z)]
+        run.notes += [f"torque: no column for {', '.join(bare)}"] if bare else []
+    elif absent:
+        hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
+        run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
+    return known
+
+
 def counted_zones(
     run: OpenRun, quantity: str, pool: Mapping[str, LoadColumn]
 ) -> tuple[list[tuple[float, str]], list[str]]:
     """Zones whose loads are added (with their sign), and those of them that are the duct."""
-    head = run.run.run
-    ducts = [z for z in pool if (z in head.duct_zones if head.duct_zones is not None else bool(DUCT.search(z)))]
-    torque = quantity == "torque"
-    if head.zones is not None:
-        known = [z for z in head.zones if z in pool]
-        if "Net" in head.zones and len(head.zones) > 1:
-            run.fault(None, "zones", "Net with other zones", "Net alone, or zones", "Net holds them all")
-        if torque and not known and list(pool) == [""]:
-            return [(1.0, "")], []
-        if absent := [z for z in head.zones if z not in pool]:
-            if not torque or not known:
-                hint = f"Zones: {', '.join(z or 'the whole' for z in pool)}"
-                run.fault(None, "zones", ", ".join(absent), f"zones with a {quantity}", hint)
-            elif bare := [z for z in absent if not DUCT.search(z)]:
-                run.notes.append(f"torque: no column for {', '.join(bare)}")
-        duct = [z for z in known if z in ducts]
-        return [(1.0, z) for z in known if not (torque and z in duct and len(duct) < len(known))], duct
+    zones, torque = run.run.run.zones, quantity == "torque"
+    ducts = [z for z in pool if run.is_duct(z)]
+    if zones is not None:
+        known = _stated_zones(run, quantity, pool, zones)
+        shaft = [z for z in known if not (torque and z in ducts)]
+        return [(1.0, z) for z in shaft or known], [z for z in known if z in ducts]
     net = next((z for z in pool if z.lower() in _NET), None)
     if net is not None:
         less = ducts if torque else []
@@ -372,4 +382,6 @@ def counted_zones(
         names = ",".join(pool)
         hint = f"--zones {names} (leave out what does not count)"
         run.fault(None, "zones", f"{quantity} of {', '.join(pool)}", "the zones that count", hint)
-    return [(1.0, z) for z in pool], [z for z in ducts if len(pool) > 1]
+    else:
+        ducts = []
+    return [(1.0, z) for z in pool], ducts

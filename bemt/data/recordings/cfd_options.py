@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from bemt.data.readers.split import decimal_mark, some, split_table
 from bemt.data.readers.unit_text import unit_for
 from bemt.data.recordings.cfd_loads import DUCT
 
+Facts = dict[str, str | int]
+"""What options say of one quantity: ``column``, ``unit``, ``sign``."""
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")
 _WORDS = {"true": True, "yes": True, "false": False, "no": False}
@@ -55,6 +58,50 @@ def _quantity(name: str, unit: str) -> str | None:
     return ("duct_thrust" if DUCT.search(name) else "thrust") if dimension == "force" else found[0] if found else None
 
 
+def _gather(
+    option: str, given: Iterable[str], meaning: Callable[[str, str], tuple[str, Facts] | Fault],
+    columns: dict[str, Facts], faults: list[Fault],
+) -> dict[str, str]:  # fmt: skip
+    """Add the facts that an option ``NAME=VALUE`` gives of quantities, or its faults; the pairs without one."""
+    sound: dict[str, str] = {}
+    for name, text in pairs(option, given, faults).items():
+        found = meaning(name, text)
+        if isinstance(found, Fault):
+            faults.append(found)
+        else:
+            columns.setdefault(found[0], {}).update(found[1])
+            sound[name] = text
+    return sound
+
+
+def _of_unit(name: str, text: str) -> tuple[str, Facts] | Fault:
+    """What ``--unit NAME=UNIT`` says of a run: NAME is a quantity, or a column whose unit tells it."""
+    quantity = _quantity(name, text)
+    if quantity is None or unit_of(text) is None:
+        usual = ", ".join(dict.fromkeys(u for _, u in QUANTITIES.values()))
+        return Fault("", "--unit", f"{name}={text}", f"a unit of a load or a speed, such as {usual}")
+    return quantity, {"unit": text}
+
+
+def _of_column(name: str, text: str) -> tuple[str, Facts] | Fault:
+    """What ``--column QUANTITY=NAME`` says of a run."""
+    if name not in QUANTITIES:
+        return Fault("", "--column", name, f"one of {', '.join(QUANTITIES)}", "As in --column thrust=NAME")
+    return name, {"column": text}
+
+
+def _of_sign(text: str, by_column: Mapping[str | int, str]) -> tuple[Sequence[str], int] | Fault:
+    """Loads that ``--sign NAME=-1`` or ``--sign -1`` turns, and how."""
+    name, mark, value = text.rpartition("=")
+    quantity = by_column.get(name, name)
+    if value.lstrip("+") not in ("1", "-1") or (mark and not name):
+        return Fault("", "--sign", text, "NAME=-1, NAME=1, or -1 for all loads")
+    if mark and quantity not in QUANTITIES:
+        expected = f"one of {', '.join(_LOADS)}, or a column named by --unit or --column"
+        return Fault("", "--sign", name, expected)
+    return (quantity,) if mark else _LOADS[:1] + _LOADS[2:], int(value)
+
+
 def run_from(
     files: Sequence[str], *, rpm: float | None = None, airspeed_m_s: float | None = None,
     density_kg_m3: float | None = None, revolutions: int | None = None, sector: int | None = None,
@@ -69,41 +116,26 @@ def run_from(
     ('N', RunColumn(column='report-def-0', unit='N m', sign=-1))
     """
     faults: list[Fault] = []
-    columns: dict[str, dict[str, Any]] = {}
+    columns: dict[str, Facts] = {}
+    united = _gather("--unit", unit, _of_unit, columns, faults)
     several: dict[str, list[str]] = {}
-    for name, text in pairs("--unit", unit, faults).items():
-        quantity = _quantity(name, text)
-        if quantity is None or unit_of(text) is None:
-            usual = ", ".join(dict.fromkeys(u for _, u in QUANTITIES.values()))
-            faults.append(Fault("", "--unit", f"{name}={text}", f"a unit of a load or a speed, such as {usual}"))
-            continue
-        columns.setdefault(quantity, {})["unit"] = text
+    for name, text in united.items():
         if name not in QUANTITIES:
-            several.setdefault(quantity, []).append(name)
+            several.setdefault(str(_quantity(name, text)), []).append(name)
     for quantity, names in several.items():
         if len(names) == 1:
             columns[quantity]["column"] = names[0]
         else:
             zones = [*zones, *names]
-    for name, text in pairs("--column", column, faults).items():
-        if name not in QUANTITIES:
-            faults.append(Fault("", "--column", name, f"one of {', '.join(QUANTITIES)}", "As in --column thrust=NAME"))
-        else:
-            columns.setdefault(name, {})["column"] = text
+    _gather("--column", column, _of_column, columns, faults)
     by_column = {c["column"]: q for q, c in columns.items() if "column" in c}
     for text in sign:
-        name, mark, value = text.rpartition("=")
-        if value.lstrip("+") not in ("1", "-1") or (mark and not name):
-            faults.append(Fault("", "--sign", text, "NAME=-1, NAME=1, or -1 for all loads"))
+        found = _of_sign(text, by_column)
+        if isinstance(found, Fault):
+            faults.append(found)
             continue
-        quantity = by_column.get(name, name)
-        if mark and quantity not in QUANTITIES:
-            faults.append(
-                Fault("", "--sign", name, f"one of {', '.join(_LOADS)}, or a column named by --unit or --column")
-            )
-            continue
-        for q in (quantity,) if mark else _LOADS[:1] + _LOADS[2:]:
-            columns.setdefault(q, {})["sign"] = int(value)
+        for quantity in found[0]:
+            columns.setdefault(quantity, {})["sign"] = found[1]
     head = {"files": tuple(files), "rpm": rpm, "airspeed_m_s": airspeed_m_s, "density_kg_m3": density_kg_m3,
             "revolutions": revolutions, "sector": sector, "axis": axis,
             "zones": tuple(_split(zones)) or None}  # fmt: skip
@@ -220,6 +252,66 @@ def _unit(quantity: str, text: str) -> str | None:
     return found[0].suffix if found and found[0].suffix in units.UNITS else None
 
 
+@dataclass(frozen=True)
+class _Measured:
+    """Headings of a table of measurements: what an option says of them is a quantity with facts, or a fault."""
+
+    known: Sequence[str]
+    taken: dict[str, str] = field(default_factory=dict)  # heading that --column named, its quantity
+
+    def column(self, name: str, text: str) -> tuple[str, Facts] | Fault:
+        """``--column QUANTITY=HEADING``."""
+        if name not in CHANNELS:
+            return Fault("", "--column", name, f"one of {', '.join(CHANNELS)}", "As in --column thrust=Fz")
+        if text not in self.known:
+            return Fault("", "--column", text, f"one of {some(map(repr, self.known), 12)}")
+        self.taken[text] = name
+        return name, {"column": text}
+
+    def unit(self, name: str, text: str) -> tuple[str, Facts] | Fault:
+        """``--unit NAME=UNIT``, of a quantity or a heading."""
+        if name not in CHANNELS and name not in self.known:
+            return Fault("", "--unit", name, f"one of {some(map(repr, self.known), 12)}, or a quantity")
+        quantity = name if name in CHANNELS else self.taken.get(name) or self._by_unit(name, text)
+        told = None if quantity is None else _unit(quantity, text)
+        if quantity is None or told is None:
+            wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
+            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d)) or "a unit that bemt knows"
+            return Fault("", "--unit", f"{name}={text}", choice)
+        facts: Facts = {"unit": told}
+        return quantity, facts | ({"column": name} if name in self.known else {})
+
+    def sign(self, name: str, text: str) -> tuple[str, Facts] | Fault:
+        """``--sign QUANTITY=-1``, or of a heading that --column named."""
+        quantity = self.taken.get(name, name)
+        if quantity not in CHANNELS or text not in ("1", "-1"):
+            return Fault("", "--sign", f"{name}={text}", "a quantity and -1, as in --sign thrust=-1")
+        return quantity, {"sign": int(text)}
+
+    def _by_unit(self, name: str, text: str) -> str | None:
+        """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
+        stated = unit_for("", text)
+        fits = (q for q in meanings(name) if _unit(q, text))
+        return next(fits, _OF_DIMENSION.get(stated[0].dimension) if stated else None)
+
+    def complete(self, quantity: str, facts: Facts) -> Iterator[Fault]:
+        """Add the column and the unit that the headings tell; faults where they do not."""
+        if "column" not in facts:
+            named = [h for h in self.known if quantity in meanings(h)]
+            if len(named) != 1:
+                expected = f"--column {quantity}=HEADING with one of {some(map(repr, named or self.known), 12)}"
+                yield Fault("", "--column", f"no column for {quantity}", expected)
+                return
+            facts["column"] = named[0]
+        if "unit" not in facts:
+            found, dimension = heading(str(facts["column"])).unit, CHANNELS[quantity]
+            if found is None or found.suffix not in units.UNITS or found.dimension != dimension:
+                expected = f"--unit {quantity}= {' or '.join(units.suffixes(dimension))}"
+                yield Fault("", "--unit", f"no unit for {quantity}", expected)
+                return
+            facts["unit"] = found.suffix
+
+
 def write_recording(
     file: str, out: str, unit: Iterable[str] = (), column: Iterable[str] = (), sign: Iterable[str] = ()
 ) -> Path:
@@ -237,60 +329,21 @@ def write_recording(
     if path.exists():
         faults.append(Fault(path.as_posix(), "", "a file that exists", "a new name", "Add the lines to it by hand"))
     table = split_table(load_text(file))
-    known = [h for h in table.headings if h]
-    columns: dict[str, dict[str, str | int]] = {}
-    for name, text in pairs("--column", column, faults).items():
-        if name not in CHANNELS:
-            faults.append(Fault("", "--column", name, f"one of {', '.join(CHANNELS)}", "As in --column thrust=Fz"))
-        elif text not in known:
-            faults.append(Fault("", "--column", text, f"one of {some(map(repr, known), 12)}"))
-        else:
-            columns.setdefault(name, {})["column"] = text
-    taken = {str(c["column"]): q for q, c in columns.items()}
-    for name, text in pairs("--unit", unit, faults).items():
-        stated = unit_for("", text)
-        fits = [q for q in meanings(name) if _unit(q, text)] if name in known else []
-        by_unit = _OF_DIMENSION.get(stated[0].dimension) if stated else None
-        quantity = name if name in CHANNELS else taken.get(name) or (fits[0] if fits else by_unit)
-        if name not in CHANNELS and name not in known:
-            faults.append(Fault("", "--unit", name, f"one of {some(map(repr, known), 12)}, or a quantity"))
-        elif quantity is None or (told := _unit(quantity, text)) is None:
-            wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
-            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d)) or "a unit that bemt knows"
-            faults.append(Fault("", "--unit", f"{name}={text}", choice))
-        else:
-            columns.setdefault(quantity, {})["unit"] = told
-            if name in known:
-                columns[quantity]["column"] = name
-    for name, text in pairs("--sign", sign, faults).items():
-        if taken.get(name, name) not in CHANNELS or text not in ("1", "-1"):
-            faults.append(Fault("", "--sign", f"{name}={text}", "a quantity and -1, as in --sign thrust=-1"))
-        else:
-            columns.setdefault(taken.get(name, name), {})["sign"] = int(text)
-    for quantity, entry in columns.items():
-        named = [h for h in known if quantity in meanings(h)]
-        if "column" not in entry and len(named) == 1:
-            entry["column"] = named[0]
-        elif "column" not in entry:
-            expected = f"--column {quantity}=HEADING with one of {some(map(repr, named or known), 12)}"
-            faults.append(Fault("", "--column", f"no column for {quantity}", expected))
-        if "column" in entry and "unit" not in entry:
-            found = heading(str(entry["column"])).unit
-            if found is not None and found.suffix in units.UNITS and found.dimension == CHANNELS[quantity]:
-                entry["unit"] = found.suffix
-            else:
-                expected = " or ".join(units.suffixes(CHANNELS[quantity]))
-                faults.append(Fault("", "--unit", f"no unit for {quantity}", f"--unit {quantity}= {expected}"))
+    headings = _Measured([h for h in table.headings if h])
+    columns: dict[str, Facts] = {}
+    _gather("--column", column, headings.column, columns, faults)
+    _gather("--unit", unit, headings.unit, columns, faults)
+    _gather("--sign", sign, headings.sign, columns, faults)
+    for quantity, facts in columns.items():
+        faults += headings.complete(quantity, facts)
     refuse(faults)
     head = {"file": Path(file).name} | ({"decimal": ","} if decimal_mark(table) == "," else {})
     out_faults = Collector(os.fspath(path))
     validated(RecordingToml, {"recording": head, "columns": columns}, out_faults)
     out_faults.check()
-    document: dict[str, dict[str, Any]] = {
-        "recording": head,
-        "columns": {name: tomlkit.inline_table() for name in columns},
-    }
-    for name, entry in columns.items():
-        document["columns"][name].update(entry)
+    inline = {name: tomlkit.inline_table() for name in columns}
+    for name, facts in columns.items():
+        inline[name].update(facts)
+    document = {"recording": head, "columns": inline}
     write_atomic(path, "# Written by bemt import. Give this file in place of the table.\n" + tomlkit.dumps(document))
     return path

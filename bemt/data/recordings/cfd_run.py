@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ MOVING = 0.01
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
 _KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
@@ -93,18 +94,10 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     """
     if run.grids:
         return _grids(run, folder, name)
-    paths = [folder / f for f in run.run.files]
-    read, faults = read_run(paths)
-    homes = {
-        zone_of(Path(f), str(r.provenance["format"])) for f, r in read if any(n.startswith("force_") for n in r.values)
-    }
-    columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
-    work = OpenRun(run, name, columns, complete=not faults)
-    work.notes += [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
+    work, read = _opened(run, folder, name)
     if not work.complete:
-        work.faults += faults
         _ask_all(work)
-        raise InputError(list(dict.fromkeys(work.faults)))
+        raise InputError(work.told)
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
     times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
@@ -112,36 +105,45 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
     if times and not math.isfinite(work.period):
         work.period = 1.0
         _ask_all(work)
-        raise InputError(list(dict.fromkeys(work.faults)))
-    loads: dict[str, Settled] = {}
-    for quantity in ("thrust", "torque", "power"):
-        pool = by_zone(work, quantity)
-        if not pool:
-            continue
-        counted, ducts = counted_zones(work, quantity, pool)
-        if not counted:
-            continue
-        found = {
-            z: work.mean(quantity, pool[z])
-            for z in {*(z for _, z in counted), *(ducts if quantity == "thrust" else ())}
-        }
-        if any(v is None for v in found.values()):
-            continue
-        known = {z: v for z, v in found.items() if v is not None}
-        loads[quantity] = _sum([(k, known[z]) for k, z in counted])
-        if quantity == "thrust" and ducts and run.columns.duct_thrust is None:
-            loads["duct_thrust"] = _sum([(1.0, known[z]) for z in ducts])
-            work.notes.append(f"duct_thrust_N is that of {', '.join(ducts)}")
-        if quantity == "thrust" and [z for _, z in counted] != [""]:
-            work.notes.append(f"thrust is that of {' + '.join(z or 'the whole' for _, z in counted)}")
-    if run.columns.duct_thrust is not None:
-        for column in work.named("duct_thrust")[:1]:
-            if (own := work.mean("duct_thrust", column)) is not None:
-                loads["duct_thrust"] = own
-    values, u, about = _applied(work, rpm, loads, read)
+        raise InputError(work.told)
+    loads = {name: load for q in ("thrust", "torque", "power") for name, load in _summed(work, q).items()}
+    for column in work.named("duct_thrust")[:1] if run.columns.duct_thrust is not None else []:
+        if (own := work.mean("duct_thrust", column)) is not None:
+            loads["duct_thrust"] = own
+    found = _applied(work, rpm, loads)
     if work.faults:
-        raise InputError(list(dict.fromkeys(work.faults)))
-    return _dataset(work, values, u, about, read)
+        raise InputError(work.told)
+    return _dataset(work, found, read)
+
+
+def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[str, Dataset]]]:
+    """The files of a run as they were read, and their columns side by side."""
+    read, faults = read_run([folder / f for f in run.run.files])
+    vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
+    homes = {zone_of(Path(f), str(r.provenance["format"])) for f, r in vectors}
+    columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
+    notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
+    return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
+
+
+def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
+    """A load summed over the zones that count, and the duct's part of a thrust; {} where it is not whole."""
+    pool = by_zone(work, quantity)
+    counted, ducts = counted_zones(work, quantity, pool) if pool else ([], [])
+    if not counted:
+        return {}
+    thrust, own = quantity == "thrust", [z for _, z in counted]
+    means = {z: work.mean(quantity, pool[z]) for z in dict.fromkeys([*own, *(ducts if thrust else ())])}
+    known = {z: v for z, v in means.items() if v is not None}
+    if len(known) < len(means):
+        return {}
+    loads = {quantity: _sum([(k, known[z]) for k, z in counted])}
+    if thrust and ducts and work.run.columns.duct_thrust is None:
+        loads["duct_thrust"] = _sum([(1.0, known[z]) for z in ducts])
+        work.notes.append(f"duct_thrust_N is that of {', '.join(ducts)}")
+    if thrust and own != [""]:
+        work.notes.append(f"thrust is that of {' + '.join(z or 'the whole' for z in own)}")
+    return loads
 
 
 def _grids(run: RunToml, folder: Path, name: str) -> Dataset:
@@ -194,13 +196,19 @@ def _ask_all(work: OpenRun) -> None:
         _nothing(work)
 
 
-def _applied(
-    work: OpenRun, rpm: Array, loads: Mapping[str, Settled], read: Sequence[tuple[str, Dataset]]
-) -> tuple[dict[str, Array], dict[str, Array], dict[str, Any]]:
-    """Sector and sign applied, the operating point beside the loads."""
-    head = work.run.run
-    sector = head.sector or 1
-    values: dict[str, Array] = {"rpm": rpm}
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Channels of a run with their u, and by load what the average was taken over and its drift over its size."""
+
+    values: dict[str, Array]
+    u: dict[str, Array] = field(default_factory=dict)
+    averaged: dict[str, str] = field(default_factory=dict)
+    drift: dict[str, float] = field(default_factory=dict)
+
+
+def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
+    """Operating point, as stated or from columns, and the cells of the grids."""
+    head, values = work.run.run, {"rpm": rpm}
     if own := work.named("cells")[:1]:
         values["cells"] = own[0].record[own[0].name]
         work.used.add(own[0].name)
@@ -213,29 +221,33 @@ def _applied(
             values[name] = np.array([given])
         elif own and (v := work.si(quantity, own[0])) is not None:
             values[name] = v[-1:] if own[0].record.provenance.get("clock") in ("time", "iteration") else v
-    u: dict[str, Array] = {}
-    over: dict[str, str] = {}
-    drift: dict[str, float] = {}
+    return values
+
+
+def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points:
+    """Sector and sign applied, the operating point beside the loads."""
+    sector, points = work.run.run.sector or 1, _Points(_operating(work, rpm))
+    values = points.values
     signs: dict[str, float] = {}
     for quantity, found in loads.items():
         name = CHANNEL[quantity]
         signs[quantity] = work.sign(quantity, found.values, signs)
         values[name] = signs[quantity] * sector * found.values
         size = math.hypot(*(abs(x) for x in (found.drift, found.scatter) if math.isfinite(x)), 0.0) * sector
-        u[name] = np.full(found.values.size, size)
-        over[name] = found.over
+        points.u[name] = np.full(found.values.size, size)
+        points.averaged[name] = found.over
         mean = float(np.nanmean(np.abs(found.values))) if np.isfinite(found.values).any() else math.nan
         if math.isfinite(found.drift) and mean:
-            drift[name] = found.drift / mean
-            if abs(drift[name]) > LOST:
-                got = f"a mean that drifts by {drift[name]:+.0%}"
+            drift = points.drift[name] = found.drift / mean
+            if abs(drift) > LOST:
+                got = f"a mean that drifts by {drift:+.0%}"
                 work.fault(None, quantity, got, "a run that has converged", "Run on, or start later")
-            elif abs(drift[name]) > MOVING:
-                work.notes.append(f"not settled: {quantity} drifts by {drift[name]:+.1%} over the averaged part; in u")
+            elif abs(drift) > MOVING:
+                work.notes.append(f"not settled: {quantity} drifts by {drift:+.1%} over the averaged part; in u")
     if sector > 1:
         work.notes.append(f"one of {sector} sectors: loads times {sector}; holds for axisymmetric flow")
     if not {"thrust_N", "torque_Nm"} & values.keys():
-        _coefficients(work, values, u, over)
+        _coefficients(work, points)
     if not {"thrust_N", "torque_Nm", "power_W", "CT", "CQ"} & values.keys():
         _nothing(work)
     elif "airspeed_m_s" not in values and "J" not in values:
@@ -244,7 +256,7 @@ def _applied(
             work.used.add(c.name)
     if not work.faults:
         _unused(work, values)
-    return values, u, {"averaged": over, "drift": drift}
+    return points
 
 
 def _table(record: Dataset) -> bool:
@@ -267,63 +279,58 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
     )
 
 
-def _coefficients(work: OpenRun, values: dict[str, Array], u: dict[str, Array], over: dict[str, str]) -> None:
+def _coefficients(work: OpenRun, points: _Points) -> None:
     """Loads as coefficients, where a file has nothing else."""
     for c in work.columns:
-        if c.name in _COEFFICIENTS and c.name not in values:
+        if c.name in _COEFFICIENTS and c.name not in points.values:
             found = settled(c.record[c.name], c.record, work.period, work.run.run.revolutions, work.end)
             if isinstance(found, Settled):
-                values[c.name], over[c.name] = found.values, found.over
+                points.values[c.name], points.averaged[c.name] = found.values, found.over
                 if c.name != "J":
-                    u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
+                    points.u[c.name] = np.full(found.values.size, math.hypot(np.nan_to_num(found.drift), found.scatter))
 
 
-def _dataset(
-    work: OpenRun, values: Mapping[str, Array], u: Mapping[str, Array], about: Mapping[str, Any],
-    read: Sequence[tuple[str, Dataset]],
-) -> Dataset:  # fmt: skip
-    run, name = work.run, work.name
-    rows = max(v.size for v in values.values())
-    bad = [k for k, v in values.items() if v.size not in (1, rows)]
-    each = values.get("cells")
-    if bad:
-        got = ", ".join(f"{k} {values[k].size}" for k in values)
+def _conditions(
+    work: OpenRun, read: Sequence[tuple[str, Dataset]], each: Array | None, drift: float | None
+) -> dict[str, Any]:
+    """What is known of how a run was made; `each` the cells of its rows, `drift` that of its thrust."""
+    clocks = {str(r.provenance.get("clock")) for _, r in read}
+    digits = (str(r.provenance.get("cells", "")) for _, r in read)
+    cells = next((float(text) for text in digits if text.isdigit()), None)
+    found = {
+        "program": " + ".join(dict.fromkeys(PROGRAMS[str(r.provenance["format"])] for _, r in read)),
+        "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
+        "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
+    }  # fmt: skip
+    gci = work.run.setup.gci_pct
+    more = {"drift_thrust": drift, "u_grid": None if gci is None else 0.01 * gci / COVERAGE}
+    return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
+
+
+def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> Dataset:
+    name, values, averaged, drift = work.name, points.values, points.averaged, points.drift
+    sizes = {k: v.size for k, v in values.items()}
+    rows = max(sizes.values())
+    if {*sizes.values()} - {1, rows}:
+        got = ", ".join(f"{k} {size}" for k, size in sizes.items())
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
     full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k != "cells"}
-    clocks = {str(r.provenance.get("clock")) for _, r in read}
-    told = {k: v for k, v in run.setup.given().items() if v is not None}
-    program = " + ".join(dict.fromkeys(PROGRAMS[str(r.provenance["format"])] for _, r in read))
-    cells = next((float(r.provenance["cells"]) for _, r in read if str(r.provenance.get("cells", "")).isdigit()), None)
-    if each is not None and np.unique(each).size == 1:
-        cells = float(each[0])
-    steady = False if "time" in clocks else True if "iteration" in clocks else None
-    found = {"program": program, "cells": cells, "steady": steady, "thrust_from": "forces"}
-    conditions = {k: v for k, v in found.items() if v is not None} | told
-    if "thrust_N" in about["drift"]:
-        conditions["drift_thrust"] = about["drift"]["thrust_N"]
-    gci = run.setup.gci_pct
-    if gci is not None:
-        conditions["u_grid"] = 0.01 * gci / COVERAGE
+    each = values.get("cells")
+    conditions = _conditions(work, read, each, drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     provenance = {
-        "file": name, "format": "cfd_run", "files": tuple(run.run.files), "conditions": conditions, **about,
-        "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
+        "file": name, "format": "cfd_run", "files": tuple(work.run.run.files), "conditions": conditions,
+        "averaged": averaged, "drift": drift, "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
     }  # fmt: skip
     if rows == 1:
-        provenance["means"] = {
-            k: Mean(float(full[k][0]), about["averaged"][k], about["drift"].get(k)) for k in about["averaged"]
-        }
-    made = Dataset("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in u.items()}, (), provenance,
-                   labels, notes=tuple(dict.fromkeys(work.notes)))  # fmt: skip
-    keep = np.any(
-        [np.isfinite(full[k]) for k in full if k not in ("rpm", "airspeed_m_s", "density_kg_m3", "J")], axis=0
-    )
+        provenance["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
+    made = Dataset("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
+                   provenance, labels, notes=tuple(dict.fromkeys(work.notes)))  # fmt: skip
+    keep = np.any([np.isfinite(v) for k, v in full.items() if k not in _POINT], axis=0)
     if not keep.all():
-        index = np.flatnonzero(keep)
-        made = Dataset("cfd", made.name, {k: v[index] for k, v in full.items()}, {k: made.u[k][index] for k in u}, (),
-                       provenance, tuple(labels[i] for i in index) if labels else (),
-                       notes=(*made.notes, f"{number_of((~keep).sum(), 'point')} without a load left out"))  # fmt: skip
-        each = None if each is None else np.broadcast_to(each, (rows,))[index]
+        note = f"{number_of((~keep).sum(), 'point')} without a load left out"
+        made = replace(made.select(keep), notes=(*made.notes, note))
+        each = None if each is None else np.broadcast_to(each, (rows,))[keep]
     slips = (f"{f.evidence}. Suggestion: {f.correction}" for f in check(made) if f.severity != "note")
     made = replace(made, notes=(*slips, *made.notes))
     if each is not None and np.unique(each).size > 1:
@@ -346,16 +353,15 @@ _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]",
           "torque_Nm": "torque [N m]", "power_W": "power [W]", "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
 
 
+def _with_u(x: float, u: float) -> str:
+    return number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "")
+
+
 def run_text(d: Dataset) -> str:
     """A run for a terminal: points with u, what was averaged, what was decided."""
     averaged, drifts, set_up = (d.provenance[k] for k in ("averaged", "drift", "conditions"))
     names = [k for k in _SHOWN if k in d]
-    rows = [
-        [number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "") for x, u in zip(*row, strict=True)]
-        for row in zip(
-            zip(*(d[k] for k in names), strict=True), zip(*(d.u[k] for k in names), strict=True), strict=True
-        )
-    ]
+    rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
     lines = [f"one run: {', '.join(Path(f).name for f in d.provenance['files'])}"]
     lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
     for over in dict.fromkeys(averaged.values()):

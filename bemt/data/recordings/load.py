@@ -76,18 +76,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         raise InputError(Fault(name, "", "a folder with a case", "a recording", "`bemt sweep` solves cases"))
     if format is None and Path(path).is_dir() and (inside := _run_in(Path(path))) is not None:
         return inside if isinstance(inside, Dataset) else cfd_run.assemble(inside, Path(), name)
-    try:
-        kind = importers.detect(path) if format is None else format
-    except InputError as error:
-        told = recognised(path)
-        if told is None:
-            raise
-        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
-    if format is None and getattr(importers.importers()[kind], "FALLBACK", False):
-        damaged = damaged_export(path)
-        if damaged:
-            hint = "Its head is cut or altered; export it again, or give --format"
-            raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
+    kind = _kind(path, name) if format is None else format
     try:
         found = importers.read(path, kind)
     except InputError as error:  # the columns of a UIUC line under a name of one's own: a table without a speed
@@ -108,6 +97,22 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
+
+
+def _kind(path: str | os.PathLike[str], name: str) -> str:
+    """Reader of a file; refused with what it looks like where that is no table, or a damaged export."""
+    try:
+        kind = importers.detect(path)
+    except InputError as error:
+        told = recognised(path)
+        if told is None:
+            raise
+        raise InputError(Fault(name, "", told[0], "results as a table of text", told[1])) from error
+    damaged = damaged_export(path) if getattr(importers.importers()[kind], "FALLBACK", False) else ""
+    if damaged:
+        hint = "Its head is cut or altered; export it again, or give --format"
+        raise InputError(Fault(name, "", f"what looks like {damaged}", "a whole file", hint))
+    return kind
 
 
 def _run_in(folder: Path) -> Dataset | RunToml | None:
@@ -207,12 +212,7 @@ def import_files(
     told = {d.provenance["file"] for d in runs}
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told)]
     notes = _restart_notes(names, records)
-    files = []
-    for name in names:
-        try:
-            files.append(_file(name, format, records.get(name), notes.get(name, []), errors.get(name)))
-        except Exception as error:
-            files.append(ImportedFile(name, format, error=_refusal(error)))
+    files = [_file(name, format, records.get(name), notes.get(name, []), errors.get(name)) for name in names]
     return Imported(tuple(files), tuple(runs), to_do)
 
 
@@ -225,22 +225,19 @@ def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
     return list(runs_of(files, run_from(list(files), **run), insist=True)[0])
 
 
-def runs_of(
-    names: Sequence[str], run: RunToml | None = None, insist: bool = False
-) -> tuple[list[Dataset], str | None]:  # fmt: skip
-    """CFD runs of files as the options of `run` say (`cfd_options.run_from`), and what exports that are no run yet
-    need.
+def _study(run: RunToml, insist: bool) -> list[Dataset]:
+    """Runs on several grids as one, which is a study of the grid where their cells are stated."""
+    if not insist and all(g.cells is None for g in run.grids):
+        return merged([import_file(f) for f in run.files])
+    found = cfd_run.assemble(run, Path(), f"{len(run.grids)} grids")
+    if not found.provenance["studies"]:
+        got = "runs of unlike conditions: no two of them are one speed and airspeed on two grids"
+        raise InputError(Fault("--out", "", got, "one condition on several grids", "Import each run by itself"))
+    return [found]
 
-    A run.toml each, and exports, which are one run together; with ``run.grids`` all of them are one study.
-    """
-    if run is not None and run.grids:
-        if not insist and all(g.cells is None for g in run.grids):
-            return merged([import_file(f) for f in run.files]), None
-        found = cfd_run.assemble(run, Path(), f"{len(run.grids)} grids")
-        if not found.provenance["studies"]:
-            got = "runs of unlike conditions: no two of them are one speed and airspeed on two grids"
-            raise InputError(Fault("--out", "", got, "one condition on several grids", "Import each run by itself"))
-        return [found], None
+
+def _runs_and_exports(names: Sequence[str], insist: bool) -> tuple[list[Dataset], list[str]]:
+    """Which names are a run by themselves, as a run.toml is, and which are exports of CFD programs."""
     runs, exports = [], list[str]()
     for name in names:
         try:
@@ -253,6 +250,20 @@ def runs_of(
         except (InputError, OSError):
             if insist:
                 raise
+    return runs, exports
+
+
+def runs_of(
+    names: Sequence[str], run: RunToml | None = None, insist: bool = False
+) -> tuple[list[Dataset], str | None]:  # fmt: skip
+    """CFD runs of files as the options of `run` say (`cfd_options.run_from`), and what exports that are no run yet
+    need.
+
+    A run.toml each, and exports, which are one run together; with ``run.grids`` all of them are one study.
+    """
+    if run is not None and run.grids:
+        return _study(run, insist), None
+    runs, exports = _runs_and_exports(names, insist)
     if insist and not exports:
         hint = "A run.toml has its own" if runs else "Name the files, or the folder that holds them (postProcessing)"
         got = "no export of CFD, which options of a run are about"
@@ -377,27 +388,28 @@ class Imported:
             steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
             lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
         if wrote or self.runs:
-            name = "" if wrote else str(self.runs[0].provenance["file"])
-            study = bool(self.runs[0].provenance.get("studies"))
-            usable = Path(name).is_file() and name.endswith(".toml")
-            usable = usable or any(f.path == name and f.format == RUN for f in self.files)
-            file = wrote or ("study.toml" if study and not usable else name if usable else "run.toml")
-            lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
-            step = f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
-            return "\n".join([*lines, step])
-        read = [(f.path, set(f.record.values)) for f in self.files if f.record]
-        loaded = [path for path, channels in read if "rpm" in channels and _LOADS & channels]
-        bench = (f.record.values for f in self.files if f.record and f.record.kind == "bench")
-        if not loaded and any(_LOADS & set(values) for values in bench):
-            lines.append(
-                "Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"
-            )
-        if loaded:
-            first, *others = (shlex.quote(path) for path in loaded)
-            lines.append(f"Next: bemt diagnose {first} --case CASE   (a case: bemt new 10x5)\n")
-            if len(others) == 1:
-                lines[-1] += f"      bemt compare {first} {others[0]}\n"
-        return "\n".join(lines)
+            return "\n".join([*lines, self._next_with_a_run(wrote)])
+        return "\n".join([*lines, *self._next_with_recordings()])
+
+    def _next_with_a_run(self, wrote: str) -> str:
+        """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
+        name = "" if wrote else str(self.runs[0].provenance["file"])
+        usable = Path(name).is_file() and name.endswith(".toml")
+        usable = usable or any(f.path == name and f.format == RUN for f in self.files)
+        file = wrote or (name if usable else "study.toml" if self.runs[0].provenance.get("studies") else "run.toml")
+        lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
+        return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+
+    def _next_with_recordings(self) -> list[str]:
+        """What to do with recordings of loads, if they have the speed."""
+        read = [(f.path, f.record.kind, set(f.record.values)) for f in self.files if f.record]
+        loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
+        if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
+            return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
+        if not loaded:
+            return []
+        step = f"Next: bemt diagnose {loaded[0]} --case CASE   (a case: bemt new 10x5)\n"
+        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}\n" if len(loaded) == 2 else "")]
 
 
 def _file(
@@ -405,10 +417,13 @@ def _file(
 ) -> ImportedFile:  # fmt: skip
     if record is None:
         return ImportedFile(name, format, warnings=tuple(notes), error=error)
-    reduced = _reduced(record)
-    found = ImportedFile(name, record.provenance["format"], record, reduced, _means(record, reduced), findings(record),
-                         (*record.notes, *notes), error)  # fmt: skip
-    found.document()  # what cannot be shown is refused with its file
+    try:
+        reduced = _reduced(record)
+        found = ImportedFile(name, record.provenance["format"], record, reduced, _means(record, reduced),
+                             findings(record), (*record.notes, *notes), error)  # fmt: skip
+        found.document()  # what cannot be shown is refused with its file
+    except Exception as failed:
+        return ImportedFile(name, format, error=_refusal(failed))
     return found
 
 

@@ -199,14 +199,29 @@ def _note_rest(found: Found, rec: Dataset, rows: Rows) -> None:
     found.lost += lost(rec, rows, "", "motor stopped: zero of the stand, not a point")
 
 
+def _signal(rec: Dataset, name: str) -> str:
+    """Channel that shows the steps: the first that moves, else the first with a value."""
+    told = [s for s in SIGNALS if s in rec.values and np.any(np.isfinite(rec.values[s]))]
+    if not told:
+        raise InputError(Fault(name, "", "no load with a value", f"one of {', '.join(SIGNALS)}"))
+    return next((s for s in told if moves(rec.values[s])), told[0])
+
+
+def _stated_u(told: Mapping[str, Array], rows: Rows, scatter: Mapping[str, float]) -> dict[str, float]:
+    """Uncertainty of means whose rows state theirs: it averages down, but no further than the scatter shows."""
+    out = {}
+    for key, e in told.items():
+        own = e[rows][np.isfinite(e[rows])]
+        if own.size:
+            seen = scatter.get(key, 0.0)
+            out[key] = max(float(np.sqrt(np.mean(own**2) / own.size)), seen if math.isfinite(seen) else 0.0)
+    return out
+
+
 def from_samples(rec: Dataset, name: str) -> Found:
     """Plateaus of every run."""
     found = Found()
-    signal = next((s for s in SIGNALS if s in rec.values and moves(rec.values[s])), None)
-    if signal is None:
-        signal = next((s for s in SIGNALS if s in rec.values and np.any(np.isfinite(rec.values[s]))), None)
-    if signal is None:
-        raise InputError(Fault(name, "", "no load with a value", f"one of {', '.join(SIGNALS)}"))
+    signal = _signal(rec, name)
     rest = at_rest(rec)
     data = _clean(rec, rest, found)
     _spikes(rec, data, found)
@@ -221,9 +236,7 @@ def from_samples(rec: Dataset, name: str) -> Found:
             found.lost += lost(rec, rows, "", f"a run without {signal}")
             continue
         command = command_of(rec)
-        own = command[1][rows] if command is not None else None
-        if own is not None and not np.any(np.isfinite(own)):
-            own = None
+        own = command[1][rows] if command is not None and np.any(np.isfinite(command[1][rows])) else None
         try:
             got = plateaus.find(t, part, signal, own)
         except InputError as error:
@@ -244,11 +257,7 @@ def from_samples(rec: Dataset, name: str) -> Found:
                 reason = f"outlier: more than {plateaus.OUTLIER:g} robust standard deviations from its neighbours"
                 found.lost += lost(rec, rows[list(outliers)], channel, reason)
             u = {key: e for key, e in p.u.items() if e > 1e-12 * abs(p.mean[key]) and key not in _COMMANDS}
-            for key, e in told.items():  # what rows state averages down no further than the scatter shows
-                own_u = e[own_rows][np.isfinite(e[own_rows])]
-                if own_u.size:
-                    least = float(np.sqrt(np.mean(own_u**2) / own_u.size))
-                    u[key] = max(least, u.get(key, 0.0)) if math.isfinite(u.get(key, 0.0)) else least
+            u |= _stated_u(told, own_rows, u)
             values = dict(p.mean)
             if t is not None:
                 values["time_s"] = middle

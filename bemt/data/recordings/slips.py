@@ -220,6 +220,21 @@ def _told(q: str, facts: Facts) -> str:
     return {"D": "diameter_m", "H": "efficacy_N_W", "G": "propeller_mech_efficiency_N_W"}.get(q, q)
 
 
+def _repairs(known: list[Relation], facts: Facts) -> list[tuple[float, Slip]]:
+    """Slips that repair all that is broken and break nothing else, with what they leave; best first."""
+    broken = [r for r in known if r.broken]
+    quantities = {q for r in known for q in r.powers} - ({"D"} if facts.diameter_m is None else set())
+    two_speeds = any("n2" in r.powers for r in broken)
+    fits: list[tuple[float, Slip]] = []
+    for slip in slips() if broken else ():
+        if slip.quantity not in quantities or (slip.id == MISCOUNT and not two_speeds):
+            continue  # some ratio of small numbers is near any factor
+        shift = {slip.quantity: slip.factor}
+        if all(r.holds(shift) for r in known if r in broken or slip.quantity in r.powers):
+            fits.append((sum(r.distance(shift) for r in known) + slip.rarity, slip))
+    return sorted(fits, key=lambda fit: fit[0])
+
+
 @check_for("slips")
 def find_slips(facts: Facts) -> Iterator[Finding]:
     """Name the slip of a unit that repairs what does not fit together."""
@@ -229,18 +244,7 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
     share = _electrical(facts, broken) if not facts.bare else None
     if not broken and share is None:
         return
-    quantities = {q for r in known for q in r.powers}
-    fits: list[tuple[float, Slip]] = []
-    two_speeds = any("n2" in r.powers for r in broken)
-    for slip in slips() if broken else ():
-        if slip.id == MISCOUNT and not two_speeds:
-            continue  # some ratio of small numbers is near any factor
-        if slip.quantity not in quantities or (facts.diameter_m is None and slip.quantity == "D"):
-            continue
-        shift = {slip.quantity: slip.factor}
-        if all(r.holds(shift) for r in known if r in broken or slip.quantity in r.powers):
-            fits.append((sum(r.distance(shift) for r in known) + slip.rarity, slip))
-    fits.sort(key=lambda fit: fit[0])
+    fits = _repairs(known, facts)
     if share is not None:
         text = f"torque x speed is {share[1]:.3g} of it ({share[0]:.3g} to {share[2]:.3g} under load), "
         text += "as the efficiency of a motor would be"
@@ -254,9 +258,7 @@ def find_slips(facts: Facts) -> Iterator[Finding]:
     if not fits:
         channels = sorted({_told(q, facts) for r in broken for q in r.powers if q in _QUANTITY or q == "D"})
         text = "no single unit error explains it: check " + ", ".join(channels)
-        yield Finding(
-            "inconsistent", channels[0] if len(channels) == 1 else "+".join(channels), evidence, text, (), "warning"
-        )
+        yield Finding("inconsistent", "+".join(channels), evidence, text, (), "warning")
         return
     best, slip = fits[0]
     others = [s for score, s in fits[1:] if score - best < ALIKE]

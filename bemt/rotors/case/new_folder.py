@@ -138,41 +138,51 @@ def write_files(files: Mapping[str, bytes], folder: Path) -> None:
         write_atomic(folder / name, files[name])
 
 
+def _broken(*rules: tuple[bool, str, str, str, str]) -> list[Fault]:
+    """Faults of options: those rules of which the first entry is true."""
+    return [Fault("", *words) for wrong, *words in rules if wrong]
+
+
 def _faults(w: Wanted) -> list[Fault]:
     """What does not go together."""
-    faults = []
-    if w.stations is not None and w.scan is not None:
-        faults.append(Fault("", "--scan, --stations", "both", "one of them"))
-    if w.label is None and w.stations is None and w.scan is None and not (w.fan and w.diameter_mm):
-        faults.append(Fault("", "label, --stations", "neither", "one of them, or --scan", "As in: new 10x5"))
-    if w.fan and (w.stations is not None or w.scan is not None):
-        faults.append(Fault("", "--fan", "together with a blade file", "--fan with the diameter as label"))
-    if w.scan is not None and w.blades is not None:
-        faults.append(Fault("", "--blades", str(w.blades), "nothing with --scan, which shows them"))
-    if w.unit is not None and w.scan is None:
-        faults.append(Fault("", "--unit", w.unit, "nothing without --scan"))
-    if w.stations is not None and w.diameter_mm is None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
-        faults.append(
-            Fault("", "--diameter-mm", "nothing", "the diameter, with --stations", "Or the propeller's label")
-        )
+    stations, scan = w.stations is not None, w.scan is not None
+    drawn, alone = stations or scan, "--kv" if w.kv is not None else "--cells"
+    nothing = w.label is None and not (drawn or (w.fan and w.diameter_mm))
+    return [
+        *_broken(
+            (stations and scan, "--scan, --stations", "both", "one of them", ""),
+            (nothing, "label, --stations", "neither", "one of them, or --scan", "As in: new 10x5"),
+            (w.fan and drawn, "--fan", "together with a blade file", "--fan with the diameter as label", ""),
+            (scan and w.blades is not None, "--blades", f"{w.blades}", "nothing with --scan, which shows them", ""),
+            (w.unit is not None and not scan, "--unit", f"{w.unit}", "nothing without --scan", ""),
+        ),
+        *_size_faults(w),
+        *_broken(
+            (w.reading is not None and (w.fan or drawn), "--reading", "without a label alone", "a label",
+             "Write blade.as_built.reading into the case"),
+            (w.kv is not None and scan, "--kv", "together with --scan", "a label or stations",
+             "Write [drive] into the case"),
+            ((w.kv is None) != (w.cells is None), alone, "alone", "--kv and --cells together", ""),
+        ),
+    ]  # fmt: skip
+
+
+def _size_faults(w: Wanted) -> Iterator[Fault]:
+    """Where a diameter is missing, out of range or said twice."""
+    if w.diameter_mm is None:
+        if w.stations is not None and fresh.label_or_name(w.label, None, Path(w.stations))[1]:
+            expected, hint = "the diameter, with --stations", "Or the propeller's label"
+            yield Fault("", "--diameter-mm", "nothing", expected, hint)
+        return
     sized = w.stations is not None or w.fan
-    if w.diameter_mm is not None and (not sized or not 5.0 <= w.diameter_mm <= 10000.0):
+    if not sized or not 5.0 <= w.diameter_mm <= 10000.0:
         unit, one = ("in", 25.4) if w.inches else ("mm", 1.0)
         value, ends = w.diameter_mm / one, " to ".join(f"{end / one:.5g}" for end in (5.0, 10000.0))
         expected = f"{ends} {unit}" if sized else "nothing without --stations or --fan"
         hint = f"In m? Times {1e3 / one:.4g}" if sized and 5.0 <= value * 1e3 <= 1e4 else ""
-        faults.append(Fault("", f"--diameter-{unit}", f"{value:g}", expected, hint))
-    if w.fan and w.diameter_mm is not None and _SIZE.fullmatch((w.label or "").strip()):
-        faults.append(Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in"))
-    if w.reading is not None and (w.fan or w.stations is not None or w.scan is not None):
-        hint = "Write blade.as_built.reading into the case"
-        faults.append(Fault("", "--reading", "without a label alone", "a label", hint))
-    if w.kv is not None and w.scan is not None:
-        faults.append(Fault("", "--kv", "together with --scan", "a label or stations", "Write [drive] into the case"))
-    if (w.kv is None) != (w.cells is None):
-        given = "--kv" if w.kv is not None else "--cells"
-        faults.append(Fault("", given, "alone", "--kv and --cells together"))
-    return faults
+        yield Fault("", f"--diameter-{unit}", f"{value:g}", expected, hint)
+    if w.fan and _SIZE.fullmatch((w.label or "").strip()):
+        yield Fault("label", "", repr(w.label), "a name, with --diameter-mm or --diameter-in")
 
 
 def _files(w: Wanted) -> dict[str, bytes]:

@@ -237,14 +237,18 @@ def _check_section(out: Collector, section: SectionTable) -> None:
             )
 
 
+def _check_axial(out: Collector, case: CaseFile, what: str, why: str) -> None:
+    angles = [case.operating.angle_deg, *case.sweep.axes().get("angle_deg", ())]
+    if any(angles):
+        where = "operating.angle_deg" if angles[0] else "sweep.angle_deg"
+        out.add(where, f"{max(angles):g} deg on {what}", "0 deg", why)
+
+
 def _check_duct(out: Collector, case: CaseFile) -> None:
     duct, diameter = case.duct, case.rotor.diameter_m
     if duct is None:
         return
-    angles = [case.operating.angle_deg, *case.sweep.axes().get("angle_deg", ())]
-    if any(angles):
-        where = "operating.angle_deg" if angles[0] else "sweep.angle_deg"
-        out.add(where, f"{max(angles):g} deg on a ducted rotor", "0 deg", "Oblique flow is solved for open rotors only")
+    _check_axial(out, case, "a ducted rotor", "Oblique flow is solved for open rotors only")
     if duct.inner_diameter_m < diameter:
         (key,) = _given(duct, "inner_diameter_mm", "inner_diameter_in")
         out.add(f"duct.{key}", shown(getattr(duct, key)), f"at least the rotor diameter, {diameter * 1e3:.6g} mm")
@@ -264,10 +268,7 @@ def _check_pair(out: Collector, case: CaseFile) -> None:
         out.add("second_rotor", "a second rotor with a duct", "two open rotors")
     if case.drive is not None:
         out.add("second_rotor", "a second rotor with [drive]", "one of them", "A drive turns one rotor")
-    angles = [case.operating.angle_deg, *case.sweep.axes().get("angle_deg", ())]
-    if any(angles):
-        where = "operating.angle_deg" if angles[0] else "sweep.angle_deg"
-        out.add(where, f"{max(angles):g} deg on a coaxial pair", "0 deg", "A pair is solved in axial flow only")
+    _check_axial(out, case, "a coaxial pair", "A pair is solved in axial flow only")
     speeds = [case.operating.airspeed_m_s, *case.sweep.axes().get("airspeed_m_s", ())]
     if min(speeds) < 0.0:
         where = "operating.airspeed_m_s" if speeds[0] < 0.0 else "sweep.airspeed_m_s"

@@ -25,7 +25,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from numbers import Real
@@ -173,59 +173,71 @@ def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
+_RANGES: dict[str, tuple[float, float, str, str]] = {  # lowest and highest value, and what one below or above may be
+    "--thrust-N": (0.01, 5000.0, "", ""), "--mass-kg": (0.005, 1000.0, "", "In grams? Divide by 1000"),
+    "--cells": (1, 60, "", ""), "--rotors": (1, 64, "", ""), "--airspeed-m-s": (0.0, 150.0, "", "km/h? Divide by 3.6"),
+    "--max-tip-mach": (0.05, 0.95, "Section theory ends below Mach 1", "Section theory ends below Mach 1"),
+    "--capacity-Ah": (0.01, 1000.0, "", "In mAh? Divide by 1000"), "--minutes": (0.01, 1e4, "", ""),
+    "--rest-kg": (0.001, 1000.0, "Part of the mass", "Part of the mass"),
+    "--arm-mm": (10.0, 5000.0, "In metres? Times 1000", ""),
+}  # fmt: skip
+
+
+def _out_of_range(given: Mapping[str, float | None]) -> list[Fault]:
+    """Numbers out of their range, and parts of a cell or a rotor."""
+    told = {k: v for k, v in given.items() if v is not None}
+    out = [Fault("", k, f"{told[k]:g}", "a whole number") for k in ("--cells", "--rotors") if told[k] % 1 != 0]
+    for name, value in told.items():
+        low, high, below, above = _RANGES[name]
+        high = told.get("--mass-kg") or high if name == "--rest-kg" else high
+        if not low <= value <= high:
+            hint = above if value > high else below
+            out.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
+    return out
+
+
+def _clashes(
+    fluid: str, fan: bool, coaxial: bool, rotors: float, rest_kg: float | None, mass_kg: float | None
+) -> Iterator[Fault]:
+    """Options that do not go together."""
+    if fluid not in LOADING or fluid == "fan":
+        yield Fault("", "--fluid", repr(fluid), "air or water")
+    if fan and (coaxial or fluid == "water"):
+        yield Fault("", "--fan", "with " + ("--coaxial" if coaxial else "--fluid water"), "a fan alone in air")
+    if rest_kg is not None and mass_kg is None:
+        yield Fault("", "--rest-kg", "given", "nothing without --mass-kg")
+    if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
+        yield Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
+
+
 def _target(
     thrust_N: float | None, cells: int | None, mass_kg: float | None, rest_kg: float | None, rotors: int,
     airspeed_m_s: float, max_tip_mach: float, capacity_Ah: float | None, minutes: float | None, fan: bool, fluid: str,
     coaxial: bool, arm_mm: float | None,
 ) -> Target:  # fmt: skip
-    faults = []
+    given = {
+        "--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors,
+        "--airspeed-m-s": airspeed_m_s, "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah,
+        "--minutes": minutes, "--rest-kg": rest_kg, "--arm-mm": arm_mm,
+    }  # fmt: skip
+    example, faults = "As in --thrust-N 27 --cells 6", []
     if thrust_N is None and mass_kg is None:
-        faults.append(
-            Fault("", "--thrust-N", "nothing", "a thrust [N] or a mass [kg]", "As in --thrust-N 27 --cells 6")
-        )
+        faults.append(Fault("", "--thrust-N", "nothing", "a thrust [N] or a mass [kg]", example))
     if cells is None:
-        faults.append(Fault("", "--cells", "nothing", "cells in series", "As in --thrust-N 27 --cells 6"))
+        faults.append(Fault("", "--cells", "nothing", "cells in series", example))
     if minutes is not None and capacity_Ah is None:
         faults.append(Fault("", "--capacity-Ah", "nothing", "the battery's capacity [A h], for the time"))
-    named = {"--thrust-N": thrust_N, "--mass-kg": mass_kg, "--cells": cells, "--rotors": rotors,
-             "--airspeed-m-s": airspeed_m_s,
-             "--max-tip-mach": max_tip_mach, "--capacity-Ah": capacity_Ah, "--minutes": minutes,
-             "--rest-kg": rest_kg, "--arm-mm": arm_mm}  # fmt: skip
-    faults += [Fault("", k, repr(v), "a number") for k, v in named.items() if not (v is None or _is_number(v))]
-    if fluid not in LOADING or fluid == "fan":
-        faults.append(Fault("", "--fluid", repr(fluid), "air or water"))
-    if fan and (coaxial or fluid == "water"):
-        faults.append(Fault("", "--fan", "with " + ("--coaxial" if coaxial else "--fluid water"), "a fan alone in air"))
-    if rest_kg is not None and mass_kg is None:
-        faults.append(Fault("", "--rest-kg", "given", "nothing without --mass-kg"))
-    if coaxial and (not _is_number(rotors) or rotors % 2 != 0):
-        faults.append(
-            Fault("", "--rotors", f"{rotors}", "an even number, for pairs of them", "It counts both of a pair")
-        )
-    refuse(faults)
-    faults += [Fault("", k, f"{v:g}", "a whole number") for k, v in (("--cells", cells), ("--rotors", rotors))
-               if v is not None and v % 1 != 0]  # fmt: skip
-    mAh = "In mAh? Divide by 1000" if capacity_Ah is not None and capacity_Ah > 200.0 else ""
-    grams = "In grams? Divide by 1000" if mass_kg is not None and mass_kg > 1000.0 else ""
-    fast = "km/h? Divide by 3.6" if airspeed_m_s > 150.0 else ""
-    for name, value, low, high, hint in (
-        ("--thrust-N", thrust_N, 0.01, 5000.0, ""), ("--mass-kg", mass_kg, 0.005, 1000.0, grams),
-        ("--cells", cells, 1, 60, ""), ("--rotors", rotors, 1, 64, ""),
-        ("--airspeed-m-s", airspeed_m_s, 0.0, 150.0, fast),
-        ("--max-tip-mach", max_tip_mach, 0.05, 0.95, "Section theory ends below Mach 1"),
-        ("--capacity-Ah", capacity_Ah, 0.01, 1000.0, mAh), ("--minutes", minutes, 0.01, 1e4, ""),
-        ("--rest-kg", rest_kg, 0.001, mass_kg or 1000.0, "Part of the mass"),
-        ("--arm-mm", arm_mm, 10.0, 5000.0, "In metres? Times 1000" if arm_mm is not None and arm_mm < 10.0 else ""),
-    ):  # fmt: skip
-        if value is not None and not low <= value <= high:
-            faults.append(Fault("", name, f"{value:g}", f"a number from {low:g} to {high:g}", hint))
-    refuse(faults)
-    hover = None if mass_kg is None else mass_kg * G0 / rotors
-    most = 2.0 * float(hover or 0.0) if thrust_N is None else thrust_N
-    if hover is not None and most < hover:
-        hint = f"Each of {rotors} carries {hover:.2f} N in hover"
-        raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
-    rest = (1.0 - motors_file.SHARE) * mass_kg if mass_kg is not None and rest_kg is None else rest_kg
+    faults += [Fault("", k, repr(v), "a number") for k, v in given.items() if not (v is None or _is_number(v))]
+    refuse([*faults, *_clashes(fluid, fan, coaxial, rotors, rest_kg, mass_kg)])
+    refuse(_out_of_range(given))
+    hover, most, rest = None, thrust_N or 0.0, rest_kg
+    if mass_kg is not None:
+        hover = mass_kg * G0 / rotors
+        most = 2.0 * hover if thrust_N is None else thrust_N
+        rest = (1.0 - motors_file.SHARE) * mass_kg if rest_kg is None else rest_kg
+        if most < hover:
+            hint = f"Each of {rotors} carries {hover:.2f} N in hover"
+            raise InputError(Fault("", "--thrust-N", f"{most:g}", f"{hover:.4g} N or more", hint))
     arm_m = None if arm_mm is None else 1e-3 * arm_mm
     return Target(most, int(cells or 1), hover, airspeed_m_s, max_tip_mach, rotors, capacity_Ah, minutes, mass_kg, rest,
                   thrust_N is not None, fluid, coaxial, fan, True, arm_m)  # fmt: skip

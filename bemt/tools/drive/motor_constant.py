@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,9 +41,14 @@ CURRENTS = {"peak": 1.0, "rms": math.sqrt(0.5), "q_power_invariant": math.sqrt(1
 WINDINGS = ("wye", "delta")
 
 
-def _known(where: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise InputError(Fault("", where, repr(value), f"one of {', '.join(known)}"))
+def _factor(measures: Mapping[str, float], measure: str, between: str, winding: str, apart: str) -> float:
+    """Factor of a measure, times sqrt(3) between the lines of the winding that sets line and phase apart."""
+    for where, value, known in (
+        ("measure", measure, (*measures,)), ("between", between, ("line", "phase")), ("winding", winding, WINDINGS)
+    ):  # fmt: skip
+        if value not in known:
+            raise InputError(Fault("", where, repr(value), f"one of {', '.join(known)}"))
+    return measures[measure] * (math.sqrt(3.0) if (between, winding) == ("line", apart) else 1.0)
 
 
 def voltage_factor(measure: str, between: str, winding: str) -> float:
@@ -52,10 +57,7 @@ def voltage_factor(measure: str, between: str, winding: str) -> float:
     >>> voltage_factor("peak_to_peak", "phase", "delta"), round(voltage_factor("rms", "line", "wye"), 6)
     (2.0, 1.224745)
     """
-    _known("measure", measure, tuple(VOLTAGES))
-    _known("between", between, ("line", "phase"))
-    _known("winding", winding, WINDINGS)
-    return VOLTAGES[measure] * (math.sqrt(3.0) if (between, winding) == ("line", "wye") else 1.0)
+    return _factor(VOLTAGES, measure, between, winding, "wye")
 
 
 def current_factor(measure: str, between: str, winding: str) -> float:
@@ -64,10 +66,7 @@ def current_factor(measure: str, between: str, winding: str) -> float:
     >>> round(current_factor("q_power_invariant", "phase", "delta"), 6)
     1.224745
     """
-    _known("measure", measure, tuple(CURRENTS))
-    _known("between", between, ("line", "phase"))
-    _known("winding", winding, WINDINGS)
-    return CURRENTS[measure] * (math.sqrt(3.0) if (between, winding) == ("line", "delta") else 1.0)
+    return _factor(CURRENTS, measure, between, winding, "delta")
 
 
 def ke_to_kt(ke: float, measure: str = "q_power_invariant", between: str = "phase", winding: str = "wye") -> float:

@@ -38,11 +38,13 @@ if TYPE_CHECKING:
     from geometry.mesh import Options
 
 __all__ = [
-    "FEATURES", "BladeExport", "DiskExport", "Export", "Files", "Job", "LoadsExport", "SolidExport",
+    "FEATURES", "BladeExport", "DiskExport", "Export", "Files", "Job", "LoadsExport", "Manifest", "SolidExport",
 ]  # fmt: skip
 
 Files = Mapping[str, str | bytes]
 """Content by path below the folder of the export."""
+Manifest = dict[str, Any]
+"""What ``manifest.json`` says of an export, or a part of it."""
 
 FEATURES = {
     "torque": "shaft torque as well as thrust",
@@ -219,7 +221,7 @@ class Export(ABC):
     uses: ClassVar[frozenset[str]] = frozenset()
     turn: ClassVar[int] = 0
 
-    def put(self, job: Job, out: Path) -> dict[str, Any]:
+    def put(self, job: Job, out: Path) -> Manifest:
         """Write the files into a folder.
 
         Parameters
@@ -338,7 +340,7 @@ class Export(ABC):
         """
         return []
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+    def checked(self, job: Job, files: Files) -> Manifest:
         """Fit error, band and range for the manifest.
 
         Parameters
@@ -401,7 +403,7 @@ class LoadsExport(Export):
         """
         return None
 
-    def hub_checked(self, job: Job, files: Files) -> dict[str, Any] | None:
+    def hub_checked(self, job: Job, files: Files) -> Manifest | None:
         """Errors of the hub's loads at oblique points that are no nodes of the table."""
         table = self.asked(job).performance
         rpm, J = table.check_points()
@@ -423,7 +425,7 @@ class LoadsExport(Export):
             for name, row in zip(("thrust", "torque", "H", "Y", "roll", "pitch"), share, strict=True)
         } | {"of": "thrust at rest, its torque, and thrust times radius", "points": int(keep.size)}  # fmt: skip
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+    def checked(self, job: Job, files: Files) -> Manifest:
         """Errors at points that are no nodes of the table, at rest and over the flight range."""
         table = self.asked(job).performance
         rpm, J = table.check_points()
@@ -472,7 +474,7 @@ class DiskExport(Export):
             out.append(Fault(job.file, f"--format {self.id}", got, "a speed above 0", hint))
         return out
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+    def checked(self, job: Job, files: Files) -> Manifest:
         """Loads of the point, and what the written numbers integrate to."""
         point = job.loading
         T, Q = self.totals(job, files)
@@ -502,13 +504,13 @@ class SolidExport(Export):
 
     turn = 1
 
-    def put(self, job: Job, out: Path) -> dict[str, Any]:
+    def put(self, job: Job, out: Path) -> Manifest:
         """The files that `geometry.export` makes."""
         from bemt.tools.exports.parts import joined
         from geometry.common import GeometryError
         from geometry.export import export
 
-        found: dict[str, Any] = {}
+        found: Manifest = {}
         try:
             for s in job.shapes:
                 made = export(s.rotor, s.duct, out, [self.id], name=job.case.name + s.end, unit=job.unit,
@@ -581,7 +583,7 @@ class BladeExport(Export):
         """Fitted section of each anchor; None where the target holds the tables themselves."""
         return None
 
-    def checked(self, job: Job, files: Files) -> dict[str, Any]:
+    def checked(self, job: Job, files: Files) -> Manifest:
         """Loads of the case at the operating point, and how far fitted sections are off its tables."""
         from bemt.tools.exports.blades import section_errors
 

@@ -17,7 +17,7 @@ from bemt.base.toml import check_field, shown
 from bemt.base.toml_text import Collector
 from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
-from bemt.tools.exports.base import FEATURES, Job
+from bemt.tools.exports.base import FEATURES, Job, Manifest
 from bemt.tools.exports.parts import joined
 from bemt.tools.exports.printing import Print, faults_of, printed_text
 from geometry.common import GeometryError
@@ -73,12 +73,12 @@ def _targets(manifest: Mapping[str, Any]) -> tuple[TargetPart, ...]:
 class PartlyRefused(InputError):
     """Some targets were refused; the others are written, and `manifest` speaks of them."""
 
-    def __init__(self, faults: list[Fault], manifest: dict[str, Any]) -> None:
+    def __init__(self, faults: list[Fault], manifest: Manifest) -> None:
         super().__init__(faults)
         self.manifest = manifest
 
 
-def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
+def export_case(job: Job, out: Path, formats: Sequence[str]) -> Manifest:
     """Write one case for one or more targets; each is whole or not there.
 
     Formats of an earlier export of the same case stay, in the folder and in its manifest: the answer has those in
@@ -89,7 +89,7 @@ def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     if before.get("name", case.name) != case.name:
         got, wanted = f"the export of {before['name']!r}", f"a folder without an export, or with one of {case.name!r}"
         raise InputError(Fault((out / MANIFEST).as_posix(), "name", got, wanted, "Give each case an --out of its own"))
-    manifest: dict[str, Any] = {}
+    manifest: Manifest = {}
     faults: list[Fault] = []
     for target in sorted((exports()[word] for word in dict.fromkeys(formats)), key=lambda target: target.turn):
         with gathered(faults):
@@ -111,7 +111,7 @@ def export_case(job: Job, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     return manifest
 
 
-def _parts(manifest: Mapping[str, Any]) -> dict[str, Any]:
+def _parts(manifest: Mapping[str, Any]) -> Manifest:
     """Targets that have a part of the manifest to themselves, with the files that they list there."""
     return {key: v for key, v in manifest.items() if isinstance(v, dict) and isinstance(v.get("files"), dict)}
 
@@ -123,7 +123,7 @@ def _formats(manifest: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys([*out, *parts, *(one.target for one in _targets(manifest))]))
 
 
-def _kept(before: dict[str, Any], manifest: dict[str, Any], out: Path) -> dict[str, Any]:
+def _kept(before: Manifest, manifest: Manifest, out: Path) -> Manifest:
     """What stays of the manifest before: formats that were not asked for again and whose files are as they were."""
     gone, digests = set(_formats(manifest)), before.get("case_sha256", {})
 
@@ -160,7 +160,7 @@ def listed(manifest: Mapping[str, Any]) -> list[str]:
     return sorted(_hashes(manifest))
 
 
-def _manifest(out: Path) -> dict[str, Any]:
+def _manifest(out: Path) -> Manifest:
     """Manifest of the export that is in a folder; empty when it is not one of ours."""
     try:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
@@ -207,7 +207,7 @@ def export_cases(
     path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
     min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
     printed: Print | None = None,
-) -> tuple[list[tuple[dict[str, Any], Path]], list[InputError]]:  # fmt: skip
+) -> tuple[list[tuple[Manifest, Path]], list[InputError]]:  # fmt: skip
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
     `given` is the operating point (``rpm``, ``airspeed_m_s``) and the options of single targets
@@ -296,7 +296,7 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
     return faults
 
 
-def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
+def _targets_text(manifest: Manifest, out: Path) -> list[str]:
     """What each target holds, and how well."""
     lines = []
     for one in _targets(manifest):
@@ -328,7 +328,7 @@ def _targets_text(manifest: dict[str, Any], out: Path) -> list[str]:
     return lines
 
 
-def text(manifest: dict[str, Any], out: Path) -> str:
+def text(manifest: Manifest, out: Path) -> str:
     """Lay a manifest out for a terminal."""
     targets = _targets_text(manifest, out)
     if not manifest["files"] and targets:

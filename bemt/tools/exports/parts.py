@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from bemt.tools.exports.performance import LOWEST, THINNER, Performance, table_l
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case
-    from bemt.tools.exports.base import Export, Files, Job
+    from bemt.tools.exports.base import Export, Files, Job, Manifest
 
 
 # Loads of the hub in oblique flow for the exports: a table over speed, axial and in-plane advance ratio.
@@ -91,7 +92,7 @@ def hub_document(hub: HubTable) -> dict[str, Any]:
     return {"rpm": hub.rpm.tolist(), "J_axial": hub.J.tolist(), "J_side": hub.side.tolist(), **named}
 
 
-def hub_loads(doc: dict[str, Any], rho: float, D: float, rpm: Array, V: Array, side: Array) -> Array:
+def hub_loads(doc: Mapping[str, Any], rho: float, D: float, rpm: Array, V: Array, side: Array) -> Array:
     """Changes of thrust [N] and torque [N m], H, Y [N], roll, pitch [N m] of such a document at points, (6, P)."""
     axes = [np.asarray(doc[key], dtype=float) for key in ("rpm", "J_axial", "J_side")]
     n = rpm / 60.0
@@ -217,7 +218,7 @@ def table_document(job: Job) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def table_of_document(doc: dict[str, Any], rpm: Array, V: Array) -> tuple[Array, Array]:
+def table_of_document(doc: Mapping[str, Any], rpm: Array, V: Array) -> tuple[Array, Array]:
     """Loads of such a document, bilinear."""
     n, J, CT, CP = (np.asarray(doc[key], dtype=float) for key in ("rpm", "J", "CT", "CP"))
     return table_loads(n, J, CT, CP, float(doc["density_kg_m3"]), float(doc["diameter_m"]), rpm, V)
@@ -273,19 +274,22 @@ def table_module(job: Job, title: str) -> str:
     )
 
 
+def _run(text: str, name: str, *axes: Array) -> Array:
+    """What a function of such a text gives at points, (P, n)."""
+    space: dict[str, Callable[..., tuple[float, ...]]] = {}
+    exec(compile(text, "<export>", "exec"), space)
+    return np.array([space[name](*map(float, at)) for at in zip(*axes, strict=True)])
+
+
 def run_module(text: str, rpm: Array, V: Array) -> tuple[Array, Array]:
     """Loads by the lookup of such a text."""
-    space: dict[str, Any] = {}
-    exec(compile(text, "<export>", "exec"), space)
-    pairs = np.array([space["loads"](float(n), float(v)) for n, v in zip(rpm, V, strict=True)])
+    pairs = _run(text, "loads", rpm, V)
     return pairs[:, 0], pairs[:, 1]
 
 
 def run_hub(text: str, rpm: Array, V: Array, side: Array) -> Array:
     """Loads of the hub by the lookup of such a text, (6, P)."""
-    space: dict[str, Any] = {}
-    exec(compile(text, "<export>", "exec"), space)
-    return np.array([space["hub"](*map(float, at)) for at in zip(rpm, V, side, strict=True)]).T
+    return _run(text, "hub", rpm, V, side).T
 
 
 # What the manifest of an export says of one target: what its files hold, and what they do not.
@@ -324,9 +328,9 @@ def _lost(export: Export, job: Job) -> list[str]:
     return out
 
 
-def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
+def entry(export: Export, job: Job, files: Files) -> Manifest:
     """Manifest entry of one target: what a reader of its files must know, and a hash of each."""
-    found: dict[str, Any] = {
+    found: Manifest = {
         "target": export.id, "title": export.title, "kind": export.kind, "holds": export.holds,
         "features": sorted(export.features), "conventions": export.conventions, "rotation": job.rotation,
         "source": export.source,
@@ -343,7 +347,7 @@ def entry(export: Export, job: Job, files: Files) -> dict[str, Any]:
     return found
 
 
-def joined(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
+def joined(first: Manifest, second: Manifest) -> Manifest:
     """Both manifests in one; the second is the newer."""
     joined = {**first, **second}
     for key in ("volumes_m3", "case_sha256"):

@@ -182,7 +182,7 @@ def _changes(case: Case, before: Rotor, after: Rotor) -> dict[str, Any]:
             "thrust_pct": thrust, "torque_pct": torque}  # fmt: skip
 
 
-def printed_text(printed: dict[str, Any]) -> list[str]:
+def printed_text(printed: Mapping[str, Any]) -> list[str]:
     """Lines for the terminal."""
     lines = [f"printed with a least thickness of {printed['least_thickness_mm']:g} mm"]
     if "tip_chord_mm" in printed:
@@ -205,18 +205,12 @@ class StlExport(SolidExport):
     source = "geometry.export"
 
 
-# OBJ solids.
-
-
 class ObjExport(SolidExport):
     """OBJ, triangles."""
 
     id = "obj"
     title = "OBJ, triangles"
     source = "geometry.export"
-
-
-# STEP solids.
 
 
 class StepExport(SolidExport):
@@ -227,18 +221,12 @@ class StepExport(SolidExport):
     source = "geometry.export"
 
 
-# 3MF solids.
-
-
 class ThreeMfExport(SolidExport):
     """3MF, triangles in millimetres for slicers."""
 
     id = "3mf"
     title = "3MF, triangles for slicers"
     source = "geometry.export"
-
-
-# Air round a rotor and its duct, in STEP with named faces, for a mesher.
 
 
 class FlowExport(SolidExport):

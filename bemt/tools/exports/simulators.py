@@ -118,6 +118,13 @@ def _fit_hub(job: Job) -> tuple[float, float]:
 # RotorPy: the rotor's entries of a vehicle's parameters.
 
 
+def _rotor_params(files: Files) -> dict[str, float]:
+    """Parameters that a written file sets."""
+    space: dict[str, dict[str, float]] = {}
+    exec(str(next(iter(files.values()))), {}, space)
+    return space["rotor_params"]
+
+
 class RotorpyExport(LoadsExport):
     """Six constants: thrust, torque, the loss of thrust with axial speed, and three of the wind across the shaft."""
 
@@ -172,16 +179,12 @@ rotor_direction = {-t.sense}
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Compute_body_wrench of one rotor along its axis."""
-        space: dict[str, dict[str, float]] = {}
-        exec(str(next(iter(files.values()))), {}, space)
-        k, W = space["rotor_params"], rpm * np.pi / 30.0
+        k, W = _rotor_params(files), rpm * np.pi / 30.0
         return k["k_eta"] * W**2 - k["k_z"] * W * airspeed_m_s, k["k_m"] * W**2
 
     def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
         """Compute_body_wrench of one rotor; without side force and roll moment."""
-        space: dict[str, dict[str, float]] = {}
-        exec(str(next(iter(files.values()))), {}, space)
-        k, W = space["rotor_params"], rpm * np.pi / 30.0
+        k, W = _rotor_params(files), rpm * np.pi / 30.0
         T, Q = self.loads(files, rpm, airspeed_m_s)
         none = np.full(W.shape, np.nan)
         return np.array([T + k["k_h"] * side_m_s**2, Q, k["k_d"] * W * side_m_s, none, none,

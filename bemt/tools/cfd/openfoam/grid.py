@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any
+from collections.abc import Sequence
 
-from bemt.base.foam_text import dictionary, vector
+from bemt.base.foam_text import Entries, dictionary, vector
 from bemt.tools.cfd.openfoam.settings import PIPE_RADIUS, Settings
 
 SURFACE_LEVEL = 6
@@ -55,89 +55,116 @@ def _narrow(s: Settings) -> tuple[int, int]:
     return max(0, round(math.log2(s.base_cell * across / half))), across
 
 
-def block_mesh(s: Settings) -> str:
-    """Write ``blockMeshDict``."""
-    radius, low, high = extent(s)
-    angle = 2 * math.pi / s.sectors
-    parts = math.ceil(angle / math.radians(120) - 1e-9) if s.sectors > 2 else 4 // s.sectors
-    step = angle / parts
-    shift, across = _narrow(s)
-    cell = s.base_cell / 2**shift
-    turning, zone_low, zone_high = mrf_zone(s)
-    planes = s.zone == "grid"
+def _kites(s: Settings, radius: float, step: float, cell: float) -> tuple[float, float, int]:
+    """Radius of the kites round the shaft and of their outer corners [m], and cells along their sides."""
+    turning, across, planes = mrf_zone(s)[0], _narrow(s)[1], s.zone == "grid"
     inner = 0.6 * radius if s.domain == "pipe" else turning if planes else KITES * s.R
     if across:
         inner = 0.6 * s.Rhub
     mid = inner * (0.75 * math.sqrt(2.0) if step > 1.3 else 1 / math.cos(0.5 * step))
     fitting = math.ceil(inner / cell - 1e-9) if planes else round(inner / cell)
-    n = across or max(2, fitting, math.ceil(0.5 * step * (s.R if inner < s.R else inner) / cell))
+    return inner, mid, across or max(2, fitting, math.ceil(0.5 * step * max(s.R, inner) / cell))
+
+
+def _outward(s: Settings, radius: float, inner: float, cell: float) -> tuple[int, str]:
+    """Rings outside the kites, and their grading."""
     if s.domain == "pipe":
-        rings, out = max(2, round((radius - inner) / cell)), "1"
-    elif across and planes:
+        return max(2, round((radius - inner) / cell)), "1"
+    turning = mrf_zone(s)[0]
+    if _narrow(s)[1] and s.zone == "grid":
         near_rings, near_ratio = _graded(turning - inner, cell)
         far_rings, far_ratio = _graded(radius - turning, cell * near_ratio * GROWTH)
-        rings = near_rings + far_rings
         out = (f"(({turning - inner:.17g} {near_rings} {near_ratio:.6g}) "
                f"({radius - turning:.17g} {far_rings} {far_ratio:.6g}))")  # fmt: skip
-    else:
-        rings, ratio = _graded(radius - inner, cell)
-        out = f"{ratio:.6g}"
+        return near_rings + far_rings, out
+    rings, ratio = _graded(radius - inner, cell)
+    return rings, f"{ratio:.6g}"
+
+
+def _upward(s: Settings, low: float, high: float, cell: float) -> tuple[int, str]:
+    """Layers and their grading: even through rotor, bodies and rotating zone, growing beyond."""
     others = [body for body in (s.duct, s.body) if body is not None]
     near = [min([s.rotor.low, -1.5 * s.R, *(b.low - 0.3 * s.R for b in others)]),
             max([s.rotor.high, 0.75 * s.R, *(b.high + 0.3 * s.R for b in others)])]  # fmt: skip
     if s.plate_z is not None:
         near[0] = min(near[0], s.plate_z - 0.5 * s.R)
-    stops, digits = [near[0], near[1]], 6
-    if planes:
-        low, high = _written(low), _written(high)
+    stops, digits = near, 6
+    if s.zone == "grid":
+        _, zone_low, zone_high = mrf_zone(s)
         stops = [min(near[0], zone_low - 0.1 * s.R), zone_low, zone_high, max(near[1], zone_high + 0.1 * s.R)]
         digits = 17
     below, ratio_below = _graded(stops[0] - low, cell)
     above, ratio_above = _graded(high - stops[-1], cell)
     even = [(b - a, max(1, round((b - a) / cell)), 1.0) for a, b in itertools.pairwise(stops)]
-    z_parts = [(stops[0] - low, below, 1 / ratio_below), *even, (high - stops[-1], above, ratio_above)]
-    layers = sum(cells for _, cells, _ in z_parts)
-    z_grading = f"({' '.join(f'({length:.{digits}g} {cells} {ratio:.6g})' for length, cells, ratio in z_parts)})"
+    parts = [(stops[0] - low, below, 1 / ratio_below), *even, (high - stops[-1], above, ratio_above)]
+    grading = " ".join(f"({length:.{digits}g} {cells} {ratio:.6g})" for length, cells, ratio in parts)
+    return sum(cells for _, cells, _ in parts), f"({grading})"
+
+
+def block_mesh(s: Settings) -> str:
+    """Write ``blockMeshDict``."""
+    radius, low, high = extent(s)
+    planes = s.zone == "grid"
+    if planes:
+        low, high = _written(low), _written(high)
+    angle = 2 * math.pi / s.sectors
+    parts = math.ceil(angle / math.radians(120) - 1e-9) if s.sectors > 2 else 4 // s.sectors
+    step = angle / parts
+    cell = s.base_cell / 2 ** _narrow(s)[0]
+    inner, mid, n = _kites(s, radius, step, cell)
+    rings, out = _outward(s, radius, inner, cell)
+    layers, z_grading = _upward(s, low, high, cell)
     turns = [-0.5 * angle + k * step for k in range(parts + (s.sectors > 1))]
-    points: list[tuple[float, float]] = [(0.0, 0.0)]
-    for r, at in ((inner, turns), (mid, [t + 0.5 * step for t in turns[:parts]]),
-                  (radius, turns), (radius, [t + 0.5 * step for t in turns[:parts]])):  # fmt: skip
+    between = [t + 0.5 * step for t in turns[:parts]]
+    points = [(0.0, 0.0)]
+    for r, at in ((inner, turns), (mid, between), (radius, turns), (radius, between)):
         points += [(r * math.cos(t), r * math.sin(t)) for t in at]
     count, ends = len(points), len(turns)
     A = [1 + k % ends for k in range(parts + 1)]
-    M = [1 + ends + k for k in range(parts)]
+    M = range(1 + ends, 1 + ends + parts)
     P = [1 + ends + parts + k % ends for k in range(parts + 1)]
-    Q = [1 + 2 * ends + parts + k for k in range(parts)]
+    Q = range(1 + 2 * ends + parts, count)
 
-    def hexa(ids: tuple[int, ...], cells: tuple[int, int], grading: str) -> str:
-        corners = " ".join(str(i) for i in (*ids, *(i + count for i in ids)))
-        return f"    hex ({corners}) ({cells[0]} {cells[1]} {layers}) simpleGrading ({grading} 1 {z_grading})\n"
+    def lifted(*ids: int) -> tuple[int, ...]:
+        return tuple(i + count for i in ids)
 
-    blocks, arcs, side, ends_faces = "", "", "", []
+    def upright(a: int, b: int) -> tuple[int, ...]:
+        return a, b, *lifted(b, a)
+
+    blocks, arcs, side, floor = "", "", list[tuple[int, ...]](), list[tuple[int, ...]]()
     for k in range(parts):
         kite, first, second = (0, A[k], M[k], A[k + 1]), (A[k], P[k], Q[k], M[k]), (M[k], Q[k], P[k + 1], A[k + 1])
-        for ids, cells, grading in ((kite, (n, n), "1"), (first, (rings, n), out), (second, (rings, n), out)):
-            blocks += hexa(ids, cells, grading)
-            ends_faces.append(ids)
+        for ids, cells, grading in ((kite, n, "1"), (first, rings, out), (second, rings, out)):
+            blocks += (f"    hex {_ids(*ids, *lifted(*ids))} ({cells} {n} {layers}) "
+                       f"simpleGrading ({grading} 1 {z_grading})\n")  # fmt: skip
+            floor.append(ids)
         for a, b, t in ((P[k], Q[k], turns[0] + (k + 0.25) * step), (Q[k], P[k + 1], turns[0] + (k + 0.75) * step)):
-            side += f"            ({a} {b} {b + count} {a + count})\n"
+            side.append(upright(a, b))
             for shift, z in ((0, low), (count, high)):
                 on_arc = vector(radius * math.cos(t), radius * math.sin(t), z)
                 arcs += f"    arc {a + shift} {b + shift} {on_arc}\n"
     spelled = _whole if planes else vector
     vertices = "".join(f"    {spelled(x, y, z)}\n" for z in (low, high) for x, y in points)
-    bottom = "".join(f"            ({' '.join(map(str, ids))})\n" for ids in ends_faces)
-    top = "".join(f"            ({' '.join(str(i + count) for i in ids)})\n" for ids in ends_faces)
-    patches = [("inlet", "patch", top), ("outlet", "patch", bottom), ("side", "patch", side)]
+    patches: dict[str, list[tuple[int, ...]]] = {
+        "inlet": [lifted(*ids) for ids in floor],
+        "outlet": floor,
+        "side": side,
+    }
     if s.sectors > 1:
-        for name, a, p in (("periodic1", A[0], P[0]), ("periodic2", A[parts], P[parts])):
-            faces = "".join(f"            ({i} {j} {j + count} {i + count})\n" for i, j in ((0, a), (a, p)))
-            patches.append((name, "patch", faces))
-    row = "    {}\n    {{\n        type {};\n        faces\n        (\n{}        );\n    }}\n"
-    boundary = "".join(row.format(*patch) for patch in patches)
+        patches |= {f"periodic{i}": [upright(0, A[k]), upright(A[k], P[k])] for i, k in ((1, 0), (2, parts))}
+    boundary = "".join(_patch(name, faces) for name, faces in patches.items())
     head = dictionary("blockMeshDict", {"convertToMeters": 1}, note=f"base cell {cell:.4g} m")
     return (f"{head}\nvertices\n(\n{vertices});\n\nblocks\n(\n{blocks});\n\nedges\n(\n{arcs});\n\n"
             f"boundary\n(\n{boundary});\n\nmergePatchPairs\n(\n);\n")  # fmt: skip
+
+
+def _ids(*ids: int) -> str:
+    return f"({' '.join(map(str, ids))})"
+
+
+def _patch(name: str, faces: Sequence[tuple[int, ...]]) -> str:
+    rows = "".join(f"            {_ids(*ids)}\n" for ids in faces)
+    return f"    {name}\n    {{\n        type patch;\n        faces\n        (\n{rows}        );\n    }}\n"
 
 
 def mrf_zone(s: Settings) -> tuple[float, float, float]:
@@ -194,13 +221,13 @@ def lines(s: Settings) -> str:
     return points + rows
 
 
-def _cylinder(low: float, high: float, radius: float) -> dict[str, Any]:
+def _cylinder(low: float, high: float, radius: float) -> dict[str, object]:
     return {"type": "searchableCylinder", "point1": vector(0, 0, low), "point2": vector(0, 0, high), "radius": radius}
 
 
-def _tips(s: Settings) -> dict[str, dict[str, Any]]:
+def _tips(s: Settings) -> dict[str, Entries]:
     """Boxes round the clearance of every blade in the domain."""
-    out = {}
+    out: dict[str, Entries] = {}
     inside = s.B // s.sectors
     depth = max(s.gap, 0.01 * s.R)
     wide = 2 * s.R * math.sin(min(s.blades.tip_half_angle + 0.02, 1.2))
@@ -221,7 +248,7 @@ def _tips(s: Settings) -> dict[str, dict[str, Any]]:
 def snappy(s: Settings) -> str:
     """Write ``snappyHexMeshDict``."""
     R, cell = s.R, s.base_cell
-    geometry: dict[str, Any] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
+    geometry: dict[str, object] = {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in s.surfaces}
     thick = 0.12 * R
     if s.plate_z is not None:
         geometry["plate"] = _cylinder(s.plate_z - thick, s.plate_z, s.plate_radius)
@@ -284,7 +311,7 @@ def topo_set(s: Settings) -> str:
     """Write ``topoSetDict``: the cells that turn."""
     radius, low, high = mrf_zone(s)
     where = {"p1": vector(0, 0, low), "p2": vector(0, 0, high), "radius": radius}
-    actions: list[dict[str, Any]] = [
+    actions: list[Entries] = [
         {"name": "turning", "type": "cellSet", "action": "new", "source": "cylinderToCell", **where},
         {"name": "turning", "type": "cellZoneSet", "action": "new", "source": "setToCellZone", "set": "turning"},
     ]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from bemt.base.foam_text import dictionary, vector
 from bemt.tools.cfd.openfoam.settings import Settings
 
@@ -17,8 +15,8 @@ BALANCE = 10
 """How often the averaged iterations are balanced."""
 
 
-def _forces(s: Settings, patches: list[str], **more: Any) -> dict[str, Any]:
-    out: dict[str, Any] = {"type": "forces", "libs": '("libforces.so")', "patches": patches, "CofR": vector(0, 0, 0),
+def _forces(s: Settings, patches: list[str], **more: object) -> dict[str, object]:
+    out: dict[str, object] = {"type": "forces", "libs": '("libforces.so")', "patches": patches, "CofR": vector(0, 0, 0),
                            "log": False, "writeControl": "timeStep", "writeInterval": 1}  # fmt: skip
     return out | ({"pRef": s.pressure} if s.compressible else {"rho": "rhoInf", "rhoInf": s.rho, "pRef": 0}) | more
 
@@ -28,12 +26,12 @@ def through(s: Settings) -> tuple[str, ...]:
     return (*OPEN, *(SIDES if s.sectors > 1 else ()))
 
 
-def _balance(s: Settings) -> dict[str, Any]:
+def _balance(s: Settings) -> dict[str, object]:
     """Function objects of the balance: flux and momentum through every patch, pressure and shear on it."""
     step = max(1, s.average // BALANCE)
     when = {"timeStart": s.iterations - s.average + 1, "executeControl": "timeStep", "executeInterval": step,
             "writeControl": "timeStep", "writeInterval": step}  # fmt: skip
-    out: dict[str, Any] = {}
+    out: dict[str, object] = {}
     for patch in through(s):
         common = {"type": "surfaceFieldValue", "libs": '("libfieldFunctionObjects.so")', "log": False,
                   "regionType": "patch", "name": patch, "surfaceFormat": "raw", "writeFields": True} | when  # fmt: skip
@@ -52,7 +50,7 @@ def control(s: Settings, balance: bool = True) -> str:
     the plate; ``radial`` the blade in bins along x, which blade 1 lies on (no bins for the whole rotor). ``mass_...``,
     ``momentum_...``, ``open`` and ``sides`` are for :mod:`bemt.tools.cfd.balance`.
     """
-    functions: dict[str, Any] = {"forces": _forces(s, ["blade", "hub"])}
+    functions: dict[str, object] = {"forces": _forces(s, ["blade", "hub"])}
     standing = [name for name in s.walls if name != "plate"]
     if standing:
         functions["standing"] = _forces(s, standing)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bemt.tools.cfd.openfoam.write import Run, RunTable, write_openfoam
-from bemt.tools.exports.base import Job, SolidExport
+from bemt.tools.exports.base import Job, Manifest, SolidExport
 
 
 class OpenfoamExport(SolidExport):
@@ -22,7 +22,7 @@ class OpenfoamExport(SolidExport):
     uses = frozenset(RunTable.named())
     turn = 2
 
-    def put(self, job: Job, out: Path) -> dict[str, Any]:
+    def put(self, job: Job, out: Path) -> Manifest:
         """The whole case, whose faults come before anything is written."""
         given = {"rpm": job.rpm, "airspeed_m_s": job.airspeed_m_s, **job.own}
         run = Run(**{key: value for key, value in given.items() if key in self.uses and value is not None})

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bemt.base.errors import Fault, InputError, needs, refuse
-from bemt.base.foam_text import dictionary, vector
+from bemt.base.foam_text import Entries, dictionary, vector
 from bemt.base.tables import write_atomic
 from bemt.base.toml import check_field, entry
 from bemt.base.toml_text import Collector
@@ -66,15 +67,19 @@ DIMENSIONS = {
 }  # fmt: skip
 
 
-def _outer(s: Settings) -> dict[str, dict[str, dict[str, Any]]]:
+Patch = Mapping[str, Entries]
+"""Conditions on a patch, by field."""
+
+
+def _outer(s: Settings) -> Mapping[str, Patch]:
     """Conditions of U and p on inlet, outlet and side."""
     wind, still = f"uniform {vector(*s.wind)}", "uniform (0 0 0)"
     p = f"uniform {s.pressure:.9g}" if s.compressible else "uniform 0"
-    total: dict[str, Any] = {"type": "totalPressure", "p0": p, "value": p}
+    total: dict[str, object] = {"type": "totalPressure", "p0": p, "value": p}
     if s.compressible:
         total |= {"rho": "rho", "psi": "none", "gamma": 1}
-    quiet = {"U": {"type": "pressureInletOutletVelocity", "value": still}, "p": total}
-    slip = {"U": {"type": "slip"}, "p": {"type": "zeroGradient"}}
+    quiet: Patch = {"U": {"type": "pressureInletOutletVelocity", "value": still}, "p": total}
+    slip: Patch = {"U": {"type": "slip"}, "p": {"type": "zeroGradient"}}
     if s.V == 0:
         return {"inlet": quiet, "outlet": quiet, "side": slip if s.domain == "pipe" else quiet}
     inlet = {"U": {"type": "fixedValue", "value": wind}, "p": {"type": "zeroGradient"}}
@@ -103,14 +108,14 @@ def fields(s: Settings) -> dict[str, str]:
         start = {"U": f"uniform {vector(*s.wind)}", "p": f"uniform {s.pressure:.9g}" if s.compressible else "uniform 0",
                  "T": f"uniform {s.temperature:.9g}", "alphat": "uniform 0"}.get(name)  # fmt: skip
         start = start or f"uniform {level[name]:.6g}"
-        conditions: dict[str, dict[str, Any]] = {
+        conditions: dict[str, Entries] = {
             "U": {"type": "fixedValue", "value": "uniform (0 0 0)"}, "p": {"type": "zeroGradient"},
             "k": {"type": "kqRWallFunction", "value": start}, "omega": {"type": "omegaWallFunction", "value": start},
             "epsilon": {"type": "epsilonWallFunction", "value": start},
             "nut": {"type": "nutkWallFunction", "value": "uniform 0"}, "T": {"type": "zeroGradient"},
             "alphat": {"type": "compressible::alphatWallFunction", "Prt": 0.85, "value": "uniform 0"},
         }  # fmt: skip
-        boundary: dict[str, Any] = {}
+        boundary: dict[str, object] = {}
         for patch, known in outer.items():
             if name in known:
                 boundary[patch] = known[name]
@@ -151,7 +156,7 @@ def constants(s: Settings) -> dict[str, str]:
         "thermo": "hConst", "equationOfState": "adiabaticPerfectFluid" if isentropic else "perfectGas",
         "specie": "specie", "energy": "sensibleEnthalpy",
     }  # fmt: skip
-    mixture: dict[str, Any] = {
+    mixture: dict[str, object] = {
         "specie": {"molWeight": 8314.46 / 287.05},
         "thermodynamics": {"Cp": CP, "Hf": 0},
         "transport": {"mu": s.mu, "Pr": PRANDTL},
@@ -167,7 +172,7 @@ def constants(s: Settings) -> dict[str, str]:
 def schemes(s: Settings) -> str:
     """Write ``fvSchemes``: second order for momentum, first for turbulence."""
     upwind = "bounded Gauss upwind"
-    div: dict[str, Any] = {"default": "none", "div(phi,U)": "bounded Gauss linearUpwind limited",
+    div: dict[str, object] = {"default": "none", "div(phi,U)": "bounded Gauss linearUpwind limited",
                            **{f"div(phi,{name})": upwind for name in ("k", "omega", "epsilon")}}  # fmt: skip
     if s.compressible:
         div |= {"div(phi,h)": upwind, "div(phi,K)": upwind, "div(phi,Ekp)": upwind,
@@ -187,8 +192,8 @@ def schemes(s: Settings) -> str:
 def solution(s: Settings) -> str:
     """Write ``fvSolution``: SIMPLE with p 0.3 and U 0.6; SIMPLEC diverged."""
     smooth = {"solver": "smoothSolver", "smoother": "symGaussSeidel", "tolerance": 1e-9, "relTol": 0.1}
-    simple: dict[str, Any] = {"nNonOrthogonalCorrectors": 0, "consistent": False}
-    relax: dict[str, Any] = {"p": 0.3}
+    simple: dict[str, object] = {"nNonOrthogonalCorrectors": 0, "consistent": False}
+    relax: dict[str, object] = {"p": 0.3}
     if s.compressible:
         simple |= {"pMinFactor": 0.3, "pMaxFactor": 2.0, "transonic": False}
         relax["rho"] = 0.3
