@@ -62,6 +62,7 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "posizione~radiale",
     "chord": "弦长 弦長 sehne sehnenlange profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
     "longueur~de~corde",
+    "thickness": "dicke profildicke blattdicke epaisseur espesor spessore espessura grubosc dikte толщина 厚度",
     "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "
     "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
     "kat~nastawienia угол~установки",
