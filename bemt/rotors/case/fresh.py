@@ -119,9 +119,9 @@ soc = {SOC:g}  # charge at which full throttle and hover are stated
 sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
-[drive.motor]  # instead of both what the motor's sheet says: resistance_mohm and no_load_A; or its mass_g or stator
-size = {size:g}  # usual for K_v and cells
-idle_share = {idle:g}
+[drive.motor]
+size = {size:g}  # the winding is usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
+idle_share = {idle:g}  # of the current. Better: replace this line by no_load_A, from the motor's sheet
 
 # [drive.vehicle]  # for hover
 # mass_kg = 1.4
