@@ -490,7 +490,7 @@ def test_results_never_replace_the_file_that_was_read(
     assert path.read_text() == text and len(list(tmp_path.iterdir())) == 1
 
 
-def test_the_motors_sheet_takes_the_place_of_what_is_typical(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_motors_sheet_takes_the_place_of_what_is_typical(tmp_path: Path) -> None:
     """By options or in the case, whose assumptions may stay: the same answer."""
     folder = tmp_path / "mine"
     assert main(["new", "9x6", "--kv", "900", "--cells", "3", "--out", str(folder)]) == 0
@@ -507,7 +507,7 @@ def test_the_motors_sheet_takes_the_place_of_what_is_typical(tmp_path: Path, cap
     assert [n.split()[3] for n in by_case.notes[:2]] == ["drive.motor.size", "drive.motor.idle_share"]
 
 
-def test_a_mass_in_grams_is_called_so(tmp_path: Path) -> None:
+def test_a_mass_in_grams_is_called_so() -> None:
     case = rotor_of("5x4.3x3").case
     heavy, light = (
         drive_result.solve(drive_result.with_drive(case, kv=2400, cells=4, mass_kg=m, rotors=4)) for m in (650, 6.5)

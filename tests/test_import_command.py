@@ -235,3 +235,25 @@ def test_import_takes_the_speed_that_diagnose_takes(put: Callable[..., Path]) ->
     )
     lines = import_files([str(put("strong.csv", strong))]).text().splitlines()
     assert "power_above_input" in lines[1]
+
+
+@pytest.mark.parametrize(("heads", "air"), [
+    ("Temp (F),Pressure (inHg)", (64.4, 29.09)), ("Lufttemperatur (C),Luftdruck (hPa)", (18.0, 985.1)),
+    ("temperature (C),pressure (kPa)", (18.0, 98.51)),
+])  # fmt: skip
+def test_temperature_and_pressure_are_the_airs_however_they_are_headed(
+    heads: str, air: tuple[float, float], put: Callable[..., Path]
+) -> None:
+    n = np.arange(3000.0, 7000.0, 500.0)
+    rows = "".join(f"{v:g},{8e-8 * v**2:.6g},{1.3e-9 * v**2.01:.6g},{air[0]:g},{air[1]:g}\n" for v in n)
+    path = put("air.csv", f"rpm,thrust (N),torque (Nm),{heads}\n{rows}")
+    reduced = import_files([str(path)]).files[0].reduced
+    assert reduced["density_kg_m3"] == pytest.approx(98510.0 / (287.05 * 291.15), rel=1e-3)
+
+
+def test_fahrenheit_under_celsius_is_an_error_that_says_so(put: Callable[..., Path]) -> None:
+    n = np.arange(3000.0, 7000.0, 500.0)
+    rows = "".join(f"{v:g},{8e-8 * v**2:.6g},{1.3e-9 * v**2.01:.6g},64.4,985\n" for v in n)
+    path = put("air.csv", f"rpm,thrust (N),torque (Nm),air temperature (C),air pressure (hPa)\n{rows}")
+    text = import_files([str(path)]).text()
+    assert "64.4 F is 18 C" in text and "Fahrenheit taken for Celsius" in text.splitlines()[1]

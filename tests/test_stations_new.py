@@ -82,7 +82,8 @@ def test_a_name_with_stations_in_any_dialect_is_the_same_case(name: str, tmp_pat
 
 
 @pytest.mark.parametrize(("head", "words"), [
-    ("r,c,beta", r"r \(mm\), c \(mm\)"), ("r/R,c/R,twist (deg)", "Rename it to beta_deg if"), ("r/R,c/R,sweep (deg)", "beta_deg"),
+    ("r,c,beta", r"r \(mm\), c \(mm\)"), ("r/R,c/R,twist (deg)", "Rename it to beta_deg if"),
+    ("r/R,c/R,sweep (deg)", "beta_deg"),
     ("r (V),c/R,beta (deg)", "r_over_R"), ("r/R,chord [-],beta (deg)", "chord"),
 ])  # fmt: skip
 def test_stations_that_leave_a_doubt_are_refused_with_what_to_write(head: str, words: str, tmp_path: Path) -> None:

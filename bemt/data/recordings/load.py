@@ -320,7 +320,9 @@ class ImportedFile:
         """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
         if self.record is None:
             return ""
-        told = {f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings}
+        told = {
+            f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+        }
         errors = [text for f, text in told.items() if f.severity == "error"]
         lines, rows, plain = [self.title, *errors], [], []
         for name in self.record.values:

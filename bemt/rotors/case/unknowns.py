@@ -204,7 +204,7 @@ def out_of_place(document: Mapping[str, Any]) -> dict[str, str]:
     for key in (item.get("key") for item in declared if isinstance(item, dict)):
         _, home, name = key.split(".") if key in _STATED else ("", "", "")
         if home and isinstance(table := drive.get(home), dict) and name not in table:
-            found |= {key: said for said in _STATED[key] if said in table}
+            found.update((key, said) for said in _STATED[key] if said in table)
     return found
 
 

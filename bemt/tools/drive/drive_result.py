@@ -379,7 +379,8 @@ def text(found: DriveResult) -> str:
         lines += [
             f"assumed     winding {1e3 * drive.motor.resistance_ohm:.0f} mohm, no-load current "
             f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from the",
-            f"            motor's sheet (--resistance-mohm, --no-load-A) the current is known to {b:.0f} % instead of {a:.0f} %",
+            f"            motor's sheet (--resistance-mohm, --no-load-A) the current is known to {b:.0f} % instead of "
+            f"{a:.0f} %",
         ]
     ask = [name for name, v in (("--mass-kg", mass), ("--capacity-Ah", t.battery.capacity_Ah)) if v is None]
     if ask:
