@@ -109,7 +109,7 @@ def test_all_faults_of_a_reading_at_once():
         Air.from_state(1013.25, 293.15, 150.0)
     assert str(error.value).splitlines() == [
         "air.pressure_Pa: got 1013.25; expected 10000 to 120000 Pa. hPa given?",
-        "air.temperature_C: got 293.15; expected -60 to 60 degC. Kelvin given?",
+        "air.temperature_C: got 293.15; expected -60 to 60 degC. Kelvin given? 293.15 K is 20 C.",
         "air.humidity_pct: got 150; expected 0 to 100 %. Relative humidity in per cent.",
     ]
 

@@ -26,11 +26,13 @@ def few():
 @pytest.mark.parametrize("label, kv, cells", [("10x4.5", 900.0, 3), ("15x5", 400.0, 6), ("6x4x3", 2300.0, 4)])
 def test_hover_and_full_throttle_are_those_of_drive(label: str, kv: float, cells: int) -> None:
     case = drive_result.with_drive(rotor_of(label).case, kv=kv, cells=cells)
-    full = drive_result.full_throttle(case, bands=False)["thrust_N"].value
+    throttle = drive_result.full_throttle(case, bands=False)
+    full = throttle["thrust_N"].value
     mass = 0.4 * full / 9.80665
     found = choose(0.9 * full, cells, labels=[label], motors=[KnownMotor("M", kv)], mass_kg=mass).iloc[0]
     hover = drive_result.solve(drive_result.with_drive(case, mass_kg=found.at_N / 9.80665)).hover
     assert found.full_thrust_N == pytest.approx(full, rel=0.01)
+    assert found.peak_A == pytest.approx(throttle["battery_A"].value, rel=0.02)  # what the controller has to stand
     assert found.rpm == pytest.approx(hover["rpm"].value, rel=0.003)
     assert found.power_W == pytest.approx(hover["power_W"].value, rel=0.01)
     assert found.current_A == pytest.approx(hover["battery_A"].value, rel=0.01)

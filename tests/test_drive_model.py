@@ -18,6 +18,7 @@ from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.physics import effects
 from bemt.rotors.case import load_case
+from bemt.rotors.propeller import rotor_of
 from bemt.tools.drive import drive_model, drive_result, mission
 from bemt.tools.drive.bench_map import map_points
 from bemt.tools.drive.drive_model import EFFECTS, Battery, Drive, Esc, Motor
@@ -487,3 +488,28 @@ def test_results_never_replace_the_file_that_was_read(
     assert main(["thrusters", str(path), "--out", str(tmp_path)]) == 2
     assert "which this run reads" in capsys.readouterr().err
     assert path.read_text() == text and len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_motors_sheet_takes_the_place_of_what_is_typical(tmp_path: Path) -> None:
+    """By options or in the case, whose assumptions may stay: the same answer."""
+    folder = tmp_path / "mine"
+    assert main(["new", "9x6", "--kv", "900", "--cells", "3", "--out", str(folder)]) == 0
+    case = load_case(folder)
+    by_option = drive_result.solve(drive_result.with_drive(case, resistance_mohm=80.0, no_load_A=0.6))
+    text = (folder / "case.toml").read_text()
+    for key, said in (("size", "resistance_mohm = 80"), ("idle_share", "no_load_A = 0.6")):
+        (line,) = [x for x in text.splitlines() if x.startswith(f"{key} = ")]
+        text = text.replace(line, said)
+    (folder / "case.toml").write_text(text)
+    by_case = drive_result.solve(load_case(folder))
+    assert by_case.full["battery_A"].value == pytest.approx(by_option.full["battery_A"].value, rel=1e-9)
+    assert by_case.full["battery_A"].u < 0.9 * drive_result.solve(case).full["battery_A"].u
+    assert [n.split()[3] for n in by_case.notes[:2]] == ["drive.motor.size", "drive.motor.idle_share"]
+
+
+def test_a_mass_in_grams_is_called_so() -> None:
+    case = rotor_of("5x4.3x3").case
+    heavy, light = (
+        drive_result.solve(drive_result.with_drive(case, kv=2400, cells=4, mass_kg=m, rotors=4)) for m in (650, 6.5)
+    )
+    assert "grams" in heavy.notes[0] and not any("grams" in note for note in light.notes)

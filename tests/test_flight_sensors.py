@@ -277,15 +277,24 @@ def test_curve_of_an_autopilot(expo: float) -> None:
     assert abs(got["MPC_THR_HOVER"].value - thrust.mean()) < 0.01 + got["MPC_THR_HOVER"].half / 4.0
 
 
-@pytest.mark.parametrize("heads", ["t_s,rpm1,rpm2,rpm3,rpm4", "time,motor_1_rpm,motor_2_rpm,motor_3_rpm,motor_4_rpm"])
+@pytest.mark.parametrize("heads", [
+    "t_s,rpm1,rpm2,rpm3,rpm4", "time,motor_1_rpm,motor_2_rpm,motor_3_rpm,motor_4_rpm",
+    "Time [s],Motor 1 [RPM],Motor 2 [RPM],Motor 3 [RPM],Motor 4 [RPM]", "t_ms,esc1_rpm,esc2_rpm,esc3_rpm,esc4_rpm",
+])  # fmt: skip
 def test_speeds_alone_give_the_thrust_constant(heads: str, tmp_path: Path) -> None:
     """A CSV of time and speeds."""
     log = hover()
     assert log.rpm is not None
-    rows = [",".join(f"{v:.4f}" for v in (a, *b)) for a, b in zip(log.t, log.rpm, strict=True)]
+    clock = log.t * (1e3 if "_ms" in heads else 1.0)
+    rows = [",".join(f"{v:.4f}" for v in (a, *b)) for a, b in zip(clock, log.rpm, strict=True)]
     (tmp_path / "s.csv").write_text("\n".join([heads, *rows]))
     k = identify(read_log(tmp_path / "s.csv"), 1.5).constants["thrust constant"]
     assert k.value == pytest.approx(1.5 * 9.80665 / float(np.sum(log.rpm**2, axis=1).mean()), rel=0.01)
+    (tmp_path / "odd.csv").write_text("\n".join(["Time [s],A,B,C,D", *rows]))
+    with pytest.raises(InputError, match="rpm1"):  # what is read is named
+        read_log(tmp_path / "odd.csv")
+    with pytest.raises(InputError, match="own healthy flight"):
+        fly(tmp_path / "s.csv", healthy=[tmp_path / "s.csv"])
 
 
 def test_what_is_packed_has_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

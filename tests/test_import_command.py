@@ -215,3 +215,45 @@ def test_a_file_of_another_command_is_handed_over(tmp_path: Path) -> None:
     (tmp_path / "log.bbl").write_bytes(b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" + bytes(99))
     with pytest.raises(InputError, match="Betaflight .*bemt fly"):
         import_file(tmp_path / "log.bbl")
+
+
+def test_import_takes_the_speed_that_diagnose_takes(put: Callable[..., Path]) -> None:
+    """An angular speed, and the electrical speed where the optical sensor saw nothing; errors stand first."""
+    n = np.arange(300.0, 700.0, 40.0)
+    rows = np.transpose([n, 8e-3 * n**2, 1.3e-4 * n**2])
+    table = "omega [rad/s],T [mN],Q [mN.m]\n" + "".join(",".join(f"{v:.6g}" for v in row) + "\n" for row in rows)
+    eyes = "Motor Electrical Speed (RPM),Motor Optical Speed (RPM),Thrust (N),Torque (N.m)\n" + "".join(
+        f"{v * 9.5493:.6g},0,{8e-6 * v * v:.6g},{1.3e-7 * v * v:.6g}\n" for v in n
+    )
+    for name, text in (("si.csv", table), ("eyes.csv", eyes)):
+        path = str(put(name, text))
+        found = import_files([path])
+        assert found.files[0].reduced["rpm"] == pytest.approx(n * 30 / np.pi, rel=1e-4)
+        assert f"bemt diagnose {path}" in found.text()
+    strong = "rpm,thrust (N),torque (N.m),voltage (V),current (A)\n" + "".join(
+        f"{v * 9.5493:.6g},{9e-6 * v**1.98:.6g},{1.3e-7 * v * v:.6g},10,{2e-9 * v**3:.6g}\n" for v in n
+    )
+    lines = import_files([str(put("strong.csv", strong))]).text().splitlines()
+    assert "power_above_input" in lines[1]
+
+
+@pytest.mark.parametrize(("heads", "air"), [
+    ("Temp (F),Pressure (inHg)", (64.4, 29.09)), ("Lufttemperatur (C),Luftdruck (hPa)", (18.0, 985.1)),
+    ("temperature (C),pressure (kPa)", (18.0, 98.51)),
+])  # fmt: skip
+def test_temperature_and_pressure_are_the_airs_however_they_are_headed(
+    heads: str, air: tuple[float, float], put: Callable[..., Path]
+) -> None:
+    n = np.arange(3000.0, 7000.0, 500.0)
+    rows = "".join(f"{v:g},{8e-8 * v**2:.6g},{1.3e-9 * v**2.01:.6g},{air[0]:g},{air[1]:g}\n" for v in n)
+    path = put("air.csv", f"rpm,thrust (N),torque (Nm),{heads}\n{rows}")
+    reduced = import_files([str(path)]).files[0].reduced
+    assert reduced["density_kg_m3"] == pytest.approx(98510.0 / (287.05 * 291.15), rel=1e-3)
+
+
+def test_fahrenheit_under_celsius_is_an_error_that_says_so(put: Callable[..., Path]) -> None:
+    n = np.arange(3000.0, 7000.0, 500.0)
+    rows = "".join(f"{v:g},{8e-8 * v**2:.6g},{1.3e-9 * v**2.01:.6g},64.4,985\n" for v in n)
+    path = put("air.csv", f"rpm,thrust (N),torque (Nm),air temperature (C),air pressure (hPa)\n{rows}")
+    text = import_files([str(path)]).text()
+    assert "64.4 F is 18 C" in text and "Fahrenheit taken for Celsius" in text.splitlines()[1]

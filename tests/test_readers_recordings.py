@@ -112,7 +112,7 @@ def said(imported: Dataset, words: str) -> list[str]:
         ("ESC signal (µs)", "pulse_width_s", "s"), ("ESC signal (μs)", "pulse_width_s", "s"), ("RPM", "rpm", "rpm"),
         ("Motor Electrical Speed (RPM)", "electrical_rpm", "rpm"), ("eRPM", "electrical_rpm", "rpm"),
         ("Motor Optical Speed (RPM)", "optical_rpm", "rpm"), ("RPM_B", "B_rpm", "rpm"), ("rpm_A", "A_rpm", "rpm"),
-        ("beta_deg", "beta_rad", "rad"), ("temp_C", "temp_K", "K"), ("airspeed_m_s", "airspeed_m_s", "m_s"),
+        ("beta_deg", "beta_rad", "rad"), ("temp_C", "temperature_K", "K"), ("airspeed_m_s", "airspeed_m_s", "m_s"),
         ("Airspeed (km/h)", "airspeed_m_s", "m_s"), ("Motor Efficiency (%)", "motor_efficiency", "-"), ("J", "J", "-"),
         ("Overall Efficiency (gf/W)", "overall_efficiency_N_W", "N/W"), ("CT_total=T/(rho n2 D4)", "CT_total", "-"),
         ("CT(rotor convention T/(rho A (Omega R)^2))", "CT_rotor", "-"), ("chord_mm(D=240mm)", "chord_m", "m"),

@@ -82,7 +82,8 @@ def test_a_name_with_stations_in_any_dialect_is_the_same_case(name: str, tmp_pat
 
 
 @pytest.mark.parametrize(("head", "words"), [
-    ("r,c,beta", r"r \(mm\), c \(mm\)"), ("r/R,c/R,twist (deg)", "beta_deg"), ("r/R,c/R,sweep (deg)", "beta_deg"),
+    ("r,c,beta", r"r \(mm\), c \(mm\)"), ("r/R,c/R,twist (deg)", "Rename it to beta_deg if"),
+    ("r/R,c/R,sweep (deg)", "beta_deg"),
     ("r (V),c/R,beta (deg)", "r_over_R"), ("r/R,chord [-],beta (deg)", "chord"),
 ])  # fmt: skip
 def test_stations_that_leave_a_doubt_are_refused_with_what_to_write(head: str, words: str, tmp_path: Path) -> None:
@@ -113,3 +114,33 @@ def test_stations_from_the_tip_inwards_are_the_same_blade_and_two_stations_know_
         bands[name] = points.thrust_N[0], points.u["thrust_N"][0] / points.thrust_N[0]
     assert bands["down"] == pytest.approx(bands["up"], rel=1e-12)
     assert bands["two"][1] > 1.2 * bands["up"][1]
+
+
+@pytest.mark.parametrize(("head", "scale"), [
+    ("Dicke [%]", 100.0), ("thickness", 1.0), ("t/c", 1.0), ("max thickness (mm)", 1e3 * R * C), ("t/c %", 100.0),
+])  # fmt: skip
+def test_a_measured_thickness_is_the_sections(head: str, scale: float | np.ndarray, tmp_path: Path) -> None:
+    T = np.array([0.15, 0.13, 0.12, 0.11, 0.1, 0.09, 0.08])
+    rows = np.transpose([X, C, BETA, T * scale, 0.1 * X])
+    (tmp_path / "blade.csv").write_text(
+        f"r/R;c/R;beta (deg);{head};Skew\n" + "".join(";".join(f"{v:.9g}" for v in row) + "\n" for row in rows)
+    )
+    _, _, notes = write(Wanted("mine", str(tmp_path / "blade.csv"), diameter_mm=2e3 * R), str(tmp_path / "mine"))
+    case = load_case(tmp_path / "mine")
+    assert np.allclose(case.file.blade.section.thickness, T, rtol=2e-3)
+    assert not any(a.key == "blade.section.thickness" for a in case.file.assumptions)
+    assert [note.split("'")[1] for note in notes] == ["Skew"]
+
+
+def test_a_thickness_that_no_section_has_is_named_not_used(tmp_path: Path) -> None:
+    rows = np.transpose([X, C, BETA, 12.0 + X])
+    text = "r/R,c/R,beta (deg),thickness\n" + "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in rows)
+    (tmp_path / "blade.csv").write_text(text)
+    _, _, (note,) = write(Wanted("mine", str(tmp_path / "blade.csv"), diameter_mm=2e3 * R), str(tmp_path / "mine"))
+    assert "thickness" in note and load_case(tmp_path / "mine").file.blade.section.thickness == 0.09
+
+
+def test_numbers_without_headings_ask_for_headings(tmp_path: Path) -> None:
+    (tmp_path / "blade.csv").write_text(table("").lstrip())
+    with pytest.raises(InputError, match="headings"):
+        write(Wanted("mine", str(tmp_path / "blade.csv"), diameter_mm=254.0), str(tmp_path / "mine"))

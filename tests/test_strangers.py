@@ -240,7 +240,7 @@ STATIONS: dict[str, bytes] = {
 @pytest.mark.parametrize("name", list(STATIONS))
 def test_stations_as_people_write_them(name: str, tmp_path: Path) -> None:
     (tmp_path / "s.csv").write_bytes(STATIONS[name])
-    x, c, beta = read_stations(tmp_path / "s.csv", TIP)
+    x, c, beta = read_stations(tmp_path / "s.csv", TIP)[:3]
     assert (
         np.allclose(x, X, rtol=1e-3) and np.allclose(c, C, rtol=1e-3) and np.allclose(np.degrees(beta), BETA, rtol=1e-3)
     )
@@ -264,7 +264,7 @@ def test_stations_in_doubt_are_refused_and_the_hint_is_right(name: str, tmp_path
     with pytest.raises(InputError, match=hint):
         read_stations(tmp_path / "s.csv", TIP)
     (tmp_path / "s.csv").write_text(follow(text))
-    x, c, beta = read_stations(tmp_path / "s.csv", TIP)
+    x, c, beta = read_stations(tmp_path / "s.csv", TIP)[:3]
     assert (
         np.allclose(x, X, rtol=1e-3) and np.allclose(c, C, rtol=1e-3) and np.allclose(np.degrees(beta), BETA, rtol=1e-3)
     )

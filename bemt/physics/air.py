@@ -130,6 +130,19 @@ def _positive(value: Any) -> bool:
     return v.size > 0 and bool(np.all(np.isfinite(v) & (v > 0.0)))
 
 
+AIR_C = (-60.0, 60.0)
+"""Temperatures that the air around a rotor can have. [degC]"""
+
+
+def _degrees(value: float) -> str:
+    """What a temperature that no air has may be in, instead of degrees Celsius."""
+    if AIR_C[0] <= (kelvin := value - ZERO_CELSIUS) <= AIR_C[1]:
+        return f"Kelvin given? {value:g} K is {kelvin:.3g} C"
+    if AIR_C[0] <= (from_F := (value - 32.0) / 1.8) <= AIR_C[1]:
+        return f"Fahrenheit given? {value:g} F is {from_F:.3g} C"
+    return ""
+
+
 def _within(given: Sequence[tuple[str, float, float, float, str, str]]) -> None:
     """Refuse all that lies outside: name, value, bounds, unit, hint."""
     faults = [
@@ -219,7 +232,7 @@ class Air:
         """
         _within(
             [
-                ("temperature_C", temperature_C, 0.0, 60.0, "degC", "Kelvin given?"),
+                ("temperature_C", temperature_C, 0.0, 60.0, "degC", _degrees(temperature_C)),
                 ("salinity_g_kg", salinity_g_kg, 0.0, _SALT, "g/kg", "The oceans have 35"),
             ]
         )
@@ -268,7 +281,7 @@ class Air:
         _within(
             [
                 ("pressure_Pa", pressure_Pa, 1e4, 1.2e5, "Pa", "hPa given?"),
-                ("temperature_C", temperature_C, -60.0, 60.0, "degC", "Kelvin given?"),
+                ("temperature_C", temperature_C, *AIR_C, "degC", _degrees(temperature_C)),
                 ("humidity_pct", humidity_pct, 0.0, 100.0, "%", "Relative humidity in per cent"),
             ]
         )

@@ -520,8 +520,8 @@ def propeller(
         return Propeller(case_of(text), text)
     assert stations is not None and diameter_m is not None
     file = Path(stations)
-    hub, key, few = fresh.of_stations(file, diameter_m)
-    text = fresh.stations_text(file.name, diameter_m, blades or 2, rpm, airspeed_m_s, hub, key, few=few)
+    hub, key, found = fresh.of_stations(file, diameter_m)
+    text = fresh.stations_text(file.name, diameter_m, blades or 2, rpm, airspeed_m_s, hub, key, found=found)
     return Propeller(case_of(text, file.parent), text)
 
 

@@ -32,7 +32,7 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "vitesse~de~air velocidad~del~aire velocidad~del~viento velocita~aria velocita~dell~aria velocita~del~vento "
     "风速 風速 来流速度 空速 vinf uinf v~inf u~inf v∞ u∞ tas",
     "speed": "geschwindigkeit vitesse velocidad velocita velocidade snelheid velocity скорость 速度",
-    "temperature": "temperatur temperatura temperatuur температура 温度 溫度 온도",
+    "temperature": "temp temperatur temperatura temperatuur температура 温度 溫度 온도",
     "pressure": "druck pression presion pressione pressao druk давление 压力 气压 氣壓 大气压 大气压力 気圧 barometer "
     "baro",
     "air pressure": "luftdruck luchtdruck luchtdruk",
@@ -62,6 +62,7 @@ _ABROAD = {  # English: as others write it, without accents, in lower case; a bl
     "posizione~radiale",
     "chord": "弦长 弦長 sehne sehnenlange profiltiefe blatttiefe blattbreite corde corda cuerda cieciwa хорда "
     "longueur~de~corde",
+    "thickness": "dicke profildicke blattdicke epaisseur espesor spessore espessura grubosc dikte толщина 厚度",
     "blade angle": "einstellwinkel blattwinkel steigungswinkel calage angle~de~calage angle~de~pas angle~de~pale "
     "calettamento angolo~di~calettamento angolo~di~pala angulo~de~paso angulo~de~pala angulo~de~calado 桨叶角 安装角 "
     "kat~nastawienia угол~установки",

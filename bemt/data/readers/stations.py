@@ -1,4 +1,4 @@
-"""Tables of blade stations as people write them: r, chord and blade angle, lengths or shares of R or D."""
+"""Tables of blade stations as people write them: r, chord, blade angle and thickness, lengths or shares."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from bemt.base import units
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers import SourceText, load_text
+from bemt.data.readers import SourceText, load_text, number
 from bemt.data.readers._words import english, plain
 from bemt.data.readers.headings import splits
-from bemt.data.readers.split import decimal_mark, split_table
+from bemt.data.readers.split import SplitTable, decimal_mark, split_table
 from bemt.data.readers.unit_text import unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
@@ -26,10 +27,24 @@ _HEADS: dict[str, tuple[set[str], set[str]]] = {  # column: its own words, words
     "chord": ({"c", "chord", "width"}, {"blade", "length", "local", "section", "of"}),
     "beta": ({"beta", "β", "theta", "θ", "b", "angle"}, {"blade", "pitch", "setting", "section", "local", "of"}),
     "pitch": ({"pitch", "p"}, {"blade", "local", "geometric", "of"}),
+    "thickness": ({"thickness", "t"}, {"blade", "local", "section", "relative", "maximum", "max", "ratio", "of"}),
 }
 _TIPS = {"r": 1.0, "rtip": 1.0, "r tip": 1.0, "radius": 1.0, "d": 2.0, "diameter": 2.0}
 """What lengths are shares of, in tip radii."""
-_TWIST = "An angle to the plane of rotation is beta_deg; twist may count from elsewhere"
+_TWIST = "Rename it to beta_deg if it is the angle to the plane of rotation; twist may count from elsewhere"
+_NO_HEADINGS = "Add a line of headings, such as r_mm,chord_mm,beta_deg"
+THICKNESSES = (0.01, 0.5)
+"""Thicknesses that a case takes, of the chord."""
+
+
+class Stations(NamedTuple):
+    """Stations of a blade, ascending; (N,) each. `left` says of each column that is not used why."""
+
+    r_R: Array
+    c_R: Array
+    beta_rad: Array
+    t_c: Array | None = None
+    left: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -57,7 +72,12 @@ def _meaning(text: str) -> str:
 def _share(text: str) -> tuple[str, float] | None:
     """Column and scale of a length over the tip radius or the diameter: ``r/R``, ``2 c/D``."""
     found = re.fullmatch(r"(2 ?)?(.+?) ?/ ?(.+)", text.strip())
-    if not found or plain(found[3]) not in _TIPS or (name := _meaning(found[2])) not in ("r", "chord", "pitch"):
+    if not found:
+        return None
+    name = _meaning(found[2])
+    if name == "thickness" and _meaning(found[3]) == "chord":
+        return name, 1.0
+    if plain(found[3]) not in _TIPS or name not in ("r", "chord", "pitch"):
         return None
     return name, _TIPS[plain(found[3])] * (0.5 if found[1] else 1.0)
 
@@ -70,6 +90,8 @@ def _column(at: int, text: str, R: float) -> _Column | None:
         if unit in ("", "-", "1", "%") and (share := _share(base)):
             return _Column(at, share[0], share[1] * (0.01 if unit == "%" else 1.0), True, text)
         name = _meaning(base)
+        if name == "thickness" and (of_chord := re.fullmatch(r"(%?) ?(?:of )?(?:c|chord)|%|-|", unit)):
+            return _Column(at, name, 0.01 if "%" in of_chord[0] else 1.0, True, text)
         if (share := _share(unit)) and share[0] == name:  # radius [r/R]
             return _Column(at, name, share[1], True, text)
         of_tip = re.fullmatch(r"(%?) ?(?:of )?R|-", unit)
@@ -77,7 +99,7 @@ def _column(at: int, text: str, R: float) -> _Column | None:
             return _Column(at, name, 0.01 if of_tip[1] else 1.0, True, text)
         if name in ("beta", "pitch") and (angle := unit_for("angle", unit)):
             return _Column(at, "beta", angle[0].factor / units.DEG, False, text)
-        if name in ("r", "chord", "pitch") and (length := unit_for("length", unit)):
+        if name in ("r", "chord", "pitch", "thickness") and (length := unit_for("length", unit)):
             return _Column(at, name, length[0].factor / R, False, text)
     return _Column(at, "beta", 1.0, False, text) if _meaning(bare) == "beta" else None
 
@@ -88,11 +110,13 @@ def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
         return "Write what a share is of: r/R %, c/R % or c/D %"
     if bare := [h for h in headings if _meaning(h) in lacking]:
         return f"Write the units, such as {', '.join(f'{h} (mm)' for h in bare)}; shares of the tip radius are r/R, c/R"
-    return _TWIST if "beta" in lacking else ""
+    if all(number(h) is not None for h in headings):
+        return _NO_HEADINGS
+    return _TWIST if "beta" in lacking and any("twist" in plain(h).split() for h in headings) else ""
 
 
-def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
-    """Columns r/R, c/R and beta [rad] of a table for a tip radius [m], others are left; faults carry line and column.
+def read_stations(path: Path, R: float) -> Stations:
+    """Stations of a table for a tip radius [m], other columns are named; faults carry line and column.
 
     Cells are parted by commas, semicolons, tabs or blanks; decimal commas are read where they can be nothing else. A
     column of local pitch (``pitch_mm``, ``P/D``) stands for the angle, beta = arctan(pitch / 2 pi r).
@@ -104,7 +128,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
     table = split_table(source, header=True, most_misfits=1.0)
     top = table.headings_line
     found = [column for j, text in enumerate(table.headings) if (column := _column(j, text, R))]
-    by_name = {name: [c for c in found if c.name == name] for name in ("r", "chord", "beta", "pitch")}
+    by_name = {name: [c for c in found if c.name == name] for name in _HEADS}
     wanted = ("r", "chord", "beta" if by_name["beta"] or not by_name["pitch"] else "pitch")
     if lacking := [name for name in wanted if not by_name[name]]:
         header = source.lines[top - 1].strip()
@@ -116,6 +140,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
         source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
     places = [by_name[name][0] for name in wanted]
     decimal = decimal_mark(table)
+    thick, left = _thickness(table, by_name["thickness"], decimal)
     columns = []
     for place in places:
         values = table.numbers(place.at, decimal)[0]
@@ -129,6 +154,7 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
     source.check()
     if np.all(np.diff(columns[0]) < 0.0):  # from the tip inwards
         columns = [v[::-1] for v in columns]
+        thick = None if thick is None else thick[::-1]
     elif back := np.flatnonzero(np.diff(columns[0]) <= 0.0).tolist():
         got = " after ".join(table.cell(i, places[0].at) for i in (back[0] + 1, back[0]))
         source.add(f"{table.lines[back[0] + 1]}:{places[0].at + 1}", got, "radii that ascend from line to line")
@@ -138,7 +164,26 @@ def read_stations(path: Path, R: float) -> tuple[Array, Array, Array]:
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
     _limits(source, places, (x, c, beta), R)
     source.check()
-    return np.minimum(x, 1.0), c, np.radians(beta)
+    if thick is not None and not by_name["thickness"][0].share:
+        thick = thick / c
+    if thick is not None and not (THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]):
+        heading, reach = by_name["thickness"][0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
+        left = [*left, f"column {heading!r} not used: {reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm"]
+        thick = None
+    used = {p.at for p in places} | {c.at for c in by_name["thickness"]}
+    left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
+    return Stations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
+
+
+def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> tuple[Array | None, list[str]]:
+    """Thickness of the chord or of R, if one column says it for every station; else why not."""
+    if not columns:
+        return None, []
+    values = table.numbers(columns[0].at, decimal)[0] * columns[0].scale
+    if len(columns) == 1 and np.all(np.isfinite(values)):
+        return values, []
+    why = "two of thickness" if len(columns) > 1 else "not a number at every station"
+    return None, [f"column {c.heading!r} not used: {why}" for c in columns]
 
 
 def _limits(source: SourceText, places: list[_Column], columns: tuple[Array, Array, Array], R: float) -> None:

@@ -22,6 +22,7 @@ from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
 from bemt.data.recordings.cfd_files import EXPORT
+from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import Finding, check
 from bemt.data.recordings.reduce import reduce, reduction
 from bemt.physics.dataset import Dataset
@@ -41,9 +42,10 @@ def is_recording(record: Dataset, adapted: bool) -> bool:
     """Whether a record is a table of measurements as a stand wrote it: to be checked and reduced."""
     if adapted:
         return False
-    known = {name for name in record.values if record.unit(name)}
-    loads = {"thrust_N", "torque_Nm", "T_N", "Q_Nm", "power_W"} & known
-    return record.kind == "bench" or (record.kind == "table" and bool(loads) and any("rpm" in n for n in known))
+    if record.kind != "table":
+        return record.kind == "bench"
+    known = named(record).values.keys()
+    return "rpm" in known and bool({"thrust_N", "torque_Nm", "power_W"} & known)
 
 
 def findings(record: Dataset) -> tuple[Finding, ...]:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from bemt.base import unit_errors
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
+from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.samples import lone
 from bemt.data.recordings.channels import shaft_power
 from bemt.data.recordings.findings import MANY, Facts, Finding, check_for, zero_thrust_speed
 from bemt.physics import coefficients as co
-from bemt.physics.air import LIQUID
+from bemt.physics.air import AIR_C, LIQUID
 
 SENSORS = (
     "thrust_N", "duct_thrust_N", "torque_Nm", "voltage_V", "current_A", "electrical_rpm", "optical_rpm", "rpm",
@@ -267,7 +268,8 @@ def lengths(facts: Facts) -> Iterator[Finding]:
 @check_for("air")
 def air_units(facts: Facts) -> Iterator[Finding]:
     """Pressure, temperature and humidity in another unit than their heading says."""
-    asked = (("pressure_Pa", "pressure", 3e4, 1.2e5), ("temperature_K", "temperature", 220.0, 340.0),
+    cold, hot = (c + ZERO_CELSIUS for c in AIR_C)
+    asked = (("pressure_Pa", "pressure", 3e4, 1.2e5), ("temperature_K", "temperature", cold, hot),
              ("density_kg_m3", "density", 0.2, 2.0), ("humidity", "fraction", 0.0, 1.0))  # fmt: skip
     for name, kind, low, high in asked:
         v = facts.get(name)
@@ -278,7 +280,8 @@ def air_units(facts: Facts) -> Iterator[Finding]:
             continue
         fits = [e.words for e in unit_errors.errors(kind) if low <= value * e.repair + e.offset <= high]
         text = f"median {value:.5g} is outside {low:g} to {high:g}"
-        yield Finding("air_unit", facts.named(name), text, "; or ".join(fits) or "check the sensor", (), "warning")
+        fatal = "error" if kind in ("pressure", "temperature") else "warning"  # no air is so, its density would be false
+        yield Finding("air_unit", facts.named(name), text, "; or ".join(fits) or "check the sensor", (), fatal)
 
 
 # Signs, and quantities beyond their physical bounds, row by row.

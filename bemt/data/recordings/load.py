@@ -51,6 +51,7 @@ from bemt.data.recordings.adapt import (
 )
 from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_loads import other_than_loads
+from bemt.data.recordings.channels import named
 from bemt.data.recordings.findings import Finding
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
@@ -330,7 +331,11 @@ class ImportedFile:
         """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
         if self.record is None:
             return ""
-        lines, rows, plain = [self.title], [], []
+        told = {
+            f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+        }
+        errors = [text for f, text in told.items() if f.severity == "error"]
+        lines, rows, plain = [self.title, *errors], [], []
         for name in self.record.values:
             unit, found = self.record.unit(name), self.means.get(name)
             if found is None or not math.isfinite(found.value):
@@ -347,9 +352,7 @@ class ImportedFile:
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
         lines += points_text(self.reduced) if self.reduced is not None else []
         lines += [f"  ! {text}" for text in self.warnings]
-        lines += [
-            f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
-        ]
+        lines += [text for text in told.values() if text not in errors]
         return "\n".join(lines)
 
 
@@ -402,7 +405,7 @@ class Imported:
 
     def _next_with_recordings(self) -> list[str]:
         """What to do with recordings of loads, if they have the speed."""
-        read = [(f.path, f.record.kind, set(f.record.values)) for f in self.files if f.record]
+        read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
         loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
         if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
             return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]

@@ -38,7 +38,7 @@ from bemt.data.recordings.channels import (
 from bemt.data.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.physics import coefficients as co
-from bemt.physics.air import GAMMA, R_DRY, Air
+from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
 from bemt.physics.dataset import Dataset, concat
 
 TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
@@ -451,7 +451,8 @@ def air_of(values: Mapping[str, Array], n: int, constants: Mapping[str, float]) 
 
 def _sound(temperature: Array) -> Array:
     """Speed of sound of dry air; NaN without a temperature that air of a laboratory can have."""
-    T = np.where((temperature > 200.0) & (temperature < 340.0), temperature, np.nan)
+    low, high = (c + ZERO_CELSIUS for c in AIR_C)
+    T = np.where((temperature >= low) & (temperature <= high), temperature, np.nan)
     return np.asarray(np.sqrt(GAMMA * R_DRY * T))
 
 

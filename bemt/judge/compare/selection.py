@@ -16,7 +16,7 @@ from bemt.base.units import KNOT, MPH, RPM, ZERO_CELSIUS, split_suffix
 from bemt.data.readers.headings import may_be_shaft_speed, surely_shaft_speed
 from bemt.data.recordings.channels import MEASURED, in_one_step, moves, named
 from bemt.data.recordings.findings import zero_thrust_speed
-from bemt.physics.air import Air
+from bemt.physics.air import AIR_C, Air
 from bemt.physics.dataset import Dataset
 
 _AIR = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(C|K|hPa|Pa|kg/m3|m/s|kt|mph|km/h)")
@@ -28,7 +28,7 @@ SECOND_ROTOR = "second_rotor_rad_s"
 # Two numbers of a table that differ by less are the same number.
 _SAME_NUMBER = 1e-6
 # Temperatures that air of a stand can have [K].
-COLD, HOT = 230.0, 330.0
+COLD, HOT = (c + ZERO_CELSIUS for c in AIR_C)
 # Name of a column without a heading: its number is that of no rotor.
 NUMBERED = re.compile(r"column_\d+")
 _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C", "D", "1", "2", "3", "4")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from geometry.common import GeometryError
 from geometry.duct import Duct, Stator, around
 from geometry.laws import from_laws
 from geometry.rotor import Blade, Rotor, from_stations
+
+if TYPE_CHECKING:
+    from bemt.data.readers.stations import Stations
 
 T = TypeVar("T")
 
@@ -88,7 +91,7 @@ def _blade(case: CaseFile, path: Path) -> Blade:
         return _bent(
             case, from_stations(made.r, made.chord * scale, made.beta + turned, R, hub * R, anchors, name=case.name)
         )
-    x, c, beta = _stations(case, path)
+    x, c, beta, *_ = _stations(case, path)
     return _bent(case, from_stations(x * R, c * R * scale, beta + turned, R, hub * R, anchors, name=case.name))
 
 
@@ -102,26 +105,26 @@ def _bent(case: CaseFile, blade: Blade) -> Blade:
     return replace(blade, sweep=sweep * grown, rake=rake * grown)
 
 
-def _stations(case: CaseFile, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns r/R, c/R and beta [rad] of whichever file of stations the case names."""
+def _stations(case: CaseFile, path: Path) -> Stations:
+    """Stations of whichever file of stations the case names."""
     key = next(k for k in ("stations", "uiuc", "apc") if getattr(case.blade, k) is not None)  # a rule of the file
     return stations_in(path.parent / getattr(case.blade, key), 0.5 * case.rotor.diameter_m, key)
 
 
-def stations_in(file: Path, R: float, key: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns r/R, c/R and beta [rad] of a file of stations, by the key of [blade] that names it; tip radius in m."""
+def stations_in(file: Path, R: float, key: str) -> Stations:
+    """Stations of a file, by the key of [blade] that names it; tip radius in m."""
+    from bemt.data.readers.stations import Stations, read_stations
+
     if key == "uiuc":
         from bemt.data.readers.uiuc_tables import read_geometry
 
         table = read_geometry(file)
-        return table.r_R, table.c_R, np.radians(table.beta_deg)
+        return Stations(table.r_R, table.c_R, np.radians(table.beta_deg))
     if key == "apc":
         from bemt.data.readers.apc import read_pe0
 
         apc = read_pe0(file)
-        return apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad
-    from bemt.data.readers.stations import read_stations
-
+        return Stations(apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad, apc.t_c)
     return read_stations(file, R)
 
 

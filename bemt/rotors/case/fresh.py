@@ -7,6 +7,7 @@ import re
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from bemt.rotors.case.unknowns import (
     FAN,
     HUB,
     SURFACE,
+    THICKNESS,
     Unknown,
     label_chord,
     offset_of,
@@ -29,6 +31,9 @@ from bemt.rotors.case.unknowns import (
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
+
+if TYPE_CHECKING:
+    from bemt.data.readers.stations import Stations
 
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
@@ -114,9 +119,9 @@ soc = {SOC:g}  # charge at which full throttle and hover are stated
 sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
-[drive.motor]  # instead of both what the motor's sheet says: resistance_mohm and no_load_A; or its mass_g or stator
-size = {size:g}  # usual for K_v and cells
-idle_share = {idle:g}
+[drive.motor]
+size = {size:g}  # the winding is usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
+idle_share = {idle:g}  # of the current. Better: replace this line by no_load_A, from the motor's sheet
 
 # [drive.vehicle]  # for hover
 # mass_kg = 1.4
@@ -234,19 +239,27 @@ def _series(told: Designation | None, family: str | None) -> str:
 def stations_text(
     file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
     hub_ratio: float = 0.15, key: str = "stations", label: Designation | None = None, family: str | None = None,
-    motor: tuple[float, int] | None = None, name: str = "", few: bool = False,
+    motor: tuple[float, int] | None = None, name: str = "", found: Stations | None = None,
 ) -> str:  # fmt: skip
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
-    The population of measured rotors weighs the pitch of the label against the angles of the stations. Of ``few``
-    stations the shape between them is a guess, as that of a label is: the chord is an unknown, too.
+    The population of measured rotors weighs the pitch of the label against the angles of the stations. Of few stations
+    the shape between them is a guess, as that of a label is: the chord is an unknown, too. A measured thickness is the
+    section's, at eight radii at most.
     """
+    few = found is not None and found.r_R.size < _FEW
+    thick, at, left = "0.09", "", "" if found is None else "".join(f"# {note}\n" for note in found.left)
     section = section_of((label.blade_class if label else None) or class_of(family))
+    if found is not None and found.t_c is not None:
+        x = found.r_R if found.r_R.size <= 8 else np.linspace(found.r_R[0], found.r_R[-1], 8)
+        thick = f"[{', '.join(f'{v:.4g}' for v in np.interp(x, found.r_R, found.t_c))}]  # measured"
+        at = f"r_over_R = [{', '.join(f'{v:.4g}' for v in x)}]\n"
+        section = tuple(u for u in section if u is not THICKNESS)
     pitch = f"label_pitch_in = {label.pitch_in:g}\n" if label else ""
     name = _label_name(label) if label else name or case_name(Path(file).stem)
     title = _title(label) if label else f"{blades} blades, {1e3 * diameter_m:.4g} mm"
     return f"""# A propeller with the stations of {file}. Each unknown is an assumption with a range.
-schema = "bemt.case/1"
+{left}schema = "bemt.case/1"
 name = "{name}"
 title = "{title}, stations of {file}"
 
@@ -261,8 +274,8 @@ hub_ratio = {hub_ratio:.4g}
 {pitch}{_series(label, family)}
 [blade.section]
 camber = {section[0].value:g}
-thickness = 0.09
-{_tail(diameter_m, rpm, airspeed_m_s, motor, *([_between(diameter_m)] if few else []), *section, *SURFACE, AIR)}"""
+thickness = {thick}
+{at}{_tail(diameter_m, rpm, airspeed_m_s, motor, *([_between(diameter_m)] if few else []), *section, *SURFACE, AIR)}"""
 
 
 def _between(diameter_m: float) -> Unknown:
@@ -325,13 +338,13 @@ recovery = 0.8
 _FEW = 5
 
 
-def of_stations(file: Path, diameter_m: float) -> tuple[float, str, bool]:
-    """Hub ratio, key of [blade] of a file of stations (a table in any dialect, or one of UIUC or APC), and if few."""
+def of_stations(file: Path, diameter_m: float) -> tuple[float, str, Stations]:
+    """Hub ratio, key of [blade] of a file of stations (a table in any dialect, or one of UIUC or APC), and them."""
     from bemt.rotors.case.build import key_of, stations_in
 
     key = key_of(file)
-    x = stations_in(file, 0.5 * diameter_m, key)[0]
-    return float(np.clip(x.min(), 0.05, 0.3)), key, x.size < _FEW
+    found = stations_in(file, 0.5 * diameter_m, key)
+    return float(np.clip(found.r_R.min(), 0.05, 0.3)), key, found
 
 
 _LABEL = re.compile(r"\d\s*[xX\u00d7*]\s*\d")

@@ -26,7 +26,7 @@ from bemt.rotors.case.as_built import CaseAsBuilt, as_built_of
 from bemt.rotors.case.build import build_air, build_duct, build_rotor
 from bemt.rotors.case.rules import check_case, check_shape, value_at
 from bemt.rotors.case.schema import AXES, GROUPS, CaseFile
-from bemt.rotors.case.unknowns import completed
+from bemt.rotors.case.unknowns import completed, out_of_place, replaced
 from bemt.rotors.latents import AsBuilt, as_built
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ class Case:
     written: Mapping[str, Any]  # The document as the file has it, without defaults
     file: CaseFile  # The same, typed, with defaults
     assumptions: tuple[Assumption, ...] = ()  # Declared unknowns
+    unused: tuple[str, ...] = ()  # What the file declares and states as well, as sentences
     _built: dict[Any, Any] = field(default_factory=dict, repr=False)  # Shared by the cases that `replaced` gives
     _own: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # Of this very case
 
@@ -403,22 +404,32 @@ def case_of(text: str, folder: str | Path = ".", ends: bool = True) -> Case:
 def with_changes(case: Case, changes: Mapping[str, Any]) -> Case:
     """The case with values set by dotted key, completed and checked anew, as if its file said so."""
     written = copy.deepcopy(dict(case.written))
-    for key, value in changes.items():
+
+    def home(key: str) -> tuple[dict[str, Any], str]:
         *tables, name = key.split(".")
         table = written
         for part in tables:
             table = table.setdefault(part, {})
+        return table, name
+
+    for key in replaced(changes):
+        table, name = home(key)
+        table.pop(name, None)
+    for key, value in changes.items():
+        table, name = home(key)
         table[name] = value
-    return _checked(case.path, written, Collector(case.path.as_posix()))
+    return replace(_checked(case.path, written, Collector(case.path.as_posix())), unused=case.unused)
 
 
 def _checked(path: Path, document: dict[str, Any], out: Collector, ends: bool = True) -> Case:
+    unused = tuple(f"the assumption about {key} is not used: the case states {said}; its block can be deleted"
+                   for key, said in out_of_place(document).items())  # fmt: skip
     document = completed(document)
     file = check_case(out, document, path.parent)
     check_name(out, document.get("name"))
     if file is None or out.faults:
         raise InputError(out.faults)
-    case = Case(path, document, file, _assumptions(file))
+    case = Case(path, document, file, _assumptions(file), unused)
     _check_build(case, ends)
     if case.paired:
         case.second()

@@ -64,17 +64,17 @@ level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 
 """
 
 
-def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], str]:
+def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list[str]]:
     """Write a new case that can be solved; nothing is written unless all of it is sound.
 
-    Gives folder and files, and why a reading may not be this rotor's.
+    Gives folder and files, and what was not used of the stations, or why a reading may not be this rotor's.
     """
     faults = _faults(wanted)
     refuse(faults)
     files = _files(wanted)
     try:
         case = checked(files)
-        doubt = "" if wanted.reading is None else case.as_built().doubt
+        notes = [] if wanted.reading is None or not (doubt := case.as_built().doubt) else [doubt]
     except InputError as error:
         raise InputError([_of_motor(fault, wanted) for fault in error.faults]) from None
     if wanted.motor is not None and wanted.rpm is None:  # a guess so far
@@ -85,7 +85,8 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], str]
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
     write_files(files, folder)
-    return folder, sorted(files), doubt
+    notes += re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    return folder, sorted(files), notes
 
 
 def _of_motor(fault: Fault, wanted: Wanted) -> Fault:
@@ -197,10 +198,10 @@ def _files(w: Wanted) -> dict[str, bytes]:
         file = Path(w.stations)
         told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
-        hub, key, few = fresh.of_stations(file, D)
+        hub, key, found = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
         text = fresh.stations_text(
-            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, few
+            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, found
         )
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}

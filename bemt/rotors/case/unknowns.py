@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -179,6 +179,35 @@ def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
     return _states(drive, key.split(".")[1], _STATED[key])
 
 
+def replaced(changes: Iterable[str]) -> set[str]:
+    """Keys of typical values that have to go where the values themselves come, by dotted key.
+
+    >>> sorted(replaced(["drive.motor.resistance_mohm", "drive.kv"]))
+    ['drive.motor.size', 'drive.motor.winding_drop']
+    """
+    homes = [(key, key.rpartition(".")[0], names) for key, names in _STATED.items()]
+    found = {(key, home, name) for key, home, names in homes for name in names if f"{home}.{name}" in set(changes)}
+    others = {f"{home}.{name}" for key, home, _ in found for name in _STATED[key]} - set(changes)
+    return {key for key, _, _ in found} | others
+
+
+def out_of_place(document: Mapping[str, Any]) -> dict[str, str]:
+    """Declared assumptions about typical values that are not in the document, as it states the values: key and which.
+
+    >>> out_of_place({"drive": {"motor": {"no_load_A": 0.6}}, "assumptions": [{"key": "drive.motor.idle_share"}]})
+    {'drive.motor.idle_share': 'no_load_A'}
+    """
+    drive, declared = document.get("drive"), document.get("assumptions")
+    if not isinstance(drive, dict) or not isinstance(declared, list):
+        return {}
+    found = {}
+    for key in (item.get("key") for item in declared if isinstance(item, dict)):
+        _, home, name = key.split(".") if key in _STATED else ("", "", "")
+        if home and isinstance(table := drive.get(home), dict) and name not in table:
+            found.update((key, said) for said in _STATED[key] if said in table)
+    return found
+
+
 ESC = ("resistance_mohm", "drop", "name")
 """Keys by which a case says which controller it has."""
 
@@ -220,6 +249,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     ('propeller', 0.15, 'apc_like', 1.225)
     """
     made: dict[str, Any] = copy.deepcopy(dict(document))
+    if gone := out_of_place(made):
+        made["assumptions"] = [x for x in made["assumptions"] if not (isinstance(x, dict) and x.get("key") in gone)]
     rotor, blade, declared = made.get("rotor"), made.get("blade"), made.get("assumptions", [])
     fan = "duct" in made
     unknowns: list[Unknown] = []

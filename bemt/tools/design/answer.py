@@ -87,6 +87,7 @@ def text(table: pd.DataFrame) -> str:
         f"{what}{pair} on {t.cells}S at 50% charge{size}{fluid}, tip Mach up to {t.max_tip_mach:g}: "
         f"{good} of {len(table)} pairs meet it with a probability of {sure:.0%} or more",
         f"power, current and time at {at} of one rotor; ± one standard deviation; best motor of each label",
+        "peak A and full N: at full throttle, what the controller has to stand and what is reached",
     ]
     if t.rest_kg is not None:
         lines.append(

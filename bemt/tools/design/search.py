@@ -378,11 +378,13 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
             asked = asked if target.fixed else 2.0 * at
     chain = _chain(loads, machines, target, float(parts.motor) if target.sized else None)
     own = _Chain(chain.k, chain.ohm[:, :1], chain.idle_A[:, :1], chain.battery_ohm[:, :1], chain.voc)
-    reach = np.isfinite(own.at(loads.rpm[None, :], loads.torque_Nm[None, :])[0])
+    duty, bus, _ = own.at(loads.rpm[None, :], loads.torque_Nm[None, :])
+    reach = np.isfinite(duty)
     last = loads.rpm.size - 1 - np.argmax(reach[:, ::-1], axis=1)
-    most = np.where(reach.any(axis=1), loads.thrust_N[last], 0.0)
+    some, motor = reach.any(axis=1), np.arange(len(machines))
+    most, peak = np.where(some, loads.thrust_N[last], 0.0), np.where(some, bus[motor, last], math.nan)
     n_full, n_at = (loads.speed_for(T / thrust) for T in (asked, at))
-    duty, peak, _ = chain.at(n_full, torque * loads.torque_at(n_full))
+    duty, _, _ = chain.at(n_full, torque * loads.torque_at(n_full))
     _, amps, power = chain.at(n_at, torque * loads.torque_at(n_at))
     mach = np.broadcast_to(loads.tip_mach(n_full, target.airspeed_m_s), duty.shape)
     met = np.isfinite(duty) & (mach <= target.max_tip_mach)
@@ -397,7 +399,7 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     return [
         {"label": loads.label, "diameter_in": loads.diameter_m / INCH, "motor": m.name, "kv": m.kv,
          "probability": float(chance[i]), "power_W": float(power[i, 0]), "u_power_W": scatter[i],
-         "current_A": float(amps[i, 0]), "peak_A": float(peak[i, 0]),
+         "current_A": float(amps[i, 0]), "peak_A": float(peak[i]),
          "g_per_W": 1e3 * float(at[i]) / G0 / float(power[i, 0]), "minutes": float(minutes[i, 0]),
          "rpm": float(n_at[i]),
          "tip_mach": float(mach[i, 0]), "full_thrust_N": float(most[i]), "propulsion_g": 1e3 * own_kg,

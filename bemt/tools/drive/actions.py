@@ -21,11 +21,13 @@ __all__ = ["drive", "map", "motor", "thrusters"]
 
 @action(
     "Drive", "drive 10x4.5 --kv 900 --cells 3", words=("case",), shown=True,
-    common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "reading", "out"),
+    common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "resistance_mohm",
+            "no_load_A", "reading", "out"),
 )  # fmt: skip
 def drive(
     case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Count | None = None,
-    motor_mass_g: float | None = None, mass_kg: float | None = None, rotors: Count | None = None,
+    motor_mass_g: float | None = None, resistance_mohm: float | None = None, no_load_A: float | None = None,
+    mass_kg: float | None = None, rotors: Count | None = None,
     capacity_Ah: float | None = None, airspeed_m_s: float = 0.0, reading: str | None = None, off: Sequence[str] = (),
     out: Path | None = None,
 ) -> DriveResult:  # fmt: skip
@@ -43,6 +45,10 @@ def drive(
         LiPo cells in series.
     motor_mass_g : float, optional
         Mass of the motor, which tells its winding. [g]
+    resistance_mohm : float, optional
+        Resistance of the motor between two leads, from its sheet. [mohm]
+    no_load_A : float, optional
+        Current of the motor without a propeller, from its sheet. [A]
     mass_kg : float, optional
         Mass of the vehicle, for the hover point. [kg]
     rotors : int, optional
@@ -81,8 +87,8 @@ def drive(
     from bemt.rotors.propeller import rotor_of
     from bemt.tools.drive import drive_result
 
-    given = {"kv": kv, "cells": cells, "motor_mass_g": motor_mass_g, "mass_kg": mass_kg, "rotors": rotors,
-             "capacity_Ah": capacity_Ah}  # fmt: skip
+    given = {"kv": kv, "cells": cells, "motor_mass_g": motor_mass_g, "resistance_mohm": resistance_mohm,
+             "no_load_A": no_load_A, "mass_kg": mass_kg, "rotors": rotors, "capacity_Ah": capacity_Ah}  # fmt: skip
     told = {name: value if value is None else number(name, value, finite=False) for name, value in given.items()}
     told |= {name: given[name] for name in ("cells", "rotors")}
     own = rotor_of(case).case

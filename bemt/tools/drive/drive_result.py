@@ -18,7 +18,7 @@ from bemt.base.action import as_html
 from bemt.base.arrays import Array
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError, refuse
 from bemt.base.tables import csv_text, json_text, number_text, plain, write_atomic
-from bemt.base.units import INCH, KGF
+from bemt.base.units import G0, INCH, KGF
 from bemt.rotors.case import Case
 from bemt.rotors.case.load import with_changes
 from bemt.rotors.case.motor import named_motor
@@ -42,6 +42,7 @@ SHEET = ("drive.motor.size", "drive.motor.winding_drop", "drive.motor.idle_share
 OPTIONS = {
     "kv": "drive.kv", "cells": "drive.cells", "mass_kg": "drive.vehicle.mass_kg", "rotors": "drive.vehicle.rotors",
     "capacity_Ah": "drive.battery.capacity_Ah", "motor_mass_g": "drive.motor.mass_g",
+    "resistance_mohm": "drive.motor.resistance_mohm", "no_load_A": "drive.motor.no_load_A",
 }  # fmt: skip
 """Arguments that set values of the table [drive]."""
 
@@ -176,7 +177,7 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
     table = drive_model.drive_table(case)
     steady = drive.steady(_pulses(drive), table.soc)
     steps, course = mission.response(drive, LOW, HIGH, table.soc)
-    notes = [*_unusual(case), *_validity(case, bands["full.rpm"].value, airspeed_m_s), *drive.rotor.notes]
+    notes = [*case.unused, *_unusual(case), *_validity(case, bands["full.rpm"].value, airspeed_m_s), *drive.rotor.notes]
     if course is None:
         full = float(steady.thrust_N[-1])
         got = f"full pulse width gives {full:.2f} N" if math.isfinite(full) else "the air turns it beyond its table"
@@ -185,6 +186,10 @@ def solve(case: Case, airspeed_m_s: float = 0.0, off: Sequence[str] = ()) -> Dri
         {key.partition(".")[2]: b for key, b in bands.items() if key.startswith(head)} for head in ("full.", "hover.")
     )
     settled = mission.settled_temperature(drive, drive.esc.pulse_max_us, table.soc)
+    mass, lift_kg = table.vehicle.mass_kg, table.vehicle.rotors * float(full_b["thrust_N"].value) / G0
+    if mass is not None and mass > math.sqrt(1e3) * lift_kg > 0.0:  # nearer to the lift in grams than in kg
+        notes.insert(0, f"{mass:g} kg is {mass / lift_kg:.0f} times what the rotors lift: looks like grams, write "
+                        f"{mass / 1e3:g} kg")  # fmt: skip
     return DriveResult(case, airspeed_m_s, full_b, hover, steady, u, drive, tuple(steps), course, settled, tuple(notes))
 
 
@@ -310,17 +315,17 @@ def _unusual(case: Case) -> list[str]:
     tips = case.diameter_m * per_m
     if tips <= TIPS[2] or case.ducted:
         return []
+    speed = f"without load the tip speed would be {tips:.0f} m/s; 95 % of 1088 recorded motors are below {TIPS[2]:.0f}"
+    if tips <= TIPS[3]:
+        return [f"a fast combination, common for racing: the motor gets hot at full throttle\n  ({speed})"]
     fit = [v / per_m / INCH for v in TIPS[:2]]
-    rare = tips > TIPS[3]
     slower = [v / (math.pi * case.diameter_m * loaded) * 60.0 for v in TIPS[:2]]
     return [
-        f"{'unusual' if rare else 'fast'} combination: without load the tip speed would be {tips:.0f} m/s; 95 % of "
-        f"1088 recorded motors are below {TIPS[2]:.0f}.\n  {table.kv:g} rev/min/V on {table.cells}S suits "
-        f"propellers of {fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits "
-        f"{slower[0]:.0f} to {slower[1]:.0f} rev/min/V.\n  "
-        + ("A typical motor would overload and burn out; the numbers assume a motor that is large enough." if rare
-           else "This is common for racing; the motor gets hot at full throttle.")
-    ]  # fmt: skip
+        "an unusual combination: a typical motor would overload and burn out; the numbers assume one that is large "
+        f"enough.\n  {speed[0].upper()}{speed[1:]}.\n  {table.kv:g} rev/min/V on {table.cells}S suits propellers of "
+        f"{fit[0]:.1f} to {fit[1]:.1f} in; one of {case.diameter_m / INCH:.3g} in suits {slower[0]:.0f} to "
+        f"{slower[1]:.0f} rev/min/V."
+    ]
 
 
 def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:
@@ -373,8 +378,8 @@ def text(found: DriveResult) -> str:
         a, b = (1e2 * v / full["battery_A"].value for v in (full["battery_A"].u, full["battery_A"].u_with_sheet))
         lines += [
             f"assumed     winding {1e3 * drive.motor.resistance_ohm:.0f} mohm, no-load current "
-            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from",
-            f"            the motor's sheet, in [drive.motor] of a case, the current is known to {b:.0f} % instead of "
+            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from the",
+            f"            motor's sheet (--resistance-mohm, --no-load-A) the current is known to {b:.0f} % instead of "
             f"{a:.0f} %",
         ]
     ask = [name for name, v in (("--mass-kg", mass), ("--capacity-Ah", t.battery.capacity_Ah)) if v is None]

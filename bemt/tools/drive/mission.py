@@ -180,7 +180,7 @@ def hover(drive: Drive, mass_kg: float, rotors: int, soc: float) -> Hover:
     wanted = mass_kg * G0 / rotors
     full = float(drive.steady(drive.esc.pulse_max_us, soc).thrust_N[0])
     pulse = drive.pulse_for(wanted, soc)
-    if math.isnan(pulse):
+    if math.isnan(pulse) or not wanted > 0.0:  # half of a full throttle that lifts nothing
         return Hover(wanted, full, *[math.nan] * 6)
     s = drive.steady(pulse, soc)
     power = float(s.power_W[0])

@@ -171,6 +171,10 @@ def fly(
         faults.append(Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg"))
     if out_case is not None and case is None:
         faults.append(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
+    named = [Path(p) for one in healthy for p in ([one] if isinstance(one, str | os.PathLike) else one)]
+    own = {p.resolve() for p in named if p.is_file()} & {Path(p).resolve() for p in given if Path(p).is_file()}
+    faults += [Fault(os.fspath(p), "", "a flight that is to be its own healthy flight", "other flights with --healthy",
+                     "Beside itself a flight shows nothing") for p in given if Path(p).resolve() in own]  # fmt: skip
     refuse(faults)
     folder = any(Path(p).is_dir() for p in given)
     mine = [f for p in given for f in _files(p)]

@@ -31,17 +31,30 @@ def sniff(head: bytes) -> bool:
     return bool(head) and b"\0" not in head
 
 
-_CELLS, _TIMES = ("p", "v", "R", "w", "fa", "pwm"), ("t", "t_s", "time", "time_s", "timestamp")
-_USED = re.compile(r"t|t_s|time|time_s|timestamp|p|v|R|w|fa|pwm"
+_CELLS = ("p", "v", "R", "w", "fa", "pwm")
+_USED = re.compile(r"p|v|R|w|fa|pwm"
                    r"|(motor|pwm|rpm|acc|gyro|pm|stateEstimate|controller)\..+|(vbat|amperage)(Latest)?"
                    r"|(motor|eRPM|gyroADC|gyroUnfilt|accSmooth)\[\d+\]")  # fmt: skip
-_SPEED = re.compile(
-    r"(?:motor|esc|rotor)?[ _.]?rpm[ _.\[]*m?(\d+)\]?"
-    r"|(?:motor|esc|rotor)[ _.]?(\d+)[ _.]?rpm",
-    re.IGNORECASE,
-)
-"""Headings of the speed of one rotor: rpm1, rpm_1, motor_1_rpm, esc.rpm[0]."""
-_CLOCK = r"\btime\b|\btime_s\b|\bt\b|\bt_s\b|loopIteration|\btimestamp\b"
+_ROTOR_WORDS = {"rpm", "motor", "esc", "rotor", "prop", "propeller", "m", "speed"}
+_TIME = re.compile(r"(t|time|timestamp)(?:[ _]*[(\[]?(s|ms|us|µs)[)\]]?)?", re.IGNORECASE)
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+_READ = ("a time (t_s, time_ms, Time [s]) with the speed of each motor (rpm1, esc1_rpm, Motor 1 [RPM]); "
+         "or a log of Betaflight or of a Crazyflie; or t, v, R, pwm")  # fmt: skip
+
+
+def _rotor(heading: str) -> int | None:
+    """Number of the rotor whose speed a heading says.
+
+    >>> [_rotor(h) for h in ("rpm1", "Motor 1 [RPM]", "esc.rpm[0]", "eRPM[0]", "motor[1]")]
+    [1, 1, 0, None, None]
+    """
+    words = re.findall(r"[a-z]+|\d+", heading.lower())
+    number = [int(w) for w in words if w.isdigit()]
+    said = {w for w in words if not w.isdigit()}
+    return number[0] if "rpm" in said and len(number) == 1 and said <= _ROTOR_WORDS else None
+
+
+_CLOCK = re.compile(r"\b(time|t|timestamp)(_(s|ms|us))?\b|loopIteration", re.IGNORECASE)
 _HEAD_BYTES = 1 << 18  # within which the headings stand
 _ROWS = 20_000  # of a piece
 
@@ -54,10 +67,10 @@ def read(path: Path) -> FlightLog:
     with path.open("rb") as file:
         head = file.read(_HEAD_BYTES)
     lines = head.decode("utf-8", errors="replace").split("\n")
-    start = next((k for k, line in enumerate(lines[:400]) if re.search(_CLOCK, line)
+    start = next((k for k, line in enumerate(lines[:400]) if _CLOCK.search(line)
                   and re.search(r"motor\[|motor\.|pwm|rpm|controller\.cmd", line, re.IGNORECASE)), None)  # fmt: skip
     if start is None:
-        raise InputError(Fault(name, "", "no row of headings with a time and motors", "a flight log"))
+        raise InputError(Fault(name, "", "no row of headings with a time and motors", _READ))
     said = {m[1]: m[2] for line in lines[:start] if (m := re.match(r'"?(\w+)"?,"?([^"]*)"?\s*$', line))}
     try:
         with path.open("rb") as rows:
@@ -76,14 +89,20 @@ def read(path: Path) -> FlightLog:
         return crazyflie.from_columns(name, "Crazyflie CSV", columns, ends)
     if any(c.startswith(("motor[", "eRPM[")) for c in frame.columns):
         return _betaflight(name, frame, said, ends)
-    if any(_SPEED.fullmatch(c) for c in frame.columns):
+    if any(_rotor(c) is not None for c in frame.columns):
         return _speeds(name, frame, ends)
-    raise InputError(Fault(name, "", "unknown headings", "Betaflight, Crazyflie, or t, v, R, pwm"))
+    raise InputError(Fault(name, "", f"headings {', '.join(map(str, frame.columns[:8]))}", _READ))
 
 
 def _label(heading: str) -> str:
-    """Heading without its unit."""
+    """Heading without its unit, unless it is the speed of a rotor or a time with its unit."""
+    if _rotor(heading) is not None or _TIME.fullmatch(heading.strip()):
+        return heading.strip()
     return re.sub(r"\s*\(.*\)\s*$", "", heading).strip()
+
+
+def _wanted(label: str) -> bool:
+    return _rotor(label) is not None or bool(_USED.fullmatch(label) or _TIME.fullmatch(label))
 
 
 def _frame(rows: BinaryIO) -> pd.DataFrame:
@@ -92,13 +111,13 @@ def _frame(rows: BinaryIO) -> pd.DataFrame:
 
     kept: Stretches[pd.DataFrame] = Stretches(lambda piece: piece.iloc[::SPARSE].copy())
     pieces = pd.read_csv(rows, on_bad_lines="skip", encoding_errors="replace", chunksize=_ROWS, low_memory=False,
-                         usecols=lambda c: any(p.fullmatch(_label(str(c))) for p in (_USED, _SPEED)))  # fmt: skip
+                         usecols=lambda c: _wanted(_label(str(c))))  # fmt: skip
     for piece in pieces:
         piece.columns = [_label(str(c)) for c in piece.columns]
         for c in piece.columns:
             if c not in _CELLS:
                 numbers = pd.to_numeric(piece[c], errors="coerce")
-                piece[c] = numbers if c in _TIMES else numbers.astype(np.float32)
+                piece[c] = numbers if _TIME.fullmatch(c) else numbers.astype(np.float32)
         kept.add(piece)
     return pd.concat(kept.parts, ignore_index=True)
 
@@ -137,22 +156,27 @@ def _cells(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
 
 def _speeds(name: str, frame: pd.DataFrame, ends: str) -> FlightLog:
     """A table of time and speeds alone: hovering gives the thrust constant."""
-    clock = next((c for c in _TIMES if c in frame), None)
-    if clock is None:
-        raise InputError(Fault(name, "", "no column of time", "t_s, time or timestamp"))
-    number = {c: int(m[1] or m[2]) for c in frame.columns if (m := _SPEED.fullmatch(c))}
+    clock, unit = next(((c, m[2]) for c in frame.columns if (m := _TIME.fullmatch(c))), ("", None))
+    if not clock:
+        raise InputError(Fault(name, "", "no column of time", "t_s, time_ms, Time [s] or timestamp"))
+    number = {c: n for c in frame.columns if (n := _rotor(c)) is not None}
     t = frame[clock].to_numpy(float)
     step = float(np.nanmedian(np.diff(t))) if t.size > 1 else 1.0
-    # Names of clocks do not state their unit: logs of flights are taken 2 to 20,000 times a second.
-    scale = 1.0 if step < 0.5 else 1e-3 if step < 500.0 else 1e-6
+    # A clock without a unit: logs of flights are taken 2 to 20,000 times a second.
+    guess = 1.0 if step < 0.5 else 1e-3 if step < 500.0 else 1e-6
+    scale = _SECONDS[unit.lower()] if unit else guess
+    if not 5e-5 <= scale * step <= 0.5:
+        expected = "2 to 20,000 rows a second"
+        raise InputError(Fault(name, clock, f"rows {step:.3g} {unit or ''} apart", expected, "Is the unit right?"))
     rpm = frame[sorted(number, key=lambda c: number[c])].to_numpy(float)
     return joined(name, "CSV of speeds", {"rpm": (scale * t, rpm)}, "rpm", ends=ends)
 
 
 def _betaflight(name: str, numbers: pd.DataFrame, said: dict[str, str], ends: str) -> FlightLog:
-    if "time" not in numbers:
+    clock = next((c for c in numbers.columns if _TIME.fullmatch(c)), "")
+    if not clock.startswith("time"):
         raise InputError(Fault(name, "time", "no such column", "time in us", "Decode with blackbox_decode"))
-    t = 1e-6 * numbers["time"].to_numpy(float)
+    t = 1e-6 * numbers[clock].to_numpy(float)
 
     def many(stem: str, factor: float = 1.0) -> tuple[Array, Array] | None:
         keys = [c for c in numbers.columns if re.fullmatch(rf"{stem}\[\d+\]", c)]
