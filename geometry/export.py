@@ -59,7 +59,7 @@ def export(
             if word in ("step", "flow"):
                 from geometry.cad import kernel
 
-                with kernel(word, "a solid that it can make", "Use stl, obj, 3mf or openfoam, which need no CAD kernel"):
+                with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
                     files.append(_step(rotor, duct, work, name, unit, model, volumes) if word == "step"
                                  else _flow(rotor, duct, work, name, unit, model))  # fmt: skip
             elif word == "openfoam":

@@ -337,6 +337,13 @@ class Result(Documented):
         """First row of a source, None where there is none."""
         return next(iter(self.of(source)), None)
 
+    def row_of(self, c: Comparison) -> Row | None:
+        """Recorded row of a comparison; None of one that a report added."""
+        rows = [row for row in self.all_rows if (row.label, row.source) == (c.reference, c.source)]
+        key = c.quantity if c.quantity in ("CT", "CP") else "bemt_error_pct"  # a label may stand at several points
+        value = c.D if key == c.quantity else c.E_pct
+        return min(rows, key=lambda row: abs((getattr(row, key) or math.nan) - value), default=None)
+
     def audit_of(self, reference: str) -> Audit | None:
         """Audit of one recorded value."""
         return next((a for a in self.audit if a.reference == reference), None)
