@@ -174,6 +174,7 @@ def compare_run(
         if not is_run(imported):
             flies = full["airspeed_m_s"][rows] > 0.5
             notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
+    notes = [*made.as_built().no_check, *notes]
     known = combined(lines)[1] if lines else math.nan
     asked = called or (made.path.as_posix() if isinstance(case, Case) else os.fspath(case))
     return RunComparison(

@@ -126,6 +126,7 @@ def verdict(result: Result) -> tuple[str, str, str]:
         told.append(f"Not distinguishable from noise against {', '.join(near)}: |E| is within u_val.")
     told += _open(lines)
     told += [f"Flagged: {flag}." for flag in row.flags]
+    told += _no_check(result)
     here = [c for c in lines if not _elsewhere(result, c, row)]
     main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *here, *lines]))
     return (*stand(main), " ".join(told))
@@ -179,7 +180,12 @@ def answer(result: Result) -> str:
             seen.add(key)
             rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N{_elsewhere(result, c, own)}")
     told += [f"{', '.join(names)}: {words}." for words, names in rest.items()]
+    told += _no_check(result)
     return " ".join(t[:1].upper() + t[1:] for t in told)
+
+
+def _no_check(result: Result) -> list[str]:
+    return [f"{words[:1].upper()}{words[1:]}." for words in result.no_check or ()]
 
 
 def _hangs(c: Comparison, name: str) -> str:

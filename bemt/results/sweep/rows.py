@@ -305,6 +305,7 @@ class Result(Documented):
     drive: FullThrottle | None = None
     fan: Fan | None = None
     pair: PairResult | None = None
+    no_check: tuple[str, ...] | None = None  # Readings to which the rotor was fitted; None where there are none
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     grid: GridResult | None = None
