@@ -308,6 +308,8 @@ def _dataset(
     provenance = {
         "file": name, "format": "cfd_run", "files": tuple(run.run.files), "conditions": conditions, **about,
         "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
+        # A unit is asked for where the files state none
+        "units_given": tuple(q for q in ("thrust", "torque") if (fact := getattr(run.columns, q)) and fact.unit),
     }  # fmt: skip
     if rows == 1:
         provenance["means"] = {
