@@ -102,7 +102,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
-    elif record.provenance["format"] == "table":
+    elif record.provenance["format"] in ("table", "recording"):
         record = of_table(record)
     elif record.provenance.get("clock") == "time":
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
