@@ -34,10 +34,15 @@ def numbers() -> dict[str, float]:
         low, high = (mid, high) if element(mid).T > 0.0 else (low, mid)
     beta = np.arctan(PITCH / (2.0 * np.pi * AT))
     phi, W = float(flight.phi[0]), float(flight.W[0])
+    q = 2.0 - 8.0 / (W * np.sin(phi))  # (V + 2 v) / (V + v)
+    phi_w = np.arctan(np.tan(phi) * q**1.5)
+    f, usual = ((R - AT) / (AT * np.sin(angle)) for angle in (phi_w, phi))
     return {
         "beta_deg": float(np.degrees(beta)), "onset_deg": float(np.degrees(np.arctan2(8.0, OMEGA * AT))),
         "phi_deg": float(np.degrees(phi)), "alpha_deg": float(np.degrees(beta - phi)), "W": W,
         "cl": float(section(np.array(beta - phi), np.array(0), np.array(0))[0]), "F": float(flight.F[0]),
+        "q": q, "phi_w_deg": float(np.degrees(phi_w)), "f": float(f),
+        "F_disk": float(2.0 / np.pi * np.arccos(np.exp(-usual))),
         "w": W * np.sin(phi), "dT": flight.T, "dQ_mNm": 1e3 * flight.Q, "eta": flight.T * 8.0 / (flight.Q * OMEGA),
         "dT_rest": rest.T, "dT_three": three.T, "V_none": low, "dT_turned": element(8.0, 2, 1.0).T,
     }  # fmt: skip

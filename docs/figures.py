@@ -104,6 +104,11 @@ def _coverage(part: str, level: str) -> Callable[[Any], list[float]]:
     return ends
 
 
+def _of_transfer(part: Callable[[Any], list[float]]) -> Callable[[Any], list[float]]:
+    """A figure of a volume predicted by a population that was fitted to the other."""
+    return lambda d: part(d["transfer"])
+
+
 def claims(text: str) -> list[int]:
     """Right and all claims of the proof of this version: pooled, then run by run.
 
@@ -206,6 +211,13 @@ FIGURES = (
            LEFT_OUT, _errors("unseen", "median_abs", *_ALL)),
     Figure(BELIEVE, "nine of ten points are within # to # %", LEFT_OUT,
            lambda d: [f(_errors("unseen", "p90_abs", *_ALL)(d)) for f in (min, max)]),
+    Figure(BELIEVE, "the 68 % intervals contain # to # % of the points of volume 2", LEFT_OUT,
+           _of_transfer(_coverage("volume-2", "68"))),
+    Figure(BELIEVE, "of volume 2 and the 95 % intervals # to # %", LEFT_OUT, _of_transfer(_coverage("volume-2", "95"))),
+    Figure(BELIEVE, "nine of ten points are within # to # % there", LEFT_OUT,
+           _of_transfer(lambda d: [f(_errors("volume-2", "p90_abs", *_ALL)(d)) for f in (min, max)])),
+    Figure(README, "but # to # % of volume 2 if fitted to volume 1", LEFT_OUT,
+           _of_transfer(_coverage("volume-2", "68"))),
     Figure(BELIEVE, "brings flight to # and # %", LEFT_OUT, _errors("on_static_and_one", "median_abs", *_ALL[2:])),
     Figure(BELIEVE, "thrust within # % at 20,000 rev/min", CFD,
            lambda t: _off("prop_8x5_compressible", rpm="20000")(t)),

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,6 +30,18 @@ _POINTS = 45
 TRIED = ((45, 8e-3), (45, 15e-3), (61, 8e-3), (45, 3e-3), (37, 8e-3))
 """Points of a section and least distance of sections over R of printed blades, tried in turn: the CAD kernel fuses most
 of them, and says nothing when it loses a blade."""
+
+
+@contextmanager
+def kernel(where: str, wanted: str, hint: str) -> Iterator[None]:
+    """Tell what the CAD kernel failed at; it raises its own kinds."""
+    try:
+        yield
+    except GeometryError:
+        raise
+    except Exception as error:
+        got = f"a failure of the CAD kernel ({type(error).__name__}: {str(error)[:80]})"
+        raise GeometryError([(where, got, wanted, hint)]) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +178,12 @@ def _loft(sections: list[tuple[float, Array]]) -> Any:
     return cq.Solid.makeLoft(wires, False)
 
 
-def _turned(profile: Array) -> Any:
-    """Solid of revolution of a closed profile of radius and z [m] around z; straight where three points are."""
+def _turned(profile: Array, copies: int) -> Any:
+    """Solid of revolution of a closed profile of radius and z [m] around z; straight where three points are.
+
+    Its seam lies midway between the `copies` blades or vanes that stand on it, the first at x: with the edges of a vane
+    on a seam the kernel's boolean gives nothing.
+    """
     cq = needs("cadquery", "cad")
 
     points = [cq.Vector(float(r) * MM, 0.0, float(z) * MM) for r, z in profile]
@@ -187,7 +205,8 @@ def _turned(profile: Array) -> Any:
             edges.append(cq.Edge.makeLine(points[order[i]], points[(order[i] + 1) % count]))
             i += 1
     face = cq.Face.makeFromWires(cq.Wire.assembleEdges(edges))
-    return cq.Solid.revolve(face, 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))
+    axis = cq.Vector(0, 0, 1)
+    return _fixed(cq.Solid.revolve(face, 360.0, cq.Vector(), axis).rotate(cq.Vector(), axis, 180.0 / copies))
 
 
 def _one(shape: Any, where: str) -> Any:
@@ -214,19 +233,13 @@ def blade_solid(rotor: Rotor, options: Options | None = None) -> tuple[Any, Arra
     if not rotor.blade.anchors:
         raise GeometryError([("anchors", "none", "one section or more", "A solid needs sections")])
     profile = hub_profile(rotor, wrapped_outline(rotor.blade, rotor.Rhub, options))
-    try:
+    with kernel("blade", "sections that can be lofted", "Use the mesh formats, which need no loft"):
         loft = _fixed(_loft(planar_sections(rotor, options)))
         low, high = 2 * float(profile[:, 1].min()) * MM - rotor.R * MM, 2 * rotor.R * MM + 4 * rotor.R * MM
         low_point = cq.Vector(0, 0, low)
         tip = cq.Solid.makeCylinder(rotor.R * MM, high, low_point)
         core = cq.Solid.makeCylinder(rotor.Rhub * MM, high, low_point)
         solid = _one(loft.intersect(tip).cut(core), "blade")
-    except GeometryError:
-        raise
-    except Exception as error:  # the CAD kernel raises its own kinds
-        name = type(error).__name__
-        got, hint = f"a failure of the CAD kernel ({name})", "Use the mesh formats, which need no loft"
-        raise GeometryError([("blade", got, "sections that can be lofted", hint)]) from error
     expected = blade_volume(rotor.blade, options) * MM**3
     if abs(solid.Volume() / expected - 1) > TOLERANCE:
         off = 100 * (solid.Volume() / expected - 1)
@@ -269,13 +282,12 @@ def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> 
     assert options.printed is not None
     root = wrapped_outline(rotor.blade, rotor.Rhub - root_depth(rotor, options.printed), options)
     profile = hub_profile(rotor, framed(root, options.printed))
-    try:
+    with kernel("blade", "sections that can be lofted", "Use stl or 3mf, which need no loft"):
         loft = _fixed(_loft(planar_sections(rotor, options, count, apart)))
         foot, axis = cq.Vector(0, 0, -2 * rotor.R * MM), cq.Vector(0, 0, 1)
         tip = cq.Solid.makeCylinder(rotor.R * MM, 4 * rotor.R * MM, foot).rotate(cq.Vector(), axis, 90.0)
         blade = _one(loft.intersect(tip), "blade")
-        # Seams of surfaces of revolution lie away from the blades.
-        solid = _fixed(_turned(profile)).rotate(cq.Vector(), axis, 180.0 / rotor.B)
+        solid = _turned(profile, rotor.B)
         for k in range(rotor.B):
             solid = solid.fuse(blade.rotate(cq.Vector(), axis, 360.0 * k / rotor.B))
         for _, shape, sides in cutters(options.printed, profile, options.segments):
@@ -287,17 +299,12 @@ def _printed_solid(rotor: Rotor, options: Options, count: int, apart: float) -> 
                 hole = cq.Solid.makeCylinder(radius, top - bottom, cq.Vector(0, 0, bottom))
             solid = solid.cut(hole)
         return _one(solid.clean(), "rotor")
-    except GeometryError:
-        raise
-    except Exception as error:  # the CAD kernel raises its own kinds
-        got, hint = f"a failure of the CAD kernel ({type(error).__name__})", "Use stl or 3mf, which need no loft"
-        raise GeometryError([("blade", got, "sections that can be lofted", hint)]) from error
 
 
 def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
     cq = needs("cadquery", "cad")
 
-    body = _fixed(_turned(centre_body(duct, plan)))
+    body = _turned(centre_body(duct, plan), plan.stator.B)
     outline = plan.outline(41)
     wide = float(np.abs(outline[:, 0]).max())
     if wide > 0.9 * plan.body_radius:
@@ -307,7 +314,7 @@ def _stator_solids(duct: Duct, plan: StatorPlan) -> list[tuple[str, str, Any]]:
     vane = _fixed(_loft([(0.05 * plan.body_radius, flat), (top, flat)]))
     inner = duct.profile(81)[0]
     room = np.array([(0.0, duct._rotor), *((r, duct._rotor - x) for x, r in inner), (0.0, duct._rotor - duct.length)])
-    between = _fixed(_turned(_thin(room))).cut(body)
+    between = _turned(_thin(room), plan.stator.B).cut(body)
     vane = _one(vane.intersect(between), "stator")
     out = [("stator", "centre_body", body)]
     for k in range(plan.stator.B):
@@ -335,12 +342,12 @@ def solids(rotor: Rotor, duct: Duct | None = None, options: Options | None = Non
         turned = blade.rotate(cq.Vector(), cq.Vector(0, 0, 1), 360.0 * k / rotor.B)
         found.append(("blade", f"blade_{k + 1}", turned))
     exact = [("hub", profile)]
-    found.append(("hub", "hub", _fixed(_turned(profile))))
+    found.append(("hub", "hub", _turned(profile, rotor.B)))
     if duct is not None:
         duct.check(rotor)
         wall = duct_profile(duct)
         exact.append(("duct", wall))
-        found.append(("duct", "duct", _fixed(_turned(wall))))
+        found.append(("duct", "duct", _turned(wall, 1 if duct.stator is None else duct.stator.B)))
         plan = plan_stator(duct, float(profile[:, 1].min()), rotor.Rhub)
         if plan is not None:
             found += _stator_solids(duct, plan)

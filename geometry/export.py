@@ -56,10 +56,12 @@ def export(
         files: list[dict[str, Any]] = []
         volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
         for word in dict.fromkeys(formats):
-            if word == "step":
-                files.append(_step(rotor, duct, work, name, unit, model, volumes))
-            elif word == "flow":
-                files.append(_flow(rotor, duct, work, name, unit, model))
+            if word in ("step", "flow"):
+                from geometry.cad import kernel
+
+                with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
+                    files.append(_step(rotor, duct, work, name, unit, model, volumes) if word == "step"
+                                 else _flow(rotor, duct, work, name, unit, model))  # fmt: skip
             elif word == "openfoam":
                 files += _openfoam(model, work)
             elif word == "3mf":

@@ -19,6 +19,8 @@ from bemt.base.errors import InputError
 from bemt.data.readers.cfd_run import RunToml, toml_text
 from bemt.data.recordings.cfd_run import assemble
 from bemt.data.recordings.cfd_setup import GRID_FLOOR, conditions_that_differ, grid_floor
+from bemt.judge.compare import one_run
+from bemt.physics.dataset import Dataset
 
 T, Q, RPM = 3.8, 0.062, 8000.0
 """Thrust [N], torque [N m] and speed of every run made here."""
@@ -658,3 +660,53 @@ def test_a_run_is_replaced_and_no_other_file(put: Callable[..., Path], capsys: p
     case = put("case.toml", 'schema = "bemt.case/1"\n')
     assert main([*args, "--out", "case.toml"]) == 2 and "no run" in capsys.readouterr().err
     assert case.read_text() == 'schema = "bemt.case/1"\n'
+
+
+# ---- the first sentence of one run
+
+
+def _told(ratios: dict[str, list[float]], unit_open: frozenset[str] = frozenset(), u: float = 0.1) -> str:
+    """First sentence for points whose CFD is these times BEMT, each side known to a share of its value."""
+    n = max(map(len, ratios.values()))
+
+    def load(ratio: float, size: float = 1.0) -> one_run.BothLoads:
+        both = size * u * math.hypot(ratio, 1.0)
+        E = size * (1.0 - ratio)
+        return one_run.BothLoads(ratio * size, u * abs(ratio) * size, size, u * size, {}, E, both,
+                                one_run._verdict(E, both))  # fmt: skip
+
+    points = [one_run.PointOfRun("", 6000.0, 0.0, 1.2, 0.0, {k: load(v[i]) for k, v in ratios.items()}, ())
+              for i in range(n)]  # fmt: skip
+    return one_run._sentence(points, "CFD", unit_open)
+
+
+def test_a_unit_is_named_only_where_it_was_open_and_fits_every_point() -> None:
+    both = frozenset({"thrust_N", "torque_Nm"})
+    kgf = {"thrust_N": [1 / 9.80665, 1.03 / 9.80665]}
+    assert "kgf" in _told(kgf, both) and "check the unit" in _told(kgf, both)
+    assert "check the unit" not in _told(kgf)  # the file stated it
+    for ratios in ([18.7, 18.7], [1.77, 1.4], [1 / 9.80665, 1 / 6.0]):
+        assert "check the unit" not in _told({"thrust_N": ratios}, both)
+    two = _told({"thrust_N": [18.7, 18.7], "torque_Nm": [25.4, 25.4]}, both)
+    assert "check the unit" not in two  # a unit of one load leaves the other unexplained
+    assert _told({"thrust_N": [4.448, 4.448], "torque_Nm": [1.356 * 12, 1.356 * 12]}, both).count("taken for") <= 1
+
+
+def test_coefficients_have_no_unit() -> None:
+    given = Dataset("bench", "a", {"CT": [0.1], "CP": [0.05]}, provenance={"format": "uiuc"})
+    assert not one_run.open_units(given)
+    stated = Dataset("bench", "a", {"thrust_N": [1.0], "torque_Nm": [1.0]},
+                     provenance={"format": "table", "headings": {"thrust_N": "thrust [lbf]", "torque_Nm": "Q"}})  # fmt: skip
+    assert one_run.open_units(stated) == {"torque_Nm"}
+
+
+def test_a_point_near_zero_thrust_does_not_make_the_headline() -> None:
+    """Seven of ten agree; the ratio at the smallest load says little."""
+
+    def point(cfd: float, bemt: float) -> one_run.PointOfRun:
+        load = one_run.BothLoads(cfd, 0.1, bemt, 0.4, {}, bemt - cfd, 0.41, one_run._verdict(bemt - cfd, 0.41))
+        return one_run.PointOfRun("", 6000.0, 0.0, 1.2, 0.0, {"thrust_N": load}, ())
+
+    points = [*(point(5.0 + k, 5.1 + k) for k in range(7)), *(point(0.6, 0.05) for _ in range(3))]
+    told = one_run._sentence(points, "CFD")
+    assert "agree in 7 of 10 values" in told and "-5 % of the largest thrust" in told and "9" not in told

@@ -279,3 +279,16 @@ def test_a_study_in_the_folder_of_a_case_stands_for_the_runs_that_it_names(
     assert {Path(r).name for r in runs} | {"study.toml"} <= {p.name for p in case.files()}
     (_, figures), *_ = study_parts([s.document() for s in import_file(study).provenance["studies"]])
     assert len(figures) == 2 and "order 2.22, 7.67" in figures[0]["note"]
+
+
+def test_a_table_of_grids_is_kept_as_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "512000,6000,4.90,0.0861\n1730000,6000,5.15,0.0850\n5840000,6000,5.25,0.0845\n"
+    Path("grids.csv").write_text("cells,rpm,thrust_N,torque_Nm\n" + rows)
+    told = import_("grids.csv", out="study.toml").text
+    assert "study.toml written. Next: bemt compare study.toml" in told and "no unit known" not in told
+    read = [import_(name).to_dict()["runs"][0]["points"] for name in ("grids.csv", "study.toml")]
+    assert read[0] == read[1]
+    sizes = "4,6000,5.0,0.0861\n2,6000,5.2,0.085\n1,6000,5.25,0.0845\n"
+    Path("sizes.csv").write_text("h [mm],rpm,thrust_N,torque_Nm\n" + sizes)
+    assert "takes their count" in import_("sizes.csv").text

@@ -341,6 +341,28 @@ def test_every_face_of_a_step_has_the_name_of_its_boundary(small_fan: tuple[Path
     assert written.count("far_field_side") == 4 and written.count("far_field_inlet") == 1
 
 
+def test_no_vane_stands_on_a_seam() -> None:
+    """A vane whose edges lie on the seams of duct and body left no air at all: fans of 70 and 254 mm."""
+    rotor = Rotor(helix(0.07, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
+    duct = around(rotor, 0.06, 0.0005, 0.004, exit_area_ratio=0.95, exit_hub_radius=0.0, stator=Stator(5, 0.02))
+    turned = {part: solid for _, part, solid in solids(rotor, duct).solids}
+    for part, copies in (("duct", 5), ("centre_body", 5), ("hub", 2)):
+        at = np.array([v.toTuple() for v in turned[part].Vertices()])
+        off_axis = at[np.hypot(at[:, 0], at[:, 1]) > 1e-3]
+        assert len(off_axis) and (np.cos(copies * np.arctan2(off_axis[:, 1], off_axis[:, 0])) < -0.99).all()
+
+
+def test_a_failure_of_the_kernel_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(*_: object) -> None:
+        raise ValueError("Null TopoDS_Shape object")
+
+    monkeypatch.setattr("geometry.cad.flow_domain", nothing)
+    rotor = Rotor(helix(0.1, 0.1, "fan", hub=0.35, anchors=naca4(0.04, 0.4, 0.1)), 2)
+    with pytest.raises(GeometryError, match=r"^flow: got a failure of the CAD kernel .*Null TopoDS"):
+        export(rotor, None, tmp_path, ["flow"], name="fan")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_mesher_picks_the_boundaries_by_name(small_fan: tuple[Path, dict[str, set[str]]]) -> None:
     gmsh = pytest.importorskip("gmsh")
     gmsh.initialize()

@@ -8,12 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bemt
 from bemt.app import cli
 from bemt.base.errors import InputError
 from bemt.base.units import G0, INCH
 from bemt.data.readers.uiuc_names import FAMILIES
+from bemt.judge.compare.one_run import compare_run
 from bemt.physics.bem.model import PREPARED
-from bemt.rotors.case import Case, case_of, estimate, fresh, lattice
+from bemt.results.report.diagnosis_block import answer, verdict
+from bemt.results.sweep.answer import summary
+from bemt.results.sweep.case import solve_case
+from bemt.rotors.case import Case, case_of, estimate, fresh, lattice, load_case
 from bemt.rotors.case.motor import class_resistance, full_speed, named_motor
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
@@ -243,3 +248,23 @@ def test_a_new_speed_needs_no_new_tables() -> None:
     for rpm in (3000.0, 4321.0, 9000.0, 11000.0):
         lattice.solve(case, np.array([rpm]), np.zeros(1), None)
     assert PREPARED.made == made and PREPARED.size <= PREPARED.most <= 200e6
+
+
+def test_a_comparison_with_what_the_rotor_was_fitted_to_is_said_to_be_no_check(tmp_path: Path) -> None:
+    """A rotor as UIUC measured it agrees with UIUC's readings because it was fitted to them."""
+    for name, label in (("known", "APC SF 10x4.7"), ("label", "10x4.7")):
+        bemt.new(label, out=tmp_path / name)
+    (tmp_path / "run.csv").write_text("rpm,thrust [N],torque [N m]\n5000,4.3,0.07\n6000,6.2,0.1\n7000,8.6,0.14\n")
+    paths = [tmp_path / name / "case.toml" for name in ("known", "label")]
+    known, label = (compare_run(str(tmp_path / "run.csv"), load_case(path)) for path in paths)
+    assert "no independent check" in known.notes[0] and "apcsf_10x4.7" in known.notes[0]
+    assert not any("no independent check" in note for note in label.notes)
+    (tmp_path / "known" / "references.csv").write_text(
+        "quantity,value,unit,uncertainty,kind,source,remark,rpm,airspeed_m_s,density_kg_m3\n"
+        "thrust,6.2,N,0.2,bench,UIUC,,6000,0,1.225\n"
+    )
+    text = paths[0].read_text()
+    paths[0].write_text(text.replace('name = "', 'references = "references.csv"\nname = "', 1))
+    result = solve_case(load_case(paths[0]))
+    for told in (summary([result]), answer(result), verdict(result)[2]):
+        assert "no independent check" in " ".join(told.split())

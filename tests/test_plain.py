@@ -86,11 +86,12 @@ def test_the_worked_element_of_the_theory_page_is_that_of_the_plain_method(proje
     for pattern, value in {
         r"= ([\d.]+) deg\. Without": n["beta_deg"], r"= ([\d.]+) deg\. 2\.": n["onset_deg"],
         r"`phi` = ([\d.]+) deg": n["phi_deg"], r"`alpha` = ([\d.]+) deg": n["alpha_deg"], r"`cl` = ([\d.]+)": n["cl"],
-        r"W = ([\d.]+) m/s": n["W"], r"`w = W sin\(phi\)` = ([\d.]+) m/s": n["w"], r"factor is F = ([\d.]+)\. ": n["F"],
+        r"W = ([\d.]+) m/s": n["W"], r"`w = W sin\(phi\)` = ([\d.]+) m/s": n["w"], r"factor is F = ([\d.]+) ": n["F"],
         r"0\.457 = ([\d.]+) N": n["dT"], r"3\.04 = ([\d.]+) N": n["dT"], r"torque is ([\d.]+) mN": n["dQ_mNm"],
         r"efficiency of the element ([\d.]+)\. ": n["eta"], r"\(1\) ([\d.]+) N": n["dT_rest"],
         r"No: ([\d.]+) N": n["dT_three"], r"N, ([\d.]+) times": n["dT_three"] / n["dT"],
-        r"\(3\) ([\d.]+) m/s": n["V_none"],
+        r"\(3\) ([\d.]+) m/s": n["V_none"], r"Here q = ([\d.]+),": n["q"], r"`phi_w` = ([\d.]+) deg": n["phi_w_deg"],
+        r"deg, f = ([\d.]+)\. ": n["f"], r"at this angle F = ([\d.]+)\. ": n["F_disk"],
     }.items():  # fmt: skip
         found = re.search(pattern, page)
         assert found is not None, pattern

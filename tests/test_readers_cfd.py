@@ -207,7 +207,10 @@ def test_number_oddities(put: Callable[..., Path]) -> None:
     record = importers.read(put(text))
     np.testing.assert_array_equal(record["q"], [1e-21, 0, 15, *[np.nan] * 3, 20.24100076, 0.3])
     assert "means" not in record.provenance
-    assert "q: 3 of 8 values are not finite numbers in the file" in record.notes
+    assert "q: 3 of 8 values are not finite numbers in the file: diverged?" in record.notes
+    lost = importers.read(put('"t"\n"i" "q"\n("Iteration" "q")\n1 1.0\n2 1.0\n9 nan\n3 1.0\n4 1.0\n'))
+    assert lost["q"].tolist() == [1.0] * 4 and any(note.endswith("diverged?") for note in lost.notes)
+    assert not any("out of order" in note for note in lost.notes)
     commas = put('"t"\n"i" "q"\n("Iteration" "q")\n1 0,25\n2 0,75\n')
     record = importers.read(commas)
     assert record.provenance["means"]["q"].value == 0.5 and "decimal commas read as decimal points" in record.notes

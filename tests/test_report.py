@@ -29,8 +29,8 @@ from bemt.app.cli import main
 from bemt.base.page import render
 from bemt.physics.dataset import Dataset
 from bemt.results.report import book_html
-from bemt.results.report.book import About, Book
-from bemt.results.report.diagnosis_block import verdict
+from bemt.results.report.book import About, Book, CasePage
+from bemt.results.report.diagnosis_block import answer, verdict
 from bemt.results.report.front import summary
 from bemt.results.report.gather import attach_diagnoses, gather, safe_files
 from bemt.results.report.plot import Mark, Plot, Trace, figure, ticks, viewer
@@ -453,6 +453,24 @@ def test_verdicts_follow_validation_uncertainty(E: float, u_D: float | None, kin
     row = Row("bemt", "bemt", 10.0, u=1.0)
     found, _, sentence = verdict(Result("one", rows=(row,), comparisons=(Comparison.from_document(line),)))
     assert found == kind and words in sentence
+
+
+def test_like_stands_beside_like_where_the_recording_is_at_another_speed() -> None:
+    """A case at 9000 rev/min whose CFD ran at 6000: BEMT's value is that at 6000, everywhere."""
+    rows = (
+        Row("bemt", "bemt", 11.01, rpm=9000.0, airspeed_m_s=0.0, u=1.0),
+        Row("bemt", "bemt", 4.751, rpm=6000.0, airspeed_m_s=0.0, u=0.4),
+        Row("cfd", "cfd 5.250 N", 5.25, rpm=6000.0, airspeed_m_s=0.0, bemt_error_pct=-9.5),
+    )
+    line = Comparison(reference="cfd 5.250 N", source="cfd", S=4.751, D=5.25, u_input=0.4)
+    result = Result("one", rows=rows, comparisons=(line,))
+    told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), (), 0))]
+    for text in told:
+        assert "4.751" in text and "6000" in text and "11.0" not in text and "9000" not in text
+    bench = Row("bench", "bench 10 N", 10.0, rpm=9000.0, airspeed_m_s=0.0)
+    second = Comparison(reference="bench 10 N", source="bench", S=11.01, D=10.0)
+    at_both = replace(result, rows=(*rows, bench), comparisons=(line, second))
+    assert "BEMT 11.01" in answer(at_both) and "CFD 5.25 N at 6000 rev/min" in answer(at_both)
 
 
 def test_nothing_is_ever_called_correct(text: str, made: tuple[Book, Path]) -> None:

@@ -98,7 +98,7 @@ def import_(
 
     if picture is not None and case is None:
         raise InputError(Fault("--picture", "", "no case", "--case CASE, whose band is drawn"))
-    names, wrote = paths_text("files", files, 1), ""
+    names, wrote, kept = paths_text("files", files, 1), "", ""
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
     told: dict[str, Any] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
@@ -112,7 +112,7 @@ def import_(
             hint = f"Add --out {Path(table).with_name('recording.toml').as_posix()}"
             raise InputError(Fault("", "--out", "nothing", "a recording.toml that keeps what you state", hint))
         written = write_recording(table, os.fspath(out), told["unit"], told["column"], told["sign"]).as_posix()
-        lines.append(f"{written} written\n")
+        kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     speed = None if choice.period is None else 60.0 / choice.period
     made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
@@ -128,7 +128,9 @@ def import_(
         seen = [wrote] if wrote else [*runs, *rest]
         sentence, document["prediction"] = _beside(seen, case, picture, rpm, airspeed_m_s, bool(wrote or runs))
         lines.append(f"{sentence}\n")
-    text = "\n".join([*lines, found.text(wrote)])
+    if kept and not found.runs:
+        lines.insert(0, f"{kept} written\n")
+    text = "\n".join([*lines, found.text(wrote or (kept if found.runs else ""))])
     return Told(document, text, exit_code=found.exit_code, complaints=found.complaints)
 
 

@@ -217,7 +217,8 @@ def numeric_table(
     array = np.array([*good.values()], dtype=float)
     for column, missing in zip(columns, np.isnan(array).sum(axis=0).tolist(), strict=True):
         if missing:
-            warnings.append(f"{column.name}: {missing} of {len(array)} values are not finite numbers in the file")
+            lost = f"{missing} of {len(array)} values are not finite numbers in the file: diverged?"
+            warnings.append(f"{column.name}: {lost}")
     return ExportTable(array, tuple(good), tuple(warnings))
 
 
@@ -274,8 +275,13 @@ def history(
     step = _clock(table.values, roles, "step")
     notes = [*warnings, *table.warnings]
     index: NDArray[np.intp] = np.arange(len(table.values))
+    alive = np.isfinite(table.values[:, [role == "value" for role in roles]]).any(axis=1)
+    at = time if time is not None else step
+    if at is not None and alive.any() and np.any(np.diff(table.values[:, at]) < 0):  # no value, no order
+        index = index[alive]
     if time is not None:
-        index, more = keep_last(table.values[:, time], columns[time].name)
+        kept, more = keep_last(table.values[index, time], columns[time].name)
+        index = index[kept]
         notes += more
     if step is not None:
         steps = table.values[index, step]

@@ -100,6 +100,13 @@ _ELECTRICAL = re.compile(r"(?=.*rpm).*[(\[]\s*(erpm|electrical)\s*[)\]]\s*", re.
 _SEA_LEVEL = "a pressure reduced to sea level: give that of the station (QFE)"
 
 
+CELLS = re.compile(
+    r"^((number|no\.?)[-_ ]of[-_ ]|n[-_ ]?|mesh[-_ ]|grid[-_ ])*(cells|elements)$|^(cell|element)s?[-_ ]count$",
+    re.IGNORECASE,
+)
+"""Heading of the count of cells of a grid, which has no unit."""
+
+
 @dataclass(frozen=True)
 class Heading:
     """What a heading says.

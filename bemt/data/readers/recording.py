@@ -26,6 +26,7 @@ from bemt.data.readers import load_text
 from bemt.data.readers._large import NumberTable
 from bemt.data.readers._words import english, quantities
 from bemt.data.readers.headings import (
+    CELLS,
     Heading,
     heading,
     in_usual_unit,
@@ -188,7 +189,8 @@ class Builder:
         if head.told:
             self.warnings.append(head.told)
         if head.unit is None:
-            self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
+            if not CELLS.search(label.partition("[")[0].strip()):  # a count needs none
+                self.unitless.append(f"{label!r}" + (f" ({head.doubt})" if head.doubt else ""))
         elif head.unit.suffix != "rpm" and (head.unit.factor, head.unit.offset) != (1.0, 0.0):
             with np.errstate(over="ignore"):
                 values = values * head.unit.factor + head.unit.offset

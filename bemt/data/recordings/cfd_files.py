@@ -31,7 +31,8 @@ EXPORT = (
 )
 """Where loads come from."""
 SEVERAL = (
-    "Several runs? Import each with --out, then give the .toml files together. A restart with its own clock: alone"
+    "Several runs? Import each with --out, then give the .toml files together. A restart with its own clock: alone. "
+    "One condition on several grids: --setup cells=a,b,c, a number for each folder"
 )
 SCATTERED = 0.02
 """Spread of the means of single revolutions above which a load is not periodic. [1]"""

@@ -18,7 +18,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault
 from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import QUANTITIES, RunColumn, RunToml
-from bemt.data.readers.headings import channel_of, may_be_shaft_speed, meanings
+from bemt.data.readers.headings import CELLS, channel_of, may_be_shaft_speed, meanings
 from bemt.data.recordings.cfd_files import Settled, settled, zone_of
 from bemt.physics.dataset import Dataset
 
@@ -38,8 +38,7 @@ _WORDS: dict[str, str] = {
     "power": r"power|leistung",
     "duct_thrust": r"duct|shroud|nozzle",
     "airspeed": r"inlet[-_ ]?(velocity|speed)|advance[-_ ](speed|velocity)|flight[-_ ]speed",
-    "cells": r"^((number|no\.?)[-_ ]of[-_ ]|n[-_ ]?|mesh[-_ ]|grid[-_ ])*(cells|elements)$"
-    r"|^(cell|element)s?[-_ ]count$",
+    "cells": CELLS.pattern,
 }
 """Headings of a quantity in CFD beside those that benches have as well (`usual`)."""
 _NOT = re.compile(r"coeff|spectral|^c[dlmt]\b|residual|^res_|^rms\[|kt\b|kq\b", re.IGNORECASE)
@@ -49,8 +48,6 @@ _OTHER = {
     "y+ of walls": re.compile(r"\by ?\+|y_?plus", re.IGNORECASE),
 }
 """What a monitor may hold beside loads."""
-CELLS = re.compile(_WORDS["cells"], re.IGNORECASE)
-"""Heading of the cells of a grid."""
 CHANNEL = {"thrust": "thrust_N", "duct_thrust": "duct_thrust_N", "torque": "torque_Nm", "power": "power_W"}
 """Channel of a load."""
 _VECTOR = {"thrust": "force", "torque": "moment"}

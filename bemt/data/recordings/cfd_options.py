@@ -288,6 +288,17 @@ class _Measured:
             return Fault("", "--sign", f"{name}={text}", "a quantity and -1, as in --sign thrust=-1")
         return quantity, {"sign": int(text)}
 
+    def plain(self) -> dict[str, Facts]:
+        """Quantities of the headings that say quantity and unit themselves."""
+        out: dict[str, Facts] = {}
+        for h in self.known:
+            head = heading(h)
+            named = {*meanings(h), head.name.removesuffix(f"_{head.unit.suffix}") if head.unit else ""}
+            told = [q for q in named if q in CHANNELS and head.unit and head.unit.dimension == CHANNELS[q]]
+            if len(told) == 1:
+                out.setdefault(told[0], {"column": h})
+        return out
+
     def _by_unit(self, name: str, text: str) -> str | None:
         """Quantity that the words of a heading mean and the unit goes with, else the one that a unit stands for."""
         stated = unit_for("", text)
@@ -334,6 +345,8 @@ def write_recording(
     _gather("--column", column, headings.column, columns, faults)
     _gather("--unit", unit, headings.unit, columns, faults)
     _gather("--sign", sign, headings.sign, columns, faults)
+    if not (columns or faults):
+        columns = headings.plain()
     for quantity, facts in columns.items():
         faults += headings.complete(quantity, facts)
     refuse(faults)

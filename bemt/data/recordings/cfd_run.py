@@ -321,6 +321,8 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     provenance = {
         "file": name, "format": "cfd_run", "files": tuple(work.run.run.files), "conditions": conditions,
         "averaged": averaged, "drift": drift, "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
+        # A unit is asked for where the files state none
+        "units_given": tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit),
     }  # fmt: skip
     if rows == 1:
         provenance["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}

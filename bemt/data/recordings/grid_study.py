@@ -23,8 +23,9 @@ index to a standard uncertainty is that of ASME V&V 20-2009 (not checked against
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text
-from bemt.data.recordings.cfd_loads import CELLS
+from bemt.data.readers.headings import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
@@ -384,6 +385,10 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
     return [together(g) if len(g) > 1 else g[0] for g in out]
 
 
+CELL_SIZE = re.compile(r"(h|dx|(cell|mesh|grid|element)_?size)(_m)?", re.IGNORECASE)
+"""Columns of a size of cells in a table of grids."""
+
+
 def of_table(record: Dataset) -> Dataset:
     """Somebody's table with a column of cells, as a run on the finest grids; any other recording as it is.
 
@@ -392,6 +397,10 @@ def of_table(record: Dataset) -> Dataset:
     cells = next((record[k] for k in record.values if CELLS.search(k)), np.empty(0))
     d = named(record)
     loads = [k for k in LOADS if k in d]
+    size = next((k for k in record.values if not cells.size and CELL_SIZE.fullmatch(k)), None)
+    if size and loads and np.unique(record[size]).size > 1 and any(len(g) > 1 for g in groups(d)):
+        told = f"{size}: a size of cells? A grid study takes their count, in a column headed cells (it goes with h^-3)"
+        return replace(record, notes=(*record.notes, told))
     if not loads or np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
     if all(len(g) == 1 for g in groups(d)):

@@ -92,7 +92,7 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
-    elif record.provenance["format"] == "table":
+    elif record.provenance["format"] in ("table", "recording"):
         record = of_table(record)
     elif record.provenance.get("clock") == "time":
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
@@ -332,7 +332,8 @@ class ImportedFile:
         if self.record is None:
             return ""
         told = {
-            f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+            f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}"
+            for f in self.findings
         }
         errors = [text for f, text in told.items() if f.severity == "error"]
         lines, rows, plain = [self.title, *errors], [], []

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ STAND_U = dict(zip(("thrust_N", "torque_Nm"), STAND.tolist(), strict=True))
 _KIND = {"thrust_N": "force", "torque_Nm": "torque"}
 _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
+_NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
@@ -174,12 +176,14 @@ def compare_run(
         if not is_run(imported):
             flies = full["airspeed_m_s"][rows] > 0.5
             notes.insert(0, "u of the file, and " + floor_note(bool(flies.any()), bool(flies.all())))
+    notes = [*made.as_built().no_check, *notes]
     known = combined(lines)[1] if lines else math.nan
     asked = called or (made.path.as_posix() if isinstance(case, Case) else os.fspath(case))
     return RunComparison(
         name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
         out, tuple(faults_first(lines)), known, dict(imported.provenance.get("averaged", {})),
-        tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording"), _next(out, lines, name, asked),
+        tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording", open_units(imported)),
+        _next(out, lines, name, asked),
     )  # fmt: skip
 
 
@@ -237,39 +241,67 @@ def _verdict(E: float, u: float) -> str:
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
-def _slip(name: str, load: BothLoads) -> str:
-    """What a difference looks like that is no physics; "" when nothing is near."""
-    if load.cfd * load.bemt < 0.0:
-        return f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
-    ratio = load.cfd / load.bemt if load.bemt else math.nan
-    if name not in _KIND or not ratio > 0.0 or 1.0 / _FAR < ratio < _FAR:
-        return ""
-    wide = _WIDE * math.hypot(load.u_both / load.bemt, 0.02)
-    near = [(e.rarity + (off / wide) ** 2, e) for e in unit_errors.errors(_KIND[name])
-            if (off := abs(math.log(ratio / e.factor))) < wide]  # fmt: skip
+def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
+    """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
+    said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
+    if said and all(load.cfd * load.bemt < 0.0 for load in said):
+        return 0.0, f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
+    off = np.array([load.cfd / load.bemt for load in said])
+    if name not in _KIND or not off.size or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
+        return math.inf, ""
+    wide = np.array([math.hypot(load.u_cfd / load.cfd if math.isfinite(load.u_cfd) else 0.0,
+                                load.u_bemt / load.bemt, 0.02) for load in said])  # fmt: skip
+    near = [(e.rarity + float(np.mean(far**2)), e) for e in unit_errors.errors(_KIND[name])
+            if unit_open and np.all((far := np.abs(np.log(off / e.factor)) / wide) < 1.0)]  # fmt: skip
     if not near:
-        return " First check unit, sector, zones and speed."
-    error = min(near, key=lambda item: item[0])[1]
+        return math.inf, f" First check {'unit, ' if unit_open else ''}sector, zones and speed."
+    score, error = min(near, key=lambda item: item[0])
     size = max(error.factor, error.repair)
-    return f" About a factor of {size:.4g}, as of {error.actual} taken for {error.stated}: check the unit."
+    return score, (f" {name.split('_')[0].capitalize()} is off by about a factor of {size:.4g}, as of {error.actual} "
+                   f"taken for {error.stated}: check the unit.")  # fmt: skip
 
 
-def _sentence(points: Sequence[PointOfRun], who: str) -> str:
+def _size(load: BothLoads, largest: float) -> str:
+    """A difference as a share: of the value, near zero of the largest one."""
+    if abs(load.cfd) >= _NEAR_ZERO * largest:
+        return load.percent
+    return f"{100.0 * load.difference / largest:+.0f} % of the largest"
+
+
+def open_units(imported: Dataset) -> frozenset[str]:
+    """Loads whose unit the file did not state; coefficients have none."""
+    about = imported.provenance
+    if is_run(imported):
+        return frozenset(k for k in _KIND if k.split("_")[0] in about.get("units_given", ()))
+    told = about.get("headings", {})
+    return frozenset(k for k in _KIND if k in imported.values and not re.search(r"[\[(].+[\])]", told.get(k, "")))
+
+
+def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str] = ()) -> str:
     every = [(k, load) for p in points for k, load in p.loads.items()]
     off = [(k, load) for k, load in every if load.verdict == "differs"]
     near = [(k, load) for k, load in every if load.verdict == "within 2 u"]
     lost = sum(load.verdict == "no result" for _, load in every)
     tail = f" No result for {number_of(lost, 'value')}." if lost else ""
+    top = {k: max(abs(load.cfd) for name, load in every if name == k) for k, _ in every}
+    agree = len(every) - len(off) - len(near) - lost
     if off:
         k, load = max(off, key=lambda x: x[1].times)
-        count = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        tail += "".join(dict.fromkeys(_slip(k, load) for k, load in off))
-        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {load.percent}, {load.times:.1f} times both bands together"
-        return f"{who} and BEMT differ{count}: {size}.{tail}"
+        slips = [_slip(name, [v for n, v in every if n == name], name in units_open) for name in {n: 0 for n, _ in off}]
+        said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
+        tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
+        share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
+        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {_size(load, top[k])}"
+        return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
     if near:
-        worst = dict(sorted(near, key=lambda item: item[1].times))  # of each load the farthest
-        sizes = " and ".join(f"{load.percent} in {_LOADS[k].split(' [')[0].lower()}" for k, load in worst.items())
-        return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
+        worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest
+        words = {k: (100.0 * load.difference / top[k], _LOADS[k].split(" [")[0].lower()) for k, load in worst.items()}
+        if len(every) == len(words):
+            sizes = " and ".join(f"{share:+.0f} % in {word}" for share, word in words.values())
+            return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
+        sizes = " and ".join(f"{share:+.0f} % of the largest {word}" for share, word in words.values())
+        rest = f"the others are within twice both bands, off by up to {sizes}"
+        return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{tail}"
     if lost == len(every):
         return f"No value of {who} and BEMT can be compared.{tail}"
     return f"{who} and BEMT agree within both bands.{tail}"
@@ -294,7 +326,7 @@ def text(found: RunComparison, details: bool = False) -> str:
     set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
     set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
-    lines = [found.sentence, "", f"{Path(found.run).name} ({', '.join(set_up) or bare}) and case {found.case}"]
+    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({', '.join(set_up) or bare}) and case {found.case}"]
     shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:

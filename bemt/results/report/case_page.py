@@ -226,14 +226,15 @@ def _validation(result: Result) -> Section:
     rows: list[Sequence[object]] = []
     for c in sorted(found, key=lambda c: list(MODELS).index(c.model) if c.model in MODELS else len(MODELS)):
         kind, word = stand(c)
-        rows.append([MODELS.get(c.model, c.model), c.reference, _quantity(c), num(c.S), num(c.D),
+        at = result.row_of(c) or result.first("bemt")
+        rows.append([MODELS.get(c.model, c.model), c.reference, num(at and at.rpm, 6), _quantity(c), num(c.S), num(c.D),
                      num(c.E_pct, signed=True), *(num(getattr(c, u), 2, none="unknown") for u in us),
                      Cell(word, badge=kind)])  # fmt: skip
     words = (
         "After ASME V&V 20: E = S − D, u_val² = u_num² + u_input² + u_model² + u_D². The two agree where |E| ≤ u_val. "
         "If u_D is not stated, the last column gives the smallest u_D for which they would agree, as a share of D."
     )
-    head = ["model", "against", "quantity", "S", "D", "E %", *us, "agreement"]
+    head = ["model", "against", "rev/min", "quantity", "S", "D", "E %", *us, "agreement"]
     return "Validation", [("words", words), ("table", table(head, rows))]
 
 

@@ -62,14 +62,41 @@ def _thrusts(result: Result) -> list[Comparison]:
     return [c for source in NAMES for c in lines if c.source == source]
 
 
+def beside(row: Row, other: Row) -> bool:
+    """Whether two values are of one speed of rotation and one airspeed."""
+    return not (abs(row.rpm - other.rpm) > 1e-6 * other.rpm or abs(row.airspeed_m_s - other.airspeed_m_s) > 1e-9)
+
+
+def lead(result: Result) -> Row | None:
+    """BEMT at the point that a front page shows: the case's own, else that of the first recorded thrust."""
+    own = result.first("bemt")
+    at = [row for c in _thrusts(result) if (row := result.row_of(c) or own)]
+    if own is None or not at or any(beside(row, own) for row in at):
+        return own
+    return next((row for row in result.of("bemt") if beside(row, at[0])), own)
+
+
+def _at(row: Row | None) -> str:
+    """The speeds of a value: " at 6000 rev/min, 5 m/s"."""
+    if row is None or not _finite(row.rpm):
+        return ""
+    return f" at {row.rpm:.6g} rev/min" + (f", {row.airspeed_m_s:.4g} m/s" if row.airspeed_m_s > 0.0 else "")
+
+
+def _elsewhere(result: Result, c: Comparison, at: Row) -> str:
+    """The speeds of a comparison that is not at a point; nothing of one that is."""
+    row = result.row_of(c)
+    return "" if row is None or beside(row, at) else _at(row)
+
+
 def _solved(result: Result) -> Row | tuple[str, str, str]:
-    """BEMT at the operating point of the case, or the verdict where there is none."""
+    """BEMT at the point that is shown, or the verdict where there is none."""
     if not result.rows:
         n = len(result.faults)
         return "fault", "not solved", f"{n} fault{'s' * (n != 1)} in the input; nothing was computed."
-    own = result.first("bemt")
+    own = lead(result)
     if own is None or not _finite(own.thrust_N):
-        return "fault", "no result", "BEMT did not converge at the operating point of the case."
+        return "fault", "no result", f"BEMT did not converge{_at(own) or ' at the operating point of the case'}."
     return own
 
 
@@ -82,13 +109,13 @@ def verdict(result: Result) -> tuple[str, str, str]:
     row = _solved(result)
     if isinstance(row, tuple):
         return row
-    words = f"BEMT gives {_n(row.thrust_N, 4)} N"
+    words = f"BEMT gives {_n(row.thrust_N, 4)} N{_at(row)}"
     if _finite(row.u):
-        words += f" ± {_n(row.u, 2)} N (one standard uncertainty: inputs that the source does not state, and the model)"
+        words += f", ± {_n(row.u, 2)} N (one standard uncertainty: what the source leaves open, and the model)"
     lines = _thrusts(result)
     if not lines:
         return "unknown", NOTHING_RECORDED, f"{words}. There is no recorded thrust to compare it with."
-    parts = [f"{c.reference} {c.E_pct:+.1f} %" if c.D else c.reference for c in lines]
+    parts = [f"{c.reference}{_elsewhere(result, c, row)}{f' {c.E_pct:+.1f} %' if c.D else ''}" for c in lines]
     told = [f"{words}. Difference from {'; '.join(parts)}."]
     far = [c for c in lines if c.state == "differs"]
     if far:
@@ -99,7 +126,9 @@ def verdict(result: Result) -> tuple[str, str, str]:
         told.append(f"Not distinguishable from noise against {', '.join(near)}: |E| is within u_val.")
     told += _open(lines)
     told += [f"Flagged: {flag}." for flag in row.flags]
-    main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *lines]))
+    told += _no_check(result)
+    here = [c for c in lines if not _elsewhere(result, c, row)]
+    main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *here, *lines]))
     return (*stand(main), " ".join(told))
 
 
@@ -128,29 +157,35 @@ def answer(result: Result) -> str:
     >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
     >>> audit = Audit("cfd", (), math.nan, 0.041)
     >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))
-    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; our audit of the recording finds an error of 4 % or more, without that of the grid, which is unknown.'
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; by our audit the recording itself is off by 4 % or more (that of its grid is not known).'
     """  # noqa: E501
     own = _solved(result)
     if isinstance(own, tuple):
         return own[2]
     band = f" ± {_n(own.u, 2)}" if _finite(own.u) else ""
-    head = f"BEMT {_n(own.thrust_N, 4)}{band} N"
-    lines = _thrusts(result)
+    lines = sorted(_thrusts(result), key=lambda c: bool(_elsewhere(result, c, own)))
     if not lines:
         power = f", {_n(own.power_W)} W at the shaft" if _finite(own.power_W) else ""
-        return f"{head}{power}; nothing is recorded to compare it with."
+        return f"BEMT {_n(own.thrust_N, 4)}{band} N{power}{_at(own)}; nothing is recorded to compare it with."
     c = lines[0]
     name = NAMES[c.source]
     share = f" (BEMT {c.E_pct:+.1f} %)" if c.D else ""
-    told = [f"{head}, {name} {_n(c.D, 4)} N{share}: {_hangs(c, name)}{_audited(result, c)}."]
+    band = f" ± {_n(c.known, 2)}" if _finite(c.known) else ""
+    head = f"BEMT {_n(c.S, 4)}{band} N, {name} {_n(c.D, 4)} N{share}{_at(result.row_of(c) or own)}"
+    told = [f"{head}: {_hangs(c, name)}{_audited(result, c)}."]
     seen = {(c.source, _n(c.D, 3))}
     rest: dict[str, list[str]] = {}
     for c in lines[1:]:
         if (key := (c.source, _n(c.D, 3))) not in seen:
             seen.add(key)
-            rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N")
+            rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N{_elsewhere(result, c, own)}")
     told += [f"{', '.join(names)}: {words}." for words, names in rest.items()]
+    told += _no_check(result)
     return " ".join(t[:1].upper() + t[1:] for t in told)
+
+
+def _no_check(result: Result) -> list[str]:
+    return [f"{words[:1].upper()}{words[1:]}." for words in result.no_check or ()]
 
 
 def _hangs(c: Comparison, name: str) -> str:
@@ -171,8 +206,8 @@ def _audited(result: Result, c: Comparison) -> str:
         return ""
     lines = audit.lines if audit else ()
     grid = next((line.u_relative for line in lines if line.topic == "grid study"), math.nan)
-    rest = f"{100.0 * grid:.1g} % of the grid" if _finite(grid) else "without that of the grid, which is unknown"
-    return f"; our audit of the recording finds an error of {100.0 * share:.1g} % or more, {rest}"
+    rest = f"the grid alone makes {100.0 * grid:.1g} %" if _finite(grid) else "that of its grid is not known"
+    return f"; by our audit the recording itself is off by {100.0 * share:.1g} % or more ({rest})"
 
 
 def headline(result: Result) -> str:

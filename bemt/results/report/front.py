@@ -10,7 +10,15 @@ from typing import Any
 from bemt.base.page import Cell, num, table
 from bemt.base.tables import number_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
-from bemt.results.report.diagnosis_block import answer, diagnosis_verdict, headline, page_verdict, verdict
+from bemt.results.report.diagnosis_block import (
+    answer,
+    beside,
+    diagnosis_verdict,
+    headline,
+    lead,
+    page_verdict,
+    verdict,
+)
 from bemt.results.report.plot import Mark, Plot, figure, points
 
 SOURCES = {
@@ -33,7 +41,10 @@ NEEDS = {
     "they agree however uncertain the recording is.",
 }
 """Explanations of badges, by how their words begin."""
-OF_TABLE = "Thrust at the operating point of each case; first value of each source. Click a heading to sort."
+OF_TABLE = (
+    "Thrust at one point of each case: its own operating point, or where the first recording is if there is none at "
+    "that; first value of each source. Click a heading to sort."
+)
 
 
 def answers(book: Book, ids: Sequence[str]) -> list[ShownAnswer]:
@@ -48,14 +59,13 @@ def answers(book: Book, ids: Sequence[str]) -> list[ShownAnswer]:
 
 
 def _values(page: CasePage) -> dict[str, list[tuple[str, float, float]]]:
-    """Thrusts by source: (label, thrust, standard uncertainty)."""
+    """Thrusts at the point that is shown, by source: (label, thrust, standard uncertainty)."""
     out: dict[str, list[tuple[str, float, float]]] = {}
+    at, own = lead(page.result), page.result.first("bemt")
     for row in page.result.rows:
-        own = page.result.at
-        here = abs(row.rpm - own.rpm) <= 1e-6 * own.rpm and row.airspeed_m_s == own.airspeed_m_s
-        if math.isfinite(row.thrust_N) and here:
+        if math.isfinite(row.thrust_N) and at and beside(row, at):
             out.setdefault(row.source, []).append((row.label, row.thrust_N, row.u))
-    for source, label, T, u in page.own_points:
+    for source, label, T, u in page.own_points if at is own else ():
         out.setdefault(source, []).append((label, T, u))
     return out
 
@@ -78,8 +88,8 @@ def _comparison_plot(book: Book) -> dict[str, Any] | None:
                        [Mark(1.0, "recorded")], NOTE, names, wide=True, x_limits=SHOWN))  # fmt: skip
 
 
-COLUMNS = ("case", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m]", "K1/K2 [N]", "CFD [N]", "own CFD [N]",
-           "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
+COLUMNS = ("case", "rev/min", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m]", "K1/K2 [N]", "CFD [N]",
+           "own CFD [N]", "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
 
 
 def _comparison_table(book: Book, ids: Sequence[str]) -> dict[str, Any] | None:
@@ -87,16 +97,16 @@ def _comparison_table(book: Book, ids: Sequence[str]) -> dict[str, Any] | None:
     for page, key in zip(book.cases, ids, strict=True):
         kind, word, _ = page_verdict(page)
         v = {source: items[0][1:] for source, items in _values(page).items()}
-        own = page.result.first("bemt")
+        own = lead(page.result)
         T, simple, cfd = (v.get(source, (None,))[0] for source in ("bemt", "k1k2", "cfd"))
         off = [100 * (x / cfd - 1) if x is not None and cfd else None for x in (T, simple)]
         rows.append([
-            Cell(page.result.name, link=key), num(own and own.M_tip, 3), num(T), num(v.get("bemt", (0, None))[1], 2),
-            num(own and own.torque_Nm), num(simple), num(cfd),
+            Cell(page.result.name, link=key), num(own and own.rpm, 6), num(own and own.M_tip, 3), num(T),
+            num(v.get("bemt", (0, None))[1], 2), num(own and own.torque_Nm), num(simple), num(cfd),
             *(num(v.get(source, (None,))[0]) for source in ("openfoam", "bench", "vendor")),
             *(num(x, signed=True) for x in off), Cell(word, badge=kind),
         ])  # fmt: skip
-    used = [k for k in range(len(COLUMNS)) if k < 3 or any(not r[k].number or r[k].value is not None for r in rows)]
+    used = [k for k in range(len(COLUMNS)) if k < 4 or any(not r[k].number or r[k].value is not None for r in rows)]
     return table([COLUMNS[k] for k in used], [[r[k] for k in used] for r in rows])
 
 
@@ -138,13 +148,14 @@ def summary(book: Book) -> str:
         "",
     ]
     out += [
-        "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | verdict |",
-        "|---|---|---|---|---|---|---|---|",
+        "| case | BEMT T [N] | u [N] | K1/K2 T [N] | CFD T [N] | bench T [N] | vendor T [N] | rev/min | verdict |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for page in book.cases:
         r = page.result
-        own, *others = (r.first(s) for s in ("bemt", "k1k2", "cfd", "bench", "vendor"))
-        cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *(_n(row and row.thrust_N) for row in others)]
+        own, v = lead(r), {source: items[0][1] for source, items in _values(page).items()}
+        others = [_n(v.get(source)) for source in ("k1k2", "cfd", "bench", "vendor")]
+        cells = [_n(own and own.thrust_N), _n(own and own.u, 2), *others, _n(own and own.rpm, 6)]
         words = [plain_markdown(r.name, 80), *cells, plain_markdown(page_verdict(page)[1])]
         out.append(f"| {' | '.join(words)} |")
     for page in book.cases:

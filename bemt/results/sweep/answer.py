@@ -59,6 +59,7 @@ def summary(results: Sequence[Result], files: Sequence[Path] = (), cut: bool = T
     end = ["", *_next(bool(found))] if solved else []
     for words in (_drives(solved), _worst(found), _ducts(solved), _unknowns(solved), _grids(solved, cut)):
         lines += ["", *words] if words else []
+    lines += ["", *checks] if (checks := _no_checks(solved)) else []
     flags = _flags(solved, SCREEN - len(lines) - len(end) - 1)
     return "\n".join([*lines, *(["", *flags] if flags else []), *end])
 
@@ -180,6 +181,16 @@ def _unknowns(solved: Sequence[Result]) -> list[str]:
                 told.pop()
             lines.append(f"  {_name(result.name):<17} {', '.join(told)}")
     return ["Unknowns that widen BEMT most (their part of u in thrust):", *lines] if lines else []
+
+
+def _no_checks(solved: Sequence[Result]) -> list[str]:
+    """Cases whose rotor was fitted to readings."""
+    told: dict[str, list[str]] = {}
+    for result in solved:
+        for words in (result.no_check or ()) if result.comparisons else ():
+            told.setdefault(words, []).append(result.name)
+    return [line for words, names in [*told.items()][:3]
+            for line in textwrap.wrap(f"! {_some(names)}: {words}", WIDTH, subsequent_indent="  ")]  # fmt: skip
 
 
 def _flags(solved: Sequence[Result], room: int) -> list[str]:

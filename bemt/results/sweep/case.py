@@ -188,6 +188,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         drive=None if drive is None else FullThrottle.from_document(drive),
         fan=None if case.paired or not case.ducted else _fan(case, cast("Model", ready), nominal),
         pair=_pair(case, nominal) if case.paired else None,
+        no_check=case.as_built().no_check or None,
         notes=(*([case.file.notes.strip()] if case.file.notes else []), *ready.notes,
                *plugins.missing_for(case)),
     )  # fmt: skip

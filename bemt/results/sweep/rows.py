@@ -305,6 +305,7 @@ class Result(Documented):
     drive: FullThrottle | None = None
     fan: Fan | None = None
     pair: PairResult | None = None
+    no_check: tuple[str, ...] | None = None  # Readings to which the rotor was fitted; None where there are none
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     grid: GridResult | None = None
@@ -336,6 +337,13 @@ class Result(Documented):
     def first(self, source: str) -> Row | None:
         """First row of a source, None where there is none."""
         return next(iter(self.of(source)), None)
+
+    def row_of(self, c: Comparison) -> Row | None:
+        """Recorded row of a comparison; None of one that a report added."""
+        rows = [row for row in self.all_rows if (row.label, row.source) == (c.reference, c.source)]
+        key = c.quantity if c.quantity in ("CT", "CP") else "bemt_error_pct"  # a label may stand at several points
+        value = c.D if key == c.quantity else c.E_pct
+        return min(rows, key=lambda row: abs((getattr(row, key) or math.nan) - value), default=None)
 
     def audit_of(self, reference: str) -> Audit | None:
         """Audit of one recorded value."""

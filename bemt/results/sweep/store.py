@@ -215,7 +215,7 @@ def case_text(result: Result) -> str:
         parts = ", ".join(f"{k} {_n(getattr(bemt, k), 3)} N" for k in ("u_input", "u_model", "u_num"))
         lines += [f"  together: {parts}; varied one at a time, thrust is {_n(low)} to {_n(high)} N"]
     lines += _grid_lines(result.grid)
-    lines += [_wrap(note, "  ", "note: ") for note in result.notes]
+    lines += [_wrap(note, "  ", "note: ") for note in (*(result.no_check or ()), *result.notes)]
     return "\n".join(lines)
 
 

@@ -42,6 +42,13 @@ class CaseAsBuilt:
     drawn: Array  # (K,) latent numbers with which the case is solved: zero, or what the case states [units of `NAMES`]
     reference: ReferenceRun | None = None  # The run's rows
     doubt: str = ""  # Why the readings may not be this rotor's
+    fitted_to: str = ""  # Readings that moved the rotor, as in "fitted to X"; empty where none did
+
+    @property
+    def no_check(self) -> tuple[str, ...]:
+        """What a comparison with those readings is not; nothing where the rotor is as it is drawn."""
+        return (f"the rotor was fitted to {self.fitted_to}: agreement with that is no independent check",
+                ) if self.fitted_to else ()  # fmt: skip
 
 
 def _stated(table: AsBuiltTable) -> Array:
@@ -99,8 +106,9 @@ def _learned(stated: AsBuiltTable, folder: Path) -> CaseAsBuilt | None:
         return _posterior(folder / stated.file)
     if stated.measured is None:
         return None
-    prior, reference = records()[stated.measured].as_built()
-    return CaseAsBuilt(prior, prior.mean, reference)
+    one = records()[stated.measured]
+    prior, reference = one.as_built()
+    return CaseAsBuilt(prior, prior.mean, reference, fitted_to=f"its measurement in the {one.source}")
 
 
 def _posterior(path: Path) -> CaseAsBuilt:
@@ -110,10 +118,12 @@ def _posterior(path: Path) -> CaseAsBuilt:
             raise ValueError(f"schema {document['schema']!r} of {document['latents']}")
         mean, cov, sizes, weights = (np.array(document[k], float) for k in ("mean", "cov", "sizes", "weights"))
         reference = ReferenceRun.of(document["reference"])
+        names = document.get("provenance", {}).get("reference", [])
     except (KeyError, ValueError, TypeError) as error:
         expected = f"a file of {_SCHEMA} with the latent numbers {', '.join(NAMES)}"
         raise InputError(Fault(path.as_posix(), "", str(error), expected, "calibrate-rotor writes it")) from error
-    return CaseAsBuilt(Prior(mean, cov, sizes, weights, "reference"), mean, reference)
+    told = ", ".join(map(str, names)) or "a run of its own"
+    return CaseAsBuilt(Prior(mean, cov, sizes, weights, "reference"), mean, reference, fitted_to=told)
 
 
 def posterior_document(prior: Prior, reference: ReferenceRun, provenance: dict[str, object]) -> dict[str, object]:

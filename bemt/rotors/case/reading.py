@@ -176,7 +176,8 @@ def conditioned(case: Case, text: str) -> CaseAsBuilt:
     known_as = replace(found.posterior, known_from="reference")
     off = f"{found.far:.2g} standard deviations off what is known of this rotor: {found.told} what the case gives"
     doubt = f"reading {text!r}: {off}. Unit, speed or label?" if found.far > FAR else ""
-    return CaseAsBuilt(known_as, found.posterior.mean, found.reference, doubt)
+    told = " and ".join([f"its reading {text}", *([f"its measurement in the {known.source}"] if known else [])])
+    return CaseAsBuilt(known_as, found.posterior.mean, found.reference, doubt, told)
 
 
 def _source_before(case: Case) -> str | None:

@@ -17,6 +17,7 @@ from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.base.given import find_data
 from bemt.base.tables import json_text, write_atomic
+from bemt.rotors.measured import records
 from bemt.rotors.population import population
 from bemt.rotors.validate.points import (
     J_SHARE,
@@ -188,6 +189,10 @@ def text(doc: Validation) -> str:
     totals += [(f"turned to measured J0, {turned.propellers}", turned)] if turned and turned.propellers else []
     lines += ["-" * len(sub), *(f"{name:38}{_percents(found)}" for name, found in totals)]
     lines += ["", *_coverage_lines(doc)] if drawn else []
+    mine = [r.name for r in doc.propellers if r.name in records()]
+    if drawn and mine:
+        some = f"All {len(mine)}" if len(mine) == len(doc.propellers) else f"{len(mine)} of {len(doc.propellers)}"
+        lines.append(f"  {some} are among the propellers that this population was fitted to: no independent check.")
     lines += [
         "",
         f"Errors of BEMT in percent of the measured value. Static: {doc.static.points} points of "

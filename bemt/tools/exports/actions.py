@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bemt.base.action import action
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from bemt.rotors.propeller import Propeller
     from bemt.tools.exports.folder import Exported
@@ -34,6 +34,7 @@ def export(
     sector: Literal["half", "blade", "full"] | None = None,
     turbulence: Literal["kOmegaSST", "realizableKE"] | None = None,
     solver: Literal["compressible", "incompressible"] | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> Exported:  # fmt: skip
     """Write a case for CAD, CFD, simulators and design tools.
 
@@ -92,6 +93,8 @@ def export(
         Openfoam: turbulence model; kOmegaSST by default.
     solver : {"compressible", "incompressible"}, optional
         Openfoam: rhoSimpleFoam (by default above a tip Mach number of 0.5) or simpleFoam.
+    progress : callable, optional
+        Called with one line per target while it is written.
 
     Returns
     -------
@@ -142,7 +145,7 @@ def export(
         made, refused = export_cases(
             os.fspath(case) if named else rotor_of(case).case, folder, wanted or ["stl"], unit,  # type: ignore[arg-type]
             0.0 if printable else fillet_mm or 0.0, 0.0 if printable else min_thickness_mm or 0.0, given,
-            tuple(dict.fromkeys(hold)), request if printable else None,
+            tuple(dict.fromkeys(hold)), request if printable else None, progress,
         )  # fmt: skip
     except OSError as error:
         raise InputError(system_fault(error)) from error

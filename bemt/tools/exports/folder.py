@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,7 +78,7 @@ class PartlyRefused(InputError):
         self.manifest = manifest
 
 
-def export_case(job: Job, out: Path, formats: Sequence[str]) -> Manifest:
+def export_case(job: Job, out: Path, formats: Sequence[str], progress: Callable[[str], None] | None = None) -> Manifest:
     """Write one case for one or more targets; each is whole or not there.
 
     Formats of an earlier export of the same case stay, in the folder and in its manifest: the answer has those in
@@ -92,6 +92,8 @@ def export_case(job: Job, out: Path, formats: Sequence[str]) -> Manifest:
     manifest: Manifest = {}
     faults: list[Fault] = []
     for target in sorted((exports()[word] for word in dict.fromkeys(formats)), key=lambda target: target.turn):
+        if progress is not None:  # a solid of CAD takes up to a minute
+            progress(f"{case.name}: writing {target.id}")
         with gathered(faults):
             manifest = joined(manifest, target.put(job, out))
     if manifest:
@@ -206,7 +208,7 @@ def _remove(out: Path, files: Mapping[str, str]) -> None:
 def export_cases(
     path: str | Case, out: str, formats: Sequence[str], unit: str = "mm", fillet_mm: float = 0.0,
     min_thickness_mm: float = 0.0, given: Mapping[str, Any] | None = None, hold: tuple[str, ...] = (),
-    printed: Print | None = None,
+    printed: Print | None = None, progress: Callable[[str], None] | None = None,
 ) -> tuple[list[tuple[Manifest, Path]], list[InputError]]:  # fmt: skip
     """Write a case for its targets, or all cases of a folder, each into a folder of its own.
 
@@ -245,7 +247,7 @@ def export_cases(
         folder = Path(out) / case.name if len(paths) > 1 else Path(out)
         try:
             job = Job(case, rpm, airspeed, hold, unit, solid, printed, asked)
-            made.append((export_case(job, folder, formats), folder))
+            made.append((export_case(job, folder, formats, progress), folder))
         except PartlyRefused as error:
             made.append((error.manifest, folder))
             refused.append(error)
