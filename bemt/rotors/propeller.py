@@ -500,8 +500,6 @@ def propeller(
     name: object = label
     if name is not None and not isinstance(name, str):
         faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
-    elif name is not None and _is_path(name):
-        faults.append(Fault("", "label", repr(label), "a label, as in 10x5", f"bemt.load({label!r}) reads a case"))
     if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
         faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
     if stations is not None:
@@ -570,9 +568,13 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
         expected = "a Propeller, a case or a label"
         raise InputError(Fault("", "case", f"{type(given).__name__} {given!r:.40}", expected))
     text = os.fspath(given)
-    return load(text) if Path(text).exists() or _is_path(text) else propeller(text)
+    if Path(text).exists() or fresh.is_path(text):
+        return load(text)
+    try:
+        return propeller(text)
+    except InputError:
+        if fresh.looks_like_label(text):
+            raise
+        got, expected = "no folder or case of this name, and no label", "a case, its folder, or a label such as 10x5"
+        raise InputError(Fault(text, "", got, expected)) from None
 
-
-def _is_path(text: str) -> bool:
-    """Whether a word can only be a path: ``cases/prop_8x5`` is no label of an 8x5."""
-    return text.endswith(".toml") or "/" in text or os.sep in text

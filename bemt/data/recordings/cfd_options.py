@@ -21,7 +21,7 @@ from bemt.data.readers.headings import heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
-from bemt.data.readers.unit_text import unit_for
+from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_loads import DUCT
 
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
@@ -256,8 +256,10 @@ def write_recording(
             faults.append(Fault("", "--unit", name, f"one of {some(map(repr, known), 12)}, or a quantity"))
         elif quantity is None or (told := _unit(quantity, text)) is None:
             wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
-            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d)) or "a unit that bemt knows"
-            faults.append(Fault("", "--unit", f"{name}={text}", choice))
+            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d))
+            every = "; ".join(f"{q} {', '.join(units.suffixes(d))}" for q, d in list(CHANNELS.items())[:8])
+            hint = TWO_MEANINGS.get(text, "").capitalize()
+            faults.append(Fault("", "--unit", f"{name}={text}", choice or f"a unit of a quantity: {every}", hint))
         else:
             columns.setdefault(quantity, {})["unit"] = told
             if name in known:
