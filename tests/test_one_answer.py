@@ -59,6 +59,7 @@ def test_a_word_that_is_no_rotor_says_what_it_is_not(word: str, said: str) -> No
 
 
 def test_a_path_is_no_label_at_the_doors_of_labels(tmp_path: Path) -> None:
-    for door in (lambda: bemt.estimate("nowhere/prop_8x5", 6000), lambda: bemt.new("nowhere/prop_8x5", out=tmp_path / "a")):
+    word = "nowhere/prop_8x5"
+    for door in (lambda: bemt.estimate(word, 6000), lambda: bemt.new(word, out=tmp_path / "a")):
         with pytest.raises(InputError, match="path is a case"):
             door()
