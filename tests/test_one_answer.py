@@ -10,8 +10,9 @@ from diagnosing import case, points, recording
 
 import bemt
 from bemt.app.cli import main
-from bemt.base.errors import EXIT_OK
+from bemt.base.errors import EXIT_OK, InputError
 from bemt.physics.dataset import Dataset
+from bemt.rotors.propeller import rotor_of
 
 CASE = str(Path(__file__).resolve().parent.parent / "cases" / "prop_8x5")
 CHANGES: list[tuple[float, float]] = [(1.0, 1.0), (1.08, 1.0), (1.1, 1.1), (0.93, 0.97), (1.0, 0.85)]
@@ -45,3 +46,20 @@ def test_diagnose_compare_and_the_library_agree(
     assert said[0][:2] == (answer.verdict, answer.effects)
     if change == (1.0, 1.0):
         assert said[0][0] == "none"
+
+
+@pytest.mark.parametrize(("word", "said"), [
+    ("nowhere/prop_8x5", "no such file or folder"), ("10x5.toml", "no such file or folder"),
+    ("nix", "no folder or case of this name, and no label"), ("10x5ZZ", "label"),
+])  # fmt: skip
+def test_a_word_that_is_no_rotor_says_what_it_is_not(word: str, said: str) -> None:
+    """A path is never a label."""
+    with pytest.raises(InputError, match=said):
+        rotor_of(word)
+
+
+def test_a_path_is_no_label_at_the_doors_of_labels(tmp_path: Path) -> None:
+    word = "nowhere/prop_8x5"
+    for door in (lambda: bemt.estimate(word, 6000), lambda: bemt.new(word, out=tmp_path / "a")):
+        with pytest.raises(InputError, match="path is a case"):
+            door()

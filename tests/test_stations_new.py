@@ -11,6 +11,7 @@ from bemt.base.errors import InputError
 from bemt.rotors.case import load_case
 from bemt.rotors.case.new_folder import Wanted, write
 from bemt.rotors.case.propagate import propagate
+from bemt.rotors.propeller import propeller
 
 R = 0.127
 X = np.array([0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0])
@@ -144,3 +145,12 @@ def test_numbers_without_headings_ask_for_headings(tmp_path: Path) -> None:
     (tmp_path / "blade.csv").write_text(table("").lstrip())
     with pytest.raises(InputError, match="headings"):
         write(Wanted("mine", str(tmp_path / "blade.csv"), diameter_mm=254.0), str(tmp_path / "mine"))
+
+
+def test_a_diameter_is_given_in_the_same_words_at_both_doors(tmp_path: Path) -> None:
+    (tmp_path / "blade.csv").write_text(DIALECTS["shares"])  # type: ignore[arg-type]
+    made = [propeller(stations=tmp_path / "blade.csv", **{k: v}) for k, v in
+            (("diameter_in", 10.0), ("diameter_mm", 254.0), ("diameter_m", 0.254))]  # fmt: skip
+    assert [p.diameter_m for p in made] == pytest.approx([0.254] * 3)
+    with pytest.raises(InputError, match="one of them"):
+        propeller(stations=tmp_path / "blade.csv", diameter_in=10.0, diameter_m=0.254)

@@ -36,6 +36,15 @@ def number_text(value: float | None, digits: int = 4, none: str = "-") -> str:
     return f"{rounded:.{max(digits - 1 - magnitude, 0)}f}"
 
 
+def speed_text(rpm: float | None) -> str:
+    """Show a speed of rotation: six digits at most, no zeros behind the point.
+
+    >>> speed_text(6000.0), speed_text(24000.5), speed_text(math.nan)
+    ('6000', '24000.5', '-')
+    """
+    return "-" if rpm is None or math.isnan(rpm) else f"{rpm:.6g}"
+
+
 def number_of(count: SupportsInt, noun: str) -> str:
     """Count things in words, singular for one.
 

@@ -16,6 +16,7 @@ from bemt.base.action import in_words_of_the_library, table_html, worded
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.given import number, numbers, path_text
 from bemt.base.tables import number_of
+from bemt.base.units import INCH
 from bemt.physics.bem.coaxial import LOADS, RATIOS
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, find_cases, fresh, load_case
@@ -452,7 +453,8 @@ class Propeller:
 @worded
 def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
-    blades: int | None = None, rpm: float | None = None, airspeed_m_s: float = 0.0,
+    diameter_in: float | None = None, diameter_mm: float | None = None, blades: int | None = None,
+    rpm: float | None = None, airspeed_m_s: float = 0.0,
 ) -> Propeller:  # fmt: skip
     """Create a propeller from a label or from a file of blade stations.
 
@@ -463,8 +465,8 @@ def propeller(
     stations : str or path, optional
         Instead of the label: a CSV with ``r_over_R,chord_over_R,beta_deg`` (r and chord may be lengths, such as
         ``r_mm``), a UIUC geometry file or an APC PE0 file.
-    diameter_m : float, optional
-        Diameter, required with `stations`. [m]
+    diameter_m, diameter_in, diameter_mm : float, optional
+        Diameter, one of them with `stations`. [m, in, mm]
     blades : int, optional
         Number of blades; by default from the label, else 2.
     rpm : float, optional
@@ -495,31 +497,35 @@ def propeller(
     if (label is None) == (stations is None):
         got = "neither" if label is None else "both"
         faults.append(Fault("", "label, stations", got, "one of them", 'As in propeller("10x5")'))
-    if stations is not None and diameter_m is None:
-        faults.append(Fault("", "diameter_m", "nothing", "the diameter [m], with stations"))
+    sizes = {"diameter_m": (diameter_m, 1.0), "diameter_in": (diameter_in, INCH), "diameter_mm": (diameter_mm, 1e-3)}
+    told = {key: (number(key, v), unit) for key, (v, unit) in sizes.items() if v is not None}
+    if stations is not None and not told:
+        faults.append(Fault("", "diameter_in, diameter_mm", "nothing", "the diameter, with stations"))
+    if len(told) > 1:
+        faults.append(Fault("", ", ".join(told), "together", "one of them"))
     name: object = label
     if name is not None and not isinstance(name, str):
         faults.append(Fault("", "label", repr(label), "a text: diameter x pitch in inches", 'As in propeller("10x5")'))
-    elif name is not None and _is_path(name):
-        faults.append(Fault("", "label", repr(label), "a label, as in 10x5", f"bemt.load({label!r}) reads a case"))
     if blades is not None and not (isinstance(blades, (int, np.integer)) and blades >= 1):
         faults.append(Fault("", "blades", repr(blades), "a whole number of 1 or more"))
     if stations is not None:
         stations = path_text("stations", stations)
     rpm = None if rpm is None else number("rpm", rpm)
     airspeed_m_s = number("airspeed_m_s", airspeed_m_s)
-    diameter_m = None if diameter_m is None else number("diameter_m", diameter_m)
-    if diameter_m is not None and not 0.01 <= diameter_m <= 10.0:
-        hint = "Is that in mm? Divide by 1000" if 10.0 < diameter_m <= 1e4 else ""
-        faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "0.01 to 10 m", hint))
-    if label is not None and diameter_m is not None:
-        faults.append(Fault("", "diameter_m", f"{diameter_m:g}", "nothing, because the label states it"))
+    for key, (value, unit) in told.items():
+        if not 0.01 <= value * unit <= 10.0:
+            hint = "Is that in mm? Divide by 1000" if unit == 1.0 and 10.0 < value <= 1e4 else ""
+            ends = f"{0.01 / unit:.4g} to {10.0 / unit:.4g} {key.partition('_')[2]}"
+            faults.append(Fault("", key, f"{value:g}", ends, hint))
+        if label is not None:
+            faults.append(Fault("", key, f"{value:g}", "nothing, because the label states it"))
     refuse(faults)
     if label is not None:
         text = fresh.label_text(label, blades, rpm, airspeed_m_s)
         return Propeller(case_of(text), text)
-    assert stations is not None and diameter_m is not None
-    file = Path(stations)
+    assert stations is not None
+    ((value, unit),) = told.values()
+    diameter_m, file = value * unit, Path(stations)
     hub, key, found = fresh.of_stations(file, diameter_m)
     text = fresh.stations_text(file.name, diameter_m, blades or 2, rpm, airspeed_m_s, hub, key, found=found)
     return Propeller(case_of(text, file.parent), text)
@@ -570,9 +576,13 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
         expected = "a Propeller, a case or a label"
         raise InputError(Fault("", "case", f"{type(given).__name__} {given!r:.40}", expected))
     text = os.fspath(given)
-    return load(text) if Path(text).exists() or _is_path(text) else propeller(text)
+    if Path(text).exists() or fresh.is_path(text):
+        return load(text)
+    try:
+        return propeller(text)
+    except InputError:
+        if fresh.looks_like_label(text):
+            raise
+        got, expected = "no folder or case of this name, and no label", "a case, its folder, or a label such as 10x5"
+        raise InputError(Fault(text, "", got, expected)) from None
 
-
-def _is_path(text: str) -> bool:
-    """Whether a word can only be a path: ``cases/prop_8x5`` is no label of an 8x5."""
-    return text.endswith(".toml") or "/" in text or os.sep in text

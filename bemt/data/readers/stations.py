@@ -168,10 +168,8 @@ def read_stations(path: Path, R: float) -> Stations:
         thick = thick / c
     if thick is not None and not (THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]):
         heading, reach = by_name["thickness"][0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
-        left = [
-            *left,
-            f"column {heading!r} not used: {reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm",
-        ]
+        why = f"{reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm"
+        left = [*left, f"column {heading!r} not used: {why}"]
         thick = None
     used = {p.at for p in places} | {c.at for c in by_name["thickness"]}
     left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]

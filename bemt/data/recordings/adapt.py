@@ -106,7 +106,10 @@ def points_text(reduced: Dataset | str) -> list[str]:
     names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
     columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
     for name in names:
-        columns[name] = [tables.number_text(_finite(x), 5) for x in values[name][:MOST]]
+        columns[name] = [
+            tables.speed_text(float(f"{x:.5g}")) if name == "rpm" else tables.number_text(_finite(x), 5)
+            for x in values[name][:MOST]
+        ]
         if np.isfinite(u := reduced.u.get(name, none)).any():
             columns[f"u({name})"] = [tables.number_text(_finite(x), 2) for x in u[:MOST]]
     columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]

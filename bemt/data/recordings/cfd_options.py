@@ -22,7 +22,7 @@ from bemt.data.readers.headings import heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
 from bemt.data.readers.split import decimal_mark, some, split_table
-from bemt.data.readers.unit_text import unit_for
+from bemt.data.readers.unit_text import TWO_MEANINGS, unit_for
 from bemt.data.recordings.cfd_loads import DUCT
 
 Facts = dict[str, str | int]
@@ -276,8 +276,10 @@ class _Measured:
         told = None if quantity is None else _unit(quantity, text)
         if quantity is None or told is None:
             wanted = [d for q in (meanings(name) or [name]) if (d := CHANNELS.get(q))]
-            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d)) or "a unit that bemt knows"
-            return Fault("", "--unit", f"{name}={text}", choice)
+            choice = ", ".join(u for d in dict.fromkeys(wanted) for u in units.suffixes(d))
+            every = "; ".join(f"{q} {', '.join(units.suffixes(d))}" for q, d in list(CHANNELS.items())[:8])
+            hint = TWO_MEANINGS.get(text, "").capitalize()
+            return Fault("", "--unit", f"{name}={text}", choice or f"a unit of a quantity: {every}", hint)
         facts: Facts = {"unit": told}
         return quantity, facts | ({"column": name} if name in self.known else {})
 

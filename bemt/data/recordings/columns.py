@@ -280,9 +280,7 @@ def air_units(facts: Facts) -> Iterator[Finding]:
             continue
         fits = [e.words for e in unit_errors.errors(kind) if low <= value * e.repair + e.offset <= high]
         text = f"median {value:.5g} is outside {low:g} to {high:g}"
-        fatal = (
-            "error" if kind in ("pressure", "temperature") else "warning"
-        )  # no air is so, its density would be false
+        fatal = "error" if kind in ("pressure", "temperature") else "warning"  # no air is so: its density is false
         yield Finding("air_unit", facts.named(name), text, "; or ".join(fits) or "check the sensor", (), fatal)
 
 

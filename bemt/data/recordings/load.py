@@ -331,11 +331,10 @@ class ImportedFile:
         """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
         if self.record is None:
             return ""
-        told = {
-            f: f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}"
-            for f in self.findings
-        }
-        errors = [text for f, text in told.items() if f.severity == "error"]
+        told = [
+            f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+        ]
+        errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
         lines, rows, plain = [self.title, *errors], [], []
         for name in self.record.values:
             unit, found = self.record.unit(name), self.means.get(name)
@@ -353,7 +352,7 @@ class ImportedFile:
             lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
         lines += points_text(self.reduced) if self.reduced is not None else []
         lines += [f"  ! {text}" for text in self.warnings]
-        lines += [text for text in told.values() if text not in errors]
+        lines += [text for text in told if text not in errors]
         return "\n".join(lines)
 
 

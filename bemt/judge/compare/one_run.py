@@ -21,7 +21,7 @@ from bemt import __version__
 from bemt.base import unit_errors
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
-from bemt.base.tables import number_of, number_text, text_table
+from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.audit import AuditLine, combined
 from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
@@ -330,7 +330,7 @@ def text(found: RunComparison, details: bool = False) -> str:
     shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:
-        head = [number_text(p.rpm, 6), number_text(p.airspeed_m_s, 4)]
+        head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
         for name, load in p.loads.items():
             rows.append([
                 *head, _LOADS[name], _pm(load.cfd, load.u_cfd), _pm(load.bemt, load.u_bemt),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bemt import __version__
 from bemt.base.document import Documented
 from bemt.base.errors import InputError
-from bemt.base.tables import number_of, number_text, text_table
+from bemt.base.tables import number_of, number_text, speed_text, text_table
 from bemt.data.recordings.cfd_run import is_run
 from bemt.data.recordings.cfd_setup import (
     GRID_FLOOR,
@@ -98,7 +98,7 @@ class TwoRuns(Documented):
     def _point_lines(self) -> list[str]:
         rows, lines = [], []
         for p in self.points or ():
-            head = [number_text(p.rpm, 6), number_text(p.airspeed_m_s, 4)]
+            head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
             for name, load in p.loads.items():
                 size = abs(load.difference) / load.u_both if load.u_both else math.nan
                 both = [f"{number_text(v, 4)} ± {number_text(u, 2, none='?')}"

@@ -14,8 +14,8 @@ from bemt.base.action import in_words
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, gathered
 from bemt.base.given import numbers
-from bemt.base.tables import number_text, or_null, text_table
-from bemt.base.units import INCH
+from bemt.base.tables import number_text, or_null, speed_text, text_table
+from bemt.base.units import INCH, KGF
 from bemt.data.readers.uiuc_names import find_family
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case, case_of, fresh
@@ -203,8 +203,16 @@ class RotorEstimate(Dataset):
                                  "M_tip")  # fmt: skip
         if self.columns["angle_deg"].any():
             head[2:2], keys = ["angle [deg]", "H [N]"], (*keys[:2], "angle_deg", "H_force_N", *keys[2:])
-        digits = {key: 2 if key.startswith("u") else 6 if key == "rpm" else 4 for key in keys}
-        cells = zip(*([number_text(x, digits[key]) for x in self.columns[key]] for key in keys), strict=True)
+        shown = {key: [number_text(x, 2 if key.startswith("u") else 4) for x in self.columns[key]] for key in keys}
+        shown["rpm"] = [speed_text(x) for x in self.columns["rpm"]]
+        cells = [list(row) for row in zip(*(shown[key] for key in keys), strict=True)]
+        at = head.index("T [N]") + 1
+        head.insert(at, "T [gf]")
+        for row, thrust in zip(cells, self.columns["thrust_N"], strict=True):
+            row.insert(at, number_text(1e3 * thrust / KGF, 3))
+        g = self.given
+        kind = f", {g['class'].replace('_', ' ')}" if g["class"] else ""
+        read = f"{g['label']}: diameter {g['diameter_in']:g} in, pitch {g['pitch_in']:g} in, {g['blades']} blades{kind}"
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
         if self.given["source"]:
             notes.append(f"as measured: {self.given['source']}")
@@ -214,7 +222,7 @@ class RotorEstimate(Dataset):
             more.append("--reading rpm=...,thrust_g=...")
         if more and self.given["known_from"] == "label":
             notes.append(f"for narrower bands give {' or '.join(more)}")
-        return "\n".join([text_table(head, map(list, cells), left=()), *notes]) + "\n"
+        return "\n".join([read, text_table(head, cells, left=()), *notes]) + "\n"
 
     def __str__(self) -> str:
         return in_words(self.text)

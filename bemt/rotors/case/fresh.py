@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from contextlib import suppress
 from dataclasses import replace
@@ -71,10 +72,23 @@ def _blocks(*unknowns: Unknown) -> str:
     return "".join(item.block() for item in unknowns)
 
 
+def is_path(text: str) -> bool:
+    """Whether a word can only be a path: ``cases/prop_8x5`` is no label of an 8x5."""
+    return text.endswith(".toml") or "/" in text or os.sep in text
+
+
+def looks_like_label(text: str) -> bool:
+    """Whether a word has the sizes of a label, right or wrong, or is all digits."""
+    return not is_path(text) and (text.strip().isdigit() or _LABEL.search(text) is not None)
+
+
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     if not isinstance(label, str):
         raise InputError(Fault("", "label", f"{type(label).__name__} {label!r:.40}", "a label, such as 10x5"))
+    if is_path(label):
+        hint = f"A path is a case: bemt sweep {label} solves it, and so does bemt.load({label!r})"
+        raise InputError(Fault("label", "", repr(label), "a label, such as 10x5", hint))
     try:
         one = records().get(label.strip())
         found = parse_designation(label, blades) if one is None else one.designation
@@ -120,7 +134,7 @@ sag = {sag:g}  # or resistance_mohm, of the pack with leads
 # capacity_Ah = 2.2  # for the flight time
 
 [drive.motor]
-size = {size:g}  # the winding is usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
+size = {size:g}  # a winding usual for K_v and cells. Better: replace this line by resistance_mohm, mass_g or stator
 idle_share = {idle:g}  # of the current. Better: replace this line by no_load_A, from the motor's sheet
 
 # [drive.vehicle]  # for hover

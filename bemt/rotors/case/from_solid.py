@@ -13,6 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_text, text_table, write_atomic
 from bemt.data.readers import HEAD_BYTES, importers
 from bemt.data.readers.blade import case_text
+from bemt.rotors.case.fresh import case_name
 from bemt.rotors.case.unknowns import AIR, SURFACE
 from geometry.common import GeometryError
 from geometry.export import UNITS, read_solid
@@ -42,8 +43,7 @@ def read_blade(path: Path, unit: str | None = None) -> BladeFile | None:
 
 def write_blade(blade: BladeFile, path: Path, out: Path) -> None:
     """Write ``case.toml``, ``stations.csv`` and a table per section."""
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem).lstrip("_.-") or "rotor"
-    files = case_text(blade, stem, path.name)
+    files = case_text(blade, case_name(out.resolve().name), path.name)
     refuse_other(out / "case.toml", files["case.toml"])
     for name in sorted(files, key=lambda n: n == "case.toml"):  # the case last: what it names is there
         write_atomic(out / name, files[name])
@@ -219,8 +219,7 @@ def text(found: FoundRotor, scale: float, path: Path, words: str, out: str | Non
 
 def write(found: FoundRotor, scale: float, path: Path, out: Path) -> None:
     """Write the case; refused where it would replace another one."""
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem).lstrip("_.-") or "rotor"
-    files = case_files(found, scale, stem, re.sub(r'["\\\n]', "_", path.name))
+    files = case_files(found, scale, case_name(out.resolve().name), re.sub(r'["\\\n]', "_", path.name))
     refuse_other(out / "case.toml", files["case.toml"])
     for name in sorted(files, key=lambda n: n == "case.toml"):  # the case last: what it names is there
         write_atomic(out / name, files[name])

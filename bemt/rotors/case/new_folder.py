@@ -198,10 +198,10 @@ def _files(w: Wanted) -> dict[str, bytes]:
         file = Path(w.stations)
         told, name = fresh.label_or_name(w.label, w.blades, file)
         D = (w.diameter_mm or 0.0) * 1e-3 if told is None or w.diameter_mm is not None else told.diameter_in * INCH
-        hub, key, found = fresh.of_stations(file, D)
+        hub, key, table = fresh.of_stations(file, D)
         blades = w.blades or (told.blades if told else None) or 2
         text = fresh.stations_text(
-            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, found
+            file.name, D, blades, w.rpm, w.airspeed_m_s, hub, key, told, w.family, w.motor, name, table
         )
         return {file.name: file.read_bytes(), "case.toml": text.encode()}
     return {"case.toml": _label_text(w, w.label or "").encode()}

@@ -200,8 +200,8 @@ def out_of_place(document: Mapping[str, Any]) -> dict[str, str]:
     drive, declared = document.get("drive"), document.get("assumptions")
     if not isinstance(drive, dict) or not isinstance(declared, list):
         return {}
-    found = {}
-    for key in (item.get("key") for item in declared if isinstance(item, dict)):
+    found: dict[str, str] = {}
+    for key in (str(item.get("key")) for item in declared if isinstance(item, dict)):
         _, home, name = key.split(".") if key in _STATED else ("", "", "")
         if home and isinstance(table := drive.get(home), dict) and name not in table:
             found.update((key, said) for said in _STATED[key] if said in table)

@@ -20,7 +20,7 @@ from filelock import FileLock, Timeout
 from bemt.base.cache import cache_dir
 from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, refuse
-from bemt.base.tables import number_text, remove_stale, text_table
+from bemt.base.tables import number_text, remove_stale, speed_text, text_table
 from bemt.data.recordings.cfd_setup import audit_of, faults_first, floor_note
 from bemt.physics.bem import solver
 from bemt.physics.bem.model import Model
@@ -311,7 +311,7 @@ def text(record: CampaignRecord) -> str:
     head = ["run", "rpm", "V [m/s]", "T [N]", "u [N]", "Q [N m]", "solver", "level", "cells", "drift T [%]", "y+", "s"]
     rows = []
     for r in record.rows:
-        rows.append([r.run, number_text(r.rpm, 6), number_text(r.airspeed_m_s), number_text(r.thrust_N),
+        rows.append([r.run, speed_text(r.rpm), number_text(r.airspeed_m_s), number_text(r.thrust_N),
                      number_text(r.u_thrust_N, 2), number_text(r.torque_Nm), r.solver, number_text(r.level),
                      f"{r.cells:.0f}", number_text(100 * r.drift_thrust, 2), number_text(r.yplus_avg, 3),
                      number_text(r.seconds, 3)])  # fmt: skip

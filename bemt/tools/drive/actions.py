@@ -21,8 +21,7 @@ __all__ = ["drive", "map", "motor", "thrusters"]
 
 @action(
     "Drive", "drive 10x4.5 --kv 900 --cells 3", words=("case",), shown=True,
-    common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "resistance_mohm",
-            "no_load_A", "reading", "out"),
+    common=("motor", "kv", "cells", "mass_kg", "rotors", "capacity_Ah", "reading", "out"),
 )  # fmt: skip
 def drive(
     case: Propeller | Path = ".", *, motor: str | None = None, kv: float | None = None, cells: Count | None = None,
