@@ -164,11 +164,11 @@ def new(
     wanted = new_folder.Wanted(label, table, solid, unit, diameter_mm, fan, blades, rpm, airspeed_m_s, series, kv,
                                cells, campaign, None if reading is None else reading_text(reading),
                                diameter_in is not None)  # fmt: skip
-    folder, files, doubt = new_folder.write(wanted, None if out is None else os.fspath(out))
+    folder, files, notes = new_folder.write(wanted, None if out is None else os.fspath(out))
     typed = shlex.quote(folder.as_posix())
     lines = [
         f"{folder.as_posix()}: {', '.join(files)}",
-        *([f"! {doubt}"] if doubt else []),
+        *(f"! {note}" for note in notes),
         f"next: bemt sweep {typed}",
     ]
     lines += [f"      bemt drive {typed}"] if kv is not None else []
