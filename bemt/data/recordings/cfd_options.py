@@ -269,11 +269,11 @@ def write_recording(
             columns.setdefault(taken.get(name, name), {})["sign"] = int(text)
     if not (columns or faults):  # nothing is stated: what the headings say themselves
         for h in known:
-            head = heading(h)
-            named = {*meanings(h), head.name.removesuffix(f"_{head.unit.suffix}") if head.unit else ""}
-            told = [q for q in named if q in CHANNELS and head.unit and head.unit.dimension == CHANNELS[q]]
-            if len(told) == 1:
-                columns.setdefault(told[0], {"column": h})
+            said = heading(h)
+            words = {*meanings(h), said.name.removesuffix(f"_{said.unit.suffix}") if said.unit else ""}
+            fit = [q for q in words if q in CHANNELS and said.unit and said.unit.dimension == CHANNELS[q]]
+            if len(fit) == 1:
+                columns.setdefault(fit[0], {"column": h})
     for quantity, entry in columns.items():
         named = [h for h in known if quantity in meanings(h)]
         if "column" not in entry and len(named) == 1:
