@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
@@ -1001,3 +1002,22 @@ def test_one_command_writes_one_range_of_speeds_or_says_why_not(project: Path) -
         assert any(f"{fan.rpm_top:.6g}" in note and f"{fan.rpm_full:.6g}" in note for note in found["notes"])
     same = Job(load_case(project / "cases/prop_8x5/case.toml"))
     assert same.speeds_note is None
+
+
+def test_a_format_is_taken_in_capitals_and_a_program_leads_to_its_target(tmp_path: Path) -> None:
+    assert bemt.export("10x5", tmp_path / "a", "QPROP").files
+    with pytest.raises(InputError, match="For star: fan"):
+        bemt.export("10x5", tmp_path / "b", "star")
+    with pytest.raises(InputError, match="Did you mean qprop"):
+        bemt.export("10x5", tmp_path / "b", "qpropp")
+
+
+def test_what_the_kernel_cannot_make_leaves_the_other_formats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(*_: object) -> None:
+        raise ValueError("Null TopoDS_Shape object")
+
+    pytest.importorskip("cadquery")
+    monkeypatch.setattr("geometry.cad.flow_domain", nothing)
+    made = bemt.export("10x5", tmp_path / "a", ["qprop", "flow"])
+    assert made.exit_code == 2 and [file.suffix for file in made.files] == [".qprop"]
+    assert any("flow: got a failure of the CAD kernel" in line for line in map(str, made.complaints))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 import bemt
 from bemt.app.cli import main
+from bemt.base.errors import InputError
 from bemt.rotors.case import case_of, fresh, load_case
 from bemt.rotors.case.unknowns import section_of
 
@@ -280,3 +282,23 @@ def test_a_fan_has_a_name_and_a_diameter_in_millimetres_or_inches(
     both = ["--diameter-mm", "90", "--diameter-in", "3"]
     assert main(["new", "EDF70", "--fan", *both, "--out", str(tmp_path / "two")]) == 2
     assert not (tmp_path / "two").exists()
+
+
+def test_a_fan_says_what_it_assumed(tmp_path: Path) -> None:
+    """A 10x5 with --fan is a ducted fan of 254 mm: how many blades it has was nobody's word."""
+    told = bemt.new("10x5", fan=True, out=tmp_path / "a").text
+    assert "assumed" in told and "blades 11" in told
+    assert "blades 11" not in bemt.new("10x5", fan=True, blades=8, out=tmp_path / "b").text
+    assert "assumed" not in bemt.new("10x5", out=tmp_path / "c").text
+
+
+def test_a_ratio_just_above_one_is_no_per_cent(tmp_path: Path) -> None:
+    bemt.new("70mm", fan=True, out=tmp_path / "a")
+    file = tmp_path / "a" / "case.toml"
+    text = file.read_text()
+    for wrong, hint in (("1.3", ""), ("37", "write hub_ratio = 0.37")):
+        file.write_text(re.sub(r"^hub_ratio = .*$", f"hub_ratio = {wrong}", text, flags=re.M))
+        with pytest.raises(InputError) as caught:
+            load_case(file)
+        (fault,) = [f for f in caught.value.faults if f.where == "rotor.hub_ratio"]
+        assert hint in fault.hint and ("percent" in fault.hint) == bool(hint)

@@ -163,12 +163,15 @@ def in_words(sentence: str) -> str:
 
     >>> in_words("As in --thrust-N 27 --cells 6"), in_words("Try bemt new --scan FILE")
     ('As in thrust_N=27, cells=6', 'Try bemt new --scan FILE')
+    >>> in_words("--rpm N; or --case /tmp/a.toml."), in_words("--chord-mm (at 0.75 R)")
+    ('rpm=N; or case=/tmp/a.toml.', 'chord_mm (at 0.75 R)')
     """
     if "\n" in sentence:
         return "\n".join(map(in_words, sentence.split("\n")))
     if "--" not in sentence or re.search(r"\bbemt [a-z]", sentence):
         return sentence
-    valued = re.sub(r"(--[a-z][\w-]*) (\d[\d.]*)", lambda m: f"{_name(m[1])}={m[2]}", sentence)
+    valued = re.sub(r"(--[a-z][\w-]*) ((?:[\d/'\"]|[A-Z]{1,2}|\w+=)[^\s;`]*[^\s;`.,)]|[A-Z\d](?![\w]))",
+                    lambda m: f"{_name(m[1])}={m[2]}", sentence)  # fmt: skip
     return re.sub(r"(=[\d.]+) (?=[a-zA-Z_]+=)", r"\1, ", re.sub(r"--[a-z][\w-]*", lambda m: _name(m[0]), valued))
 
 

@@ -585,4 +585,3 @@ def rotor_of(given: Propeller | Case | str | os.PathLike[str]) -> Propeller:
             raise
         got, expected = "no folder or case of this name, and no label", "a case, its folder, or a label such as 10x5"
         raise InputError(Fault(text, "", got, expected)) from None
-

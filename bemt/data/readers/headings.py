@@ -79,6 +79,10 @@ _OTHER_SPEEDS = {
     "climb", "err", "error", "u", "std", "sd",
 }  # fmt: skip
 """Words of a heading that make it a speed of rotation, and of other speeds or of an uncertainty."""
+_COMPONENT = re.compile(
+    r"\b([xyz]|axial|radial|tangential|swirl)[-_ ](velocity|speed)\b|\b(velocity|speed)[-_ ]([xyz]|magnitude)\b",
+    re.IGNORECASE,
+)
 _THOUSANDS = re.compile(
     r"(?P<of>.*?)[\s_]*(?:[\[(]?\s*k[ -]?rpm\s*[\])]?"
     r"|rpm\s*(?:[\[(]\s*[x×*/]?|[x×*/])\s*(?:1000|1e3|10\^3|10³|k|thousands?)\s*[\])]?"
@@ -219,12 +223,15 @@ def meanings(text: str) -> list[str]:
 def may_be_shaft_speed(text: str) -> bool:
     """Tell whether the words of a heading fit a speed of rotation; its unit is not looked at.
 
-    >>> [may_be_shaft_speed(t) for t in ("speed", "n (1/s)", "Drehzahl", "motor speed [Hz]", "wind speed", "thrust")]
-    [True, True, True, True, False, False]
+    >>> [may_be_shaft_speed(t) for t in ("speed", "n (1/s)", "Drehzahl", "motor speed [Hz]")]
+    [True, True, True, True]
+    >>> [may_be_shaft_speed(t) for t in ("wind speed", "x-velocity", "thrust")]
+    [False, False, False]
     """
     base, words = _spoken(text)
     turning = words & _SHAFT_PARTS and words & {"hz", "freq", "frequency"}
-    return base in _SHAFT_LETTERS or bool((words & _SHAFT_WORDS or turning) and not words & _OTHER_SPEEDS)
+    other = words & _OTHER_SPEEDS or _COMPONENT.search(text)
+    return base in _SHAFT_LETTERS or bool((words & _SHAFT_WORDS or turning) and not other)
 
 
 def surely_shaft_speed(text: str) -> bool:

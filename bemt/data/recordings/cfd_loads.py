@@ -182,7 +182,8 @@ class OpenRun:
         rho, a, unit = ref.density_kg_m3 or self.run.run.density_kg_m3, ref.sound_m_s, ref.length_m
         if not (rho and a and unit):
             hint = "--reference density=RHO,sound=A,length=L in kg/m3, m/s and m: L is one unit of the grid"
-            got = "no newtons: Flow360 divides loads of disks by density, speed of sound and the unit of the grid"
+            size = {"force": "newtons", "moment": "newton metres"}.get(c.part, "watts")
+            got = f"no {size}: Flow360 divides loads of disks by density, speed of sound and the unit of the grid"
             self.fault(c, c.name, got, "what it divided by", hint)
             return None
         return rho * a**2 * unit**2 * {"force": 1.0, "moment": unit}.get(c.part, a)

@@ -399,8 +399,8 @@ def of_table(record: Dataset) -> Dataset:
     loads = [k for k in LOADS if k in d]
     size = next((k for k in record.values if not cells.size and CELL_SIZE.fullmatch(k)), None)
     if size and loads and np.unique(record[size]).size > 1 and any(len(g) > 1 for g in groups(d)):
-        told = f"{size}: a size of cells? A grid study takes their count, in a column headed cells (it goes with h^-3)"
-        return replace(record, notes=(*record.notes, told))
+        note = f"{size}: a size of cells? A grid study takes their count, in a column headed cells (it goes with h^-3)"
+        return replace(record, notes=(*record.notes, note))
     if not loads or np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
     if all(len(g) == 1 for g in groups(d)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import shlex
 import textwrap
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
@@ -310,6 +311,7 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
 def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, case: str) -> str:
     """What would tell more."""
     steps = []
+    name, case = shlex.quote(name), shlex.quote(case)
     if any(line.topic == "grid study" and line.status in ("fault", "not stated") for line in audit):
         steps.append("the same point on a finer grid (cells x 2 or more): its change is the u of the grid")
     if sum(len(p.loads.keys() - {"duct_share"}) for p in points) < 3:

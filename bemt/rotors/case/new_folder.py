@@ -67,7 +67,8 @@ level = [5, 5.5, 6]       # cells on the blade R / 2^(level + 2): about 35,000, 
 def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list[str]]:
     """Write a new case that can be solved; nothing is written unless all of it is sound.
 
-    Gives folder and files, and what was not used of the stations, or why a reading may not be this rotor's.
+    Gives folder and files; what was assumed of a fan, was not used of the stations, or why a reading may not be this
+    rotor's.
     """
     faults = _faults(wanted)
     refuse(faults)
@@ -85,8 +86,12 @@ def write(wanted: Wanted, out: str | None = None) -> tuple[Path, list[str], list
         files["cfd/campaign.toml"] = _CAMPAIGN.format(name=case.name, rpm=case.rpm, V=case.airspeed_m_s).encode()
     folder = Path(out) if out else Path(case.name)
     write_files(files, folder)
-    notes += re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
-    return folder, sorted(files), notes
+    open_ = [item for item in case.assumptions if item.key.partition(".")[0] in ("rotor", "duct", "blade")]
+    told = [f"{item.key.rpartition('.')[2]} {item.nominal:.3g}" for item in open_
+            if isinstance(item.nominal, int | float)]  # fmt: skip
+    assumed = [f"assumed, with ranges in case.toml: {', '.join(told)}"] if wanted.fan and told else []
+    unused = re.findall(r"^# (column .*)$", files["case.toml"].decode(), re.M)
+    return folder, sorted(files), [*assumed, *notes, *unused]
 
 
 def _of_motor(fault: Fault, wanted: Wanted) -> Fault:

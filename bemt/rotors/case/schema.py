@@ -96,7 +96,7 @@ class RotorTable(Table):
     diameter_in: float | None = entry("tip diameter", _DIAMETER_IN)
     diameter_mm: float | None = entry("tip diameter", "mm", 10, 6000, _metres("diameter_mm", 6.0))
     diameter_m_: float | None = entry("tip diameter", "m", 0.01, 6, alias="diameter_m")
-    hub_ratio: float | None = entry("hub radius over tip radius", "", 0.01, 0.95, _percent("hub_ratio"))
+    hub_ratio: float | None = entry("hub radius over tip radius", "", 0.01, 0.95, _percent("hub_ratio", 5.0))
     hub_diameter_mm: float | None = entry("hub diameter", "mm", 0.5, 3000, _metres("hub_diameter_mm", 0.499))
     hub_diameter_in: float | None = entry("hub diameter", "in", 0.02, 120)
     spinner_mm: float = entry("length of the nose ahead of the hub; 0: flat face", "mm", 0, 3000, default=0.0)

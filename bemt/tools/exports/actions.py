@@ -126,7 +126,7 @@ def export(
     from bemt.tools.exports.folder import Exported, export_cases
     from bemt.tools.exports.printing import Print, asked
 
-    wanted, faults = [format] if isinstance(format, str) else list(format), []
+    wanted, faults = [word.lower() for word in ([format] if isinstance(format, str) else format)], []
     numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level}
     given: dict[str, Any] = {k: None if v is None else number(k, v, finite=False) for k, v in numbers.items()}
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bemt.base.action import as_html
+from bemt.base.action import as_html, did_you_mean
 from bemt.base.document import Documented, rows_of
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError, gathered, refuse
 from bemt.base.plugins import missing, tool_of
@@ -220,7 +220,7 @@ def export_cases(
     """
     known = exports()
     unknown = [word for word in formats if word not in known]
-    faults = [Fault("", "--format", word, f"one of {', '.join(known)}", absent_target(word)) for word in unknown]
+    faults = [Fault("", "--format", word, f"one of {', '.join(known)}", _nearest(word)) for word in unknown]
     refuse(faults)
     asked = {key: value for key, value in (given or {}).items() if value is not None}
     faults += option_faults(asked) + _unused(asked, formats, hold)
@@ -254,6 +254,14 @@ def export_cases(
         except InputError as error:
             refused.append(error)
     return made, refused
+
+
+def _nearest(word: str) -> str:
+    """What a word that is no target may have meant: one spelt alike, or those that speak of it."""
+    known = exports()
+    about = [name for name, t in known.items() if word.lower() in f"{t.title} {t.source}".lower()]
+    words = f"For {word}: {' or '.join(about)}" if len(word) > 2 and about else ""
+    return absent_target(word) or did_you_mean(word.lower(), known).strip() or words
 
 
 def absent_target(word: str) -> str:
