@@ -121,9 +121,8 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
-        build.warnings.append(
-            f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
-        )
+        text = f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
+        build.warnings.append(text)
     electrical(build)
     _several(build)
     build.check_magnitudes()

@@ -15,17 +15,7 @@ from bemt.base.units import INCH
 from bemt.data.readers.uiuc_names import class_of, family_of
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.reading import parse_reading
-from bemt.rotors.case.unknowns import (
-    AIR,
-    DRIVE,
-    FAN,
-    HUB,
-    SURFACE,
-    Unknown,
-    label_chord,
-    offset_of,
-    section_of,
-)
+from bemt.rotors.case.unknowns import AIR, DRIVE, FAN, HUB, SURFACE, Unknown, label_chord, offset_of, section_of
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation

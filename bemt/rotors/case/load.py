@@ -128,9 +128,8 @@ class Case:
         if self.angle_deg:
             hint = "sweep, estimate and the library's solve take an angle"
             expected = "0 deg: this knows axial flow only"
-            raise InputError(
-                Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
-            )
+            fault = Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
+            raise InputError(fault)
 
     @property
     def paired(self) -> bool:
@@ -486,9 +485,8 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
         else:
             label = re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", item.as_posix())
             hint = f"A label? `bemt new {item.as_posix()}` writes its case" if label else "Check the path"
-            faults.append(
-                Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
-            )
+            fault = Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
+            faults.append(fault)
     refuse(faults)
     return list(dict.fromkeys(found))
 

@@ -382,9 +382,8 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     s = solver.solve(prep, rpm, airspeed_m_s, air, radial=True)
     if not s.converged[0]:
         got = "; ".join(s.flags[0]) or "not converged"
-        raise InputError(
-            Fault(case.path.as_posix(), f"{rpm:g} rev/min, {airspeed_m_s:g} m/s", got, "a converged point")
-        )
+        fault = Fault(case.path.as_posix(), f"{rpm:g} rev/min, {airspeed_m_s:g} m/s", got, "a converged point")
+        raise InputError(fault)
     around = [e.id for e in ready.effects if e not in prep.effects]
     if around:
         raise InputError(
