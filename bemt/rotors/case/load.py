@@ -147,7 +147,9 @@ class Case:
         second = self.file.second_rotor
         assert second is not None  # the caller asks for a pair
         if second.label is None and second.case is None:
-            return self.once("second", lambda: replace(self, written=_less(self.written), file=_alone(self.file)))
+            written = {key: value for key, value in self.written.items() if key != "second_rotor"}
+            file = self.file.model_copy(update={"second_rotor": None})
+            return self.once("second", lambda: replace(self, written=written, file=file))
 
         def other() -> Case:
             try:
@@ -331,15 +333,6 @@ class Case:
             data = repr(self.written).encode() if made_here else path.read_bytes()
             digest.update(f"{path.name}\0{len(data)}\0".encode() + data)
         return digest.hexdigest()
-
-
-def _alone(file: CaseFile) -> CaseFile:
-    """A case without its second rotor."""
-    return file.model_copy(update={"second_rotor": None})
-
-
-def _less(written: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in written.items() if key != "second_rotor"}
 
 
 def _exports(run: Path) -> list[Path]:

@@ -174,11 +174,6 @@ def label_chord(
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
 
 
-def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
-    """Whether a table [drive] has the value itself, of which the key is a typical share."""
-    return _states(drive, key.split(".")[1], _STATED[key])
-
-
 ESC = ("resistance_mohm", "drop", "name")
 """Keys by which a case says which controller it has."""
 
@@ -239,7 +234,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(made.get("second_rotor"), dict):
         unknowns += PAIR
     if isinstance(made.get("drive"), dict):
-        unknowns += [_sized(item, made["drive"]) for item in DRIVE if not _drive_states(made["drive"], item.key)]
+        bare = [u for u in DRIVE if not _states(made["drive"], u.key.split(".")[1], _STATED[u.key])]
+        unknowns += [_sized(item, made["drive"]) for item in bare]
         if _states(made["drive"], "motor", ("resistance_mohm",)) and not _states(made["drive"], "esc", ESC):
             unknowns.append(ESC_DROP)
     if not isinstance(declared, list):
