@@ -516,7 +516,7 @@ def test_one_outlier_does_not_flatten_the_axis() -> None:
     shown, alone = figure(plot), figure(replace(plot, traces=[near]))
     assert shown is not None and alone is not None
     assert shown["traces"][0] == alone["traces"][0], "the others stand where they stand without it"
-    assert [t["words"] for t in shown["traces"][1]["words"]] == ["0.10"], "and it is named at the edge"
+    assert [t.words for t in shown["traces"][1]["words"]] == ["0.10"], "and it is named at the edge"
 
 
 @pytest.mark.parametrize(

@@ -257,8 +257,8 @@ def read_design_points(path: str | os.PathLike[str]) -> Dataset:
     for line, raw in enumerate(source.lines, 1):
         text = raw.strip()
         if text.startswith("#"):
-            found = map(_PARAMETER.fullmatch, text.lstrip("# ").split(","))
-            told |= {m[1]: (m[2], m[3] or "") for m in found if m}
+            found = filter(None, map(_PARAMETER.fullmatch, text.lstrip("# ").split(",")))
+            told |= {m[1]: (m[2], m[3] or "") for m in found}
         elif text and not names:
             mark = ";" if ";" in text and "," not in text else ","
             names = cells_of(text, mark)[1:]

@@ -195,12 +195,12 @@ def numeric_table(
     elif cut:
         warnings.append(f"line {rows[-1].line}: the only row has no line end and may be cut")
     comma = commas and _decimal_commas(rows)
-    good: dict[int, list[float]] = {}
+    good: dict[int, list[float | None]] = {}
     bad: list[Fault] = []
     for row in rows:
         values = [_value(cell, comma) for cell in row.cells]
         if len(values) == len(columns) and None not in values:
-            good[row.line] = [v for v in values if v is not None]
+            good[row.line] = values
             continue
         fault = _misfit(source, columns, row, values)
         if row is rows[-1] and len(rows) > 1 and not cut:

@@ -133,9 +133,8 @@ def _made(name: str, sha256: str, tables: dict[str, dict[str, NDArray[np.float64
     commands = [v for key, v in columns.items() if _COMMAND.fullmatch(key)][:4]
     if len(commands) == 4:
         channels["throttle"] = Channel(np.mean(commands, axis=0) / 65535.0, "-")
-    warnings.append(
-        "a flight: no thrust is measured; mass times acceleration gives it, and the mass is not in the file"
-    )
+    text = "a flight: no thrust is measured; mass times acceleration gives it, and the mass is not in the file"
+    warnings.append(text)
     said = {"file": name, "sha256": sha256}
     return dataset(CRAZYFLIE_LOG, "flight", channels, warnings, said)
 

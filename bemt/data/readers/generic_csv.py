@@ -71,12 +71,8 @@ def sniff(head: bytes | str) -> bool:
     if width < 2:
         return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
-    numbers = sum(any(_numeric(c) for c in cells) for cells in split[1:])
+    numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
     return alike >= 0.5 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
-
-
-def _numeric(cell: str) -> bool:
-    return number(cell) is not None or re.fullmatch(r"[+-]?\d+,\d+", cell) is not None
 
 
 def _blank_numbers(line: str) -> bool:
@@ -121,9 +117,8 @@ def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     if len(speeds) == 1 and speeds[0] not in ("rpm", "electrical_rpm", "optical_rpm", "motor_rpm", "ESC_rpm"):
         own = build.headings[speeds[0]]
         line = f'[columns] rpm = {{ column = "{own}", unit = "rpm" }}'
-        build.warnings.append(
-            f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
-        )
+        text = f"{own!r} is not taken for the speed of the rotor; if it is, head it rpm, or write {line}"
+        build.warnings.append(text)
     electrical(build)
     _several(build)
     build.check_magnitudes()

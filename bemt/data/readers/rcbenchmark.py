@@ -115,9 +115,8 @@ def _messages(build: Builder, k: int, text: str) -> None:
     if any(cells):
         build.texts["app_message" if text else f"column_{k + 1}"] = cells
         rows = [i for i, cell in enumerate(cells) if cell]
-        build.warnings.append(
-            f"messages of the stand in {number_of(len(rows), 'row')}, kept as text: {cells[rows[0]][:60]!r} ..."
-        )
+        note = f"messages of the stand in {number_of(len(rows), 'row')}, kept as text: {cells[rows[0]][:60]!r} ..."
+        build.warnings.append(note)
 
 
 def _mode(build: Builder) -> str:
@@ -163,9 +162,8 @@ def _speeds(build: Builder) -> None:
             "which the file does not state; check it against an optical speed, or state it in a recording.toml"
         )
     if "rpm" in build.channels and seen:
-        build.warnings.append(
-            "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
-        )
+        note = "rpm: the file names neither its sensor nor the number of poles set in the stand's software"
+        build.warnings.append(note)
     electric, optical = (build.at(n) for n in _SPEEDS)
     if electric is not None and optical is not None:
         good = (electric > 0) & (optical > 0)

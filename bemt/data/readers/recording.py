@@ -165,9 +165,8 @@ class Builder:
         values, bad, empty = self.table.numbers(index, decimal)
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
-            self.warnings.append(
-                f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
-            )
+            note = f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
+            self.warnings.append(note)
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
@@ -325,9 +324,8 @@ class Builder:
         if self.empty:
             self.warnings.append(f"no values in {number_of(len(self.empty), 'column')}: {some(self.empty, 8)}")
         if self.words:
-            self.warnings.append(
-                f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
-            )
+            note = f"text, kept as such, in {number_of(len(self.words), 'column')}: {some(self.words, 8)}"
+            self.warnings.append(note)
         if self.unitless:
             hint = "Name units in the headings or in a recording.toml" + _nearest(self.unitless, self.channels)
             self.warnings.append(f"no unit known, none assumed, for {some(self.unitless, 8)}. {hint}")

@@ -46,10 +46,6 @@ def _mass_for_force(unit: Any) -> str:
     return f"{unit} is a mass: write {unit}f for the force" if mass else ""
 
 
-def _nothing_left(sign: float) -> str:
-    return "" if sign else "Nothing would be left"
-
-
 class ColumnTable(Table):
     """[columns]: column, unit, sign and instrument uncertainty of each channel."""
 
@@ -57,7 +53,9 @@ class ColumnTable(Table):
         "column of the channel", low=1, required=True, words="a heading, or the number of a column from 1"
     )
     unit: str = entry("unit of the column", required=True)
-    sign: int = entry("factor on every value", "", -1, 1, _nothing_left, default=1, words="1 or -1")
+    sign: int = entry(
+        "factor on every value", "", -1, 1, lambda v: "" if v else "Nothing would be left", default=1, words="1 or -1"
+    )
     u_gain_pct: float | None = entry("standard uncertainty of the scale", "%", 0.0, 50.0)
     u_zero: float | None = entry("standard uncertainty of the zero, in the unit of the column", low=0.0)
     u_sample: float | None = entry("standard uncertainty of one sample, in the unit of the column", low=0.0)

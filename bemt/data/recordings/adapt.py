@@ -72,13 +72,9 @@ def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
     how = reduction(reduced)
     rows = [{**row, "direction": way} for row, way in zip(reduced.to_rows(), how.directions, strict=True)]
     return {
-        "mode": how.mode,
-        "points": rows,
-        "correlated": {k: dict(v) for k, v in how.correlated.items()},
-        "dropped": [asdict(lost) for lost in how.dropped],
-        "notes": list(reduced.notes),
-        "error": None,
-    }
+        "mode": how.mode, "points": rows, "correlated": {k: dict(v) for k, v in how.correlated.items()},
+        "dropped": [asdict(lost) for lost in how.dropped], "notes": list(reduced.notes), "error": None,
+    }  # fmt: skip
 
 
 def ranges(lines: Iterable[tuple[int, int]]) -> str:

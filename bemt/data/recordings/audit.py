@@ -202,11 +202,7 @@ def _thrust(f: CfdFacts) -> Judged:
         return "fine", "pressure and shear integrated over the blades", "none", 0.0
     table = {
         "momentum": ("doubtful", "momentum through a plane", "depends on the plane and on the pressure there"),
-        "node": (
-            "fault",
-            "one node behind the propeller",
-            "one point of a non-uniform wake, not an integral",
-        ),
+        "node": ("fault", "one node behind the propeller", "one point of a non-uniform wake, not an integral"),
     }
     return *table.get(f.thrust_from, ("not stated", "not stated", "unknown")), math.nan
 

@@ -38,9 +38,8 @@ def pairs(option: str, given: Iterable[str], faults: list[Fault]) -> dict[str, s
     for text in given:
         name, mark, value = text.partition("=")
         if not mark or not name.strip() or not value.strip():
-            faults.append(
-                Fault("", option, text, "NAME=VALUE", f"As in {option} thrust=N" if option == "--unit" else "")
-            )
+            fault = Fault("", option, text, "NAME=VALUE", f"As in {option} thrust=N" if option == "--unit" else "")
+            faults.append(fault)
         elif name.strip() in out:
             faults.append(Fault("", option, f"{name.strip()} twice", "each once"))
         else:

@@ -90,12 +90,12 @@ def constant(facts: Facts) -> Iterator[Finding]:
         if v is None or own in seen or own not in facts.raw:
             continue
         finite = v[np.isfinite(v)]
-        if finite.size < 5 or float(np.ptp(finite)) > 0.0 or len([k for k in moving if k != name]) == 0:
+        others = ", ".join(facts.named(k) for k in moving if k != name)
+        if finite.size < 5 or float(np.ptp(finite)) > 0.0 or not others:
             continue
         if name == "rpm" and not facts.still.all():
             continue  # a line of constant speed through the advance ratios
         seen.add(own)
-        others = ", ".join(facts.named(k) for k in moving if k != name)
         if finite[0] == 0.0:
             text = f"0 in all {finite.size} rows while {others} change: that sensor saw nothing"
             yield Finding("dead_sensor", own, text, "leave the column out", (), "note")

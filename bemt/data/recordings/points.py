@@ -230,8 +230,8 @@ def from_samples(rec: Dataset, name: str) -> Found:
     for run in labels[np.argsort(first)].tolist():
         rows = np.flatnonzero(runs == run)
         rows, t = _clock(rec, rows, found)
-        inside = {key: v if len(rows) == len(v) else v[rows] for key, v in data.items()}
-        part = {key: v for key, v in inside.items() if np.any(np.isfinite(v))}
+        inside = ((key, v if len(rows) == len(v) else v[rows]) for key, v in data.items())
+        part = {key: v for key, v in inside if np.any(np.isfinite(v))}
         if signal not in part:
             found.lost += lost(rec, rows, "", f"a run without {signal}")
             continue

@@ -144,9 +144,8 @@ def _open(lines: Sequence[Comparison]) -> list[str]:
     if inside:
         told.append(f"Within BEMT's own band, whatever the uncertainty of the recording: {', '.join(inside)}.")
     if wanted:
-        told.append(
-            f"Agrees only if the recording (no uncertainty stated) is at least this uncertain: {', '.join(wanted)}."
-        )
+        text = f"Agrees only if the recording (no uncertainty stated) is at least this uncertain: {', '.join(wanted)}."
+        told.append(text)
     return told
 
 

@@ -257,9 +257,8 @@ def diagnose_into(
 
     cases = find_cases(paths)
     if len(cases) != 1:
-        raise InputError(
-            Fault("--recording", "", number_of(len(cases), "case"), "one case, the rotor that was recorded")
-        )
+        fault = Fault("--recording", "", number_of(len(cases), "case"), "one case, the rotor that was recorded")
+        raise InputError(fault)
     found, records = load_all(list(recordings), [str(cases[0])])
     target = (out / found[0].name / "diagnosis").as_posix()
     folder.check(target, found)

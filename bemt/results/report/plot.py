@@ -284,43 +284,60 @@ def _path(points: Sequence[tuple[float, float]]) -> str:
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
-def _draw(t: _Numbers, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
-    """Paths of one trace: bands and lines, or bars and markers; words where a point lies beyond the edge."""
-    trace, out, words = t.trace, [], []
-    if trace.points:
-        for x, y, u in t.points:
-            px, py = f.x(x), f.y(y)
-            if px != f.inside(px):
-                left = px < f.left
-                out.append(_marker("left" if left else "right", f.inside(px), py))
-                words.append(_text(f.left + 13 if left else f.right - 13, py + 4, number_text(x, 2),
-                                   "start" if left else "end", "edge"))  # fmt: skip
-                continue
-            if not math.isnan(u):
-                ends = [(f.inside(f.x(x + s * u)), py) if trace.horizontal else (px, f.y(y + s * u)) for s in (-1, 1)]
-                out.append(("bar", _path(ends)))
-            out.append(_marker(trace.shape, px, py))
-        return out, words
+@dataclass(frozen=True)
+class _Label:
+    """Words at a place of the picture [px], as its template writes them."""
+
+    x: str
+    y: str
+    words: str
+    anchor: str
+    kind: str
+    turn: bool
+
+
+_Drawn = tuple[list[tuple[str, str]], list[_Label]]
+"""Paths with their kind, and words."""
+
+
+def _points(t: _Numbers, f: _Frame) -> _Drawn:
+    """Bars and markers of a trace; words where a point lies beyond the edge."""
+    out, words = [], []
+    for x, y, u in t.points:
+        px, py = f.x(x), f.y(y)
+        if px != f.inside(px):
+            end, at = ("start", f.left + 13) if px < f.left else ("end", f.right - 13)
+            out.append(_marker("left" if px < f.left else "right", f.inside(px), py))
+            words.append(_text(at, py + 4, number_text(x, 2), end, "edge"))
+            continue
+        if not math.isnan(u):
+            ends = [(f.inside(f.x(x + s * u)), py) if t.trace.horizontal else (px, f.y(y + s * u)) for s in (-1, 1)]
+            out.append(("bar", _path(ends)))
+        out.append(_marker(t.trace.shape, px, py))
+    return out, words
+
+
+def _curves(t: _Numbers, f: _Frame) -> _Drawn:
+    """Bands and lines of a trace; markers where there are few points."""
+    out = []
     for run in t.runs:
         at = [t.points[i] for i in run]
         band = [p for p in at if not math.isnan(p[2])]
         if len(band) > 1:
-            edge = [(f.x(x), f.y(trace.top(x, y, u))) for x, y, u in band] + [
-                (f.x(x), f.y(y - u)) for x, y, u in reversed(band)
-            ]
-            out.append(("band", _path(edge) + "z"))
+            upper = [(f.x(x), f.y(t.trace.top(x, y, u))) for x, y, u in band]
+            out.append(("band", _path(upper + [(f.x(x), f.y(y - u)) for x, y, u in reversed(band)]) + "z"))
         if len(at) > 1:
             out.append(("line", _path([(f.x(x), f.y(y)) for x, y, _ in at])))
         if len(at) <= 8:
             out += [_marker("circle" if len(at) == 1 else "small", f.x(x), f.y(y)) for x, y, _ in at]
-    return out, words
+    return out, []
 
 
-def _text(x: float, y: float, words: str, anchor: str = "middle", kind: str = "", turn: bool = False) -> dict[str, Any]:
-    return {"x": f"{x:.1f}", "y": f"{y:.1f}", "words": words, "anchor": anchor, "kind": kind, "turn": turn}
+def _text(x: float, y: float, words: str, anchor: str = "middle", kind: str = "", turn: bool = False) -> _Label:
+    return _Label(f"{x:.1f}", f"{y:.1f}", words, anchor, kind, turn)
 
 
-def _axes(plot: Plot, f: _Frame, width: int, height: int) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
+def _axes(plot: Plot, f: _Frame, width: int, height: int) -> _Drawn:
     """Grid, axes and their words."""
     lines, words = [], []
     if f.log:
@@ -347,10 +364,10 @@ def _tick(value: float) -> str:
     return f"{value:,.10g}".replace(",", " ") if abs(value) >= 1e4 else f"{value:.10g}"
 
 
-def _marks(plot: Plot, f: _Frame) -> tuple[list[tuple[str, str]], list[dict[str, Any]]]:
+def _marks(plot: Plot, f: _Frame) -> _Drawn:
     """Places on the axes: lines, shaded ranges, words."""
     lines: list[tuple[str, str]] = []
-    words: list[dict[str, Any]] = []
+    words: list[_Label] = []
     for mark in plot.marks:
         v = _number(mark.at)
         if math.isnan(v) or (f.log and v <= 0):
@@ -401,8 +418,8 @@ def figure(plot: Plot) -> dict[str, Any] | None:
     (lines, words), (more, notes) = _axes(plot, f, width, height), _marks(plot, f)
     drawn = []
     for t in traces:
-        paths, beyond = _draw(t, f)
         look = t.trace
+        paths, beyond = (_points if look.points else _curves)(t, f)
         key = _marker(look.shape, 12, 9) if look.points else ("line", "M1 9H23")
         drawn.append({"name": look.name[:60], "colour": look.colour, "dash": look.dash, "paths": paths,
                       "words": beyond, "key": key})  # fmt: skip

@@ -197,11 +197,7 @@ def case_text(result: Result) -> str:
         f"{_n(c.temperature_C, 3)} degC; {c.convention}; {c.stations} stations, n_crit {c.n_crit:g}, "
         f"section drag x {c.drag_level:g}"
     )
-    lines = [
-        f"{result.name}: {result.title}",
-        _wrap(head, "  "),
-        _wrap("effects: " + ", ".join(c.effects), "  "),
-    ]
+    lines = [f"{result.name}: {result.title}", _wrap(head, "  "), _wrap("effects: " + ", ".join(c.effects), "  ")]
     if result.drive:
         lines += ["", _wrap(result.drive.text, "  "), ""]
     lines += [

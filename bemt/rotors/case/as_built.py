@@ -51,11 +51,6 @@ class CaseAsBuilt:
                 ) if self.fitted_to else ()  # fmt: skip
 
 
-def _stated(table: AsBuiltTable) -> Array:
-    """Expectations that a case states, zero elsewhere."""
-    return np.array([getattr(table, name, None) or 0.0 for name in NAMES])
-
-
 def known_from(blade: BladeTable) -> str:
     """How the blade is known: as the case says, else by where its stations come from."""
     if blade.known_from is not None:
@@ -87,7 +82,7 @@ def as_built_of(
     drawn_section = blade.section is not None and blade.section.dat is not None
     drawn_section = drawn_section or bool(file.polars) or source in ("cad", "scan")
     section = "given" if drawn_section else section_rule.source(blade.family)
-    sds, drawn = {}, np.zeros(len(NAMES)) if stated is None else _stated(stated)
+    sds, drawn = {}, np.array([getattr(stated, name, None) or 0.0 for name in NAMES])  # zero elsewhere
     if stated is not None:
         named = {"angle_deg": "angle_sd_deg", "camber_deg": "camber_sd_deg", "lift": "lift_sd", "drag": "drag_sd"}
         for name, sd in named.items():

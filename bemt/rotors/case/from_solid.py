@@ -52,15 +52,10 @@ def write_blade(blade: BladeFile, path: Path, out: Path) -> None:
 def blade_document(blade: BladeFile, path: Path) -> dict[str, Any]:
     """Plain values of what was found."""
     return {
-        "schema": SCHEMA,
-        "file": path.name,
-        "program": blade.source,
-        "blades": blade.blades,
-        "diameter_m": 2 * blade.R_m,
-        "hub_diameter_m": 2 * blade.Rhub_m,
-        "warnings": list(blade.notes),
+        "schema": SCHEMA, "file": path.name, "program": blade.source, "blades": blade.blades,
+        "diameter_m": 2 * blade.R_m, "hub_diameter_m": 2 * blade.Rhub_m, "warnings": list(blade.notes),
         "stations": {"r_m": blade.r_m, "chord_m": blade.chord_m, "beta_deg": np.degrees(blade.beta_rad)},
-    }
+    }  # fmt: skip
 
 
 def blade_text(blade: BladeFile, path: Path, out: str | None) -> str:

@@ -129,9 +129,8 @@ class Case:
         if self.angle_deg:
             hint = "sweep, estimate and the library's solve take an angle"
             expected = "0 deg: this knows axial flow only"
-            raise InputError(
-                Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
-            )
+            fault = Fault(self.path.as_posix(), "operating.angle_deg", f"{self.angle_deg:g} deg", expected, hint)
+            raise InputError(fault)
 
     @property
     def paired(self) -> bool:
@@ -149,7 +148,9 @@ class Case:
         second = self.file.second_rotor
         assert second is not None  # the caller asks for a pair
         if second.label is None and second.case is None:
-            return self.once("second", lambda: replace(self, written=_less(self.written), file=_alone(self.file)))
+            written = {key: value for key, value in self.written.items() if key != "second_rotor"}
+            file = self.file.model_copy(update={"second_rotor": None})
+            return self.once("second", lambda: replace(self, written=written, file=file))
 
         def other() -> Case:
             try:
@@ -335,15 +336,6 @@ class Case:
         return digest.hexdigest()
 
 
-def _alone(file: CaseFile) -> CaseFile:
-    """A case without its second rotor."""
-    return file.model_copy(update={"second_rotor": None})
-
-
-def _less(written: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in written.items() if key != "second_rotor"}
-
-
 def _exports(run: Path) -> list[Path]:
     """Files of a CFD run; none where its run.toml cannot be read, which the sweep says."""
     from bemt.data.readers.cfd_run import read
@@ -497,9 +489,8 @@ def find_cases(paths: Iterable[str | Path]) -> list[Path]:
         else:
             label = re.fullmatch(r"[\d.]+x[\d.]+(x\d+)?", item.as_posix())
             hint = f"A label? `bemt new {item.as_posix()}` writes its case" if label else "Check the path"
-            faults.append(
-                Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
-            )
+            fault = Fault(item.as_posix(), "", "no such file or folder", "a case file or a folder of cases", hint)
+            faults.append(fault)
     refuse(faults)
     return list(dict.fromkeys(found))
 

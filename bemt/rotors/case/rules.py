@@ -229,12 +229,8 @@ def _check_section(out: Collector, section: SectionTable) -> None:
         out.add("blade.section.r_over_R", got, expected)
     for key in ("camber", "camber_position"):
         if key in stated and "thickness" not in stated:
-            value = stated[key]
-            out.add(
-                f"blade.section.{key}",
-                shown(list(value) if isinstance(value, tuple) else value),
-                "nothing without thickness",
-            )
+            value = [*stated[key]] if isinstance(stated[key], tuple) else stated[key]
+            out.add(f"blade.section.{key}", shown(value), "nothing without thickness")
 
 
 def _check_axial(out: Collector, case: CaseFile, what: str, why: str) -> None:

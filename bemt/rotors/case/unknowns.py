@@ -66,13 +66,10 @@ SECTION = (Unknown("blade.section.camber", 0.035, 0.02, 0.05, _CAMBER), THICKNES
 SURFACE = (
     Unknown("model.n_crit", N_CRIT, 1.0, 5.0, "transition not known; 3 is the rule for disturbed flow"),
     Unknown(
-        "model.drag_level",
-        DRAG_LEVEL,
-        1.0,
-        1.2,
+        "model.drag_level", DRAG_LEVEL, 1.0, 1.2,
         "surface not known; smooth (1.0) to twice the excess of moulded blades (1.1)",
     ),
-)
+)  # fmt: skip
 AIR = Unknown("air.density_kg_m3", 1.225, 1.16, 1.29, "air not stated; 30 to 0 C at sea level")
 _MOTORS = " in two of three of 1088 measured motors with a propeller"
 FAN = (
@@ -86,47 +83,32 @@ DRIVE = (
         "drive.battery.sag", 0.06, 0.01, 0.13, "battery not known; loses 3 to 10 % of its voltage at full throttle"
     ),
     Unknown(
-        "drive.motor.size",
-        0.0,
-        -1.3,
-        1.3,
+        "drive.motor.size", 0.0, -1.3, 1.3,
         "motor not known; resistance with controller and leads is half to twice the usual for K_v and cells in two of "
         "three of 611 motors. Its mass_g narrows that to 0.7 to 1.4",
     ),
     Unknown(
         "drive.motor.idle_share", 0.073, 0.03, 0.14, f"motor not known; losses take 5 to 11 % of the current{_MOTORS}"
     ),
-)
+)  # fmt: skip
 PAIR = (
     Unknown(
-        "second_rotor.wake_radius",
-        WAKE_RADIUS,
-        0.7071,
-        0.85,
+        "second_rotor.wake_radius", WAKE_RADIUS, 0.7071, 0.85,
         "wake not measured; 0.707 by momentum theory, 0.78 to 0.82 measured",
     ),
     Unknown(
-        "second_rotor.interference",
-        1.0,
-        0.8,
-        1.2,
+        "second_rotor.interference", 1.0, 0.8, 1.2,
         "declared; blades that pass each other and mixing with the air outside are not modelled",
     ),
     Unknown(
-        "second_rotor.swirl",
-        SWIRL,
-        0.0,
-        1.0,
+        "second_rotor.swirl", SWIRL, 0.0, 1.0,
         "not known; 1 without anything between the rotors, less behind motors and arms, which straighten the flow",
     ),
     Unknown(
-        "second_rotor.mount_drag",
-        MOUNT_DRAG,
-        0.0,
-        0.06,
+        "second_rotor.mount_drag", MOUNT_DRAG, 0.0, 0.06,
         "declared; motor and arm cover 2 to 6 % of the disk. A stand reads it while the first rotor turns alone",
     ),
-)
+)  # fmt: skip
 ESC_DROP = Unknown(
     "drive.esc.drop", 0.07, 0.0, 0.18,
     "controller not known; it, leads and a warm winding take 2 to 13 % of the voltage in two of three of 859 motors",
@@ -172,11 +154,6 @@ def label_chord(
     of = f"{blade_class} propellers" if scatter else "87 measured propellers, 2.2 to 19 in"
     why = f"chord not known; range of {of}. Measuring it narrows the band most"
     return Unknown("blade.max_chord_over_R", float(f"{chord:.3g}"), least, most, why)
-
-
-def _drive_states(drive: Mapping[str, Any], key: str) -> bool:
-    """Whether a table [drive] has the value itself, of which the key is a typical share."""
-    return _states(drive, key.split(".")[1], _STATED[key])
 
 
 def replaced(changes: Iterable[str]) -> set[str]:
@@ -240,6 +217,13 @@ def _blades(rotor: Any) -> int | None:
     return blades if isinstance(blades, int) else None
 
 
+def _of_drive(drive: Mapping[str, Any]) -> list[Unknown]:
+    """What a motor and its controller leave out."""
+    out = [_sized(u, drive) for u in DRIVE if not _states(drive, u.key.split(".")[1], _STATED[u.key])]
+    known = _states(drive, "motor", ("resistance_mohm",)) and not _states(drive, "esc", ESC)
+    return [*out, ESC_DROP] if known else out
+
+
 def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     """Document with what a short case leaves out: kind, hub, chord law, section and air, each with its assumption.
 
@@ -269,10 +253,8 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         unknowns.append(AIR)
     if isinstance(made.get("second_rotor"), dict):
         unknowns += PAIR
-    if isinstance(made.get("drive"), dict):
-        unknowns += [_sized(item, made["drive"]) for item in DRIVE if not _drive_states(made["drive"], item.key)]
-        if _states(made["drive"], "motor", ("resistance_mohm",)) and not _states(made["drive"], "esc", ESC):
-            unknowns.append(ESC_DROP)
+    if isinstance(drive := made.get("drive"), dict):
+        unknowns += _of_drive(drive)
     if not isinstance(declared, list):
         return made
     named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}

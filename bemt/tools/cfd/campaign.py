@@ -214,17 +214,13 @@ def summary_text(found: Summary) -> str:
             words = []
             for key in ("thrust_N", "torque_Nm"):
                 of = study.of(key)
-                gci = number_text(_percent(of.gci_fine), 2)
+                gci = number_text(math.nan if of.gci_fine is None else 100 * of.gci_fine, 2)
                 said = f": {'; '.join(of.flags)}" if of.flags else ""
                 order, limit = number_text(of.order, 3), number_text(of.extrapolated)
                 words.append(f"{key} order {order}, limit {limit}, GCI {gci} %{said}")
             levels = ", ".join(f"{level:g}" for level in study.levels)
             lines.append(f"  grid study {study.solver} levels {levels}: {' | '.join(words)}")
     return "\n".join([*lines, *_radial_text(found)]) + "\n"
-
-
-def _percent(value: float | None) -> float:
-    return math.nan if value is None else 100 * value
 
 
 def _radial_text(found: Summary) -> list[str]:

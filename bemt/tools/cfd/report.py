@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from pathlib import Path
@@ -184,11 +184,6 @@ def _facts(run: ShownRun, c: CaseConditions, ducted: bool, levels: int) -> CfdFa
     )  # fmt: skip
 
 
-def _levels(item: Runs, found: Iterable[Runs]) -> int:
-    """Grids behind the uncertainty of a recording: its own study, else that of the same case."""
-    return max([item.levels, *(o.levels for o in found if o.case == item.case)]) if item.grid_study else 1
-
-
 def _plain_rows(found: Sequence[Runs], result: Result) -> list[Row]:
     """Runs of the bare case as rows like those of a sweep, each condition and flow once, finest grid."""
     c = result.conditions
@@ -241,7 +236,9 @@ def attach(book: Book, found: Sequence[Runs]) -> tuple[Book, list[Runs]]:
 
 
 def _audited(item: Runs, result: Result, found: Sequence[Runs]) -> Runs:
-    ducted, levels = result.kind == "fan" or "duct" in item.name, _levels(item, found)
+    ducted, levels = result.kind == "fan" or "duct" in item.name, 1
+    if item.grid_study:  # of its own, else of the same case
+        levels = max([item.levels, *(o.levels for o in found if o.case == item.case)])
     runs = (
         replace(run, audit=Audit.of(f"{item.name}: {run.run}", _facts(run, result.at, ducted, levels)))
         for run in item.runs

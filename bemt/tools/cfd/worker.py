@@ -387,9 +387,8 @@ def _means(row: RunRow, history: Array, s: Settings, code: int, balanced: bool) 
         if not abs(drift) <= DRIFT_LIMIT:
             why.append(f"{key} drifts by {drift:+.1%} over the last {s.average} iterations (limit {DRIFT_LIMIT:.0%})")
         if not scatter <= SCATTER_LIMIT:
-            why.append(
-                f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})"
-            )
+            text = f"{key} scatters by {scatter:.1%} over the last {s.average} iterations (limit {SCATTER_LIMIT:.0%})"
+            why.append(text)
     if code == 0 and balanced and not why:
         rotor, standing = (float(history[-s.average :, k].mean()) for k in (1, 3))
         row = replace(row, thrust_N=means[0], torque_Nm=means[1], converged=1, thrust_rotor_N=rotor,

@@ -365,9 +365,8 @@ def _section(text: str | None, hub_ratio: float) -> tuple[dict[str, Any], Path]:
         return {"camber": SECTION[0].value, "thickness": list(FAMILY[0]), "r_over_R": radii}, Path(".")
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words:
-        raise InputError(
-            Fault("--section", "", repr(text), "NACA digits or coordinate files", "As in 4412, or 4415,4409")
-        )
+        fault = Fault("--section", "", repr(text), "NACA digits or coordinate files", "As in 4412, or 4415,4409")
+        raise InputError(fault)
     files = [Path(word) for word in words if word.lower().endswith(".dat")]
     if files and (len(files) < len(words) or len({f.parent for f in files}) > 1):
         raise InputError(Fault("--section", "", text, "NACA digits, or coordinate files (.dat) of one folder"))

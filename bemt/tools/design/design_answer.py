@@ -145,9 +145,8 @@ def text(d: Design) -> str:
     limits = need.limits
     stress, allowed = float(np.nanmax(v.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
     if d.thickness is not None and d.thickness != FAMILY[0]:
-        lines.append(
-            "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
-        )
+        note = "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
+        lines.append(note)
     lines.append(f"limits reached: {'; '.join(d.active) or 'none'}")
     lines.append(f"largest stress {stress:.3g} MPa; {allowed:.3g} allowed ({limits.material.name}, "
                  f"{limits.material.strength_MPa:g} MPa over {limits.safety:g})")  # fmt: skip

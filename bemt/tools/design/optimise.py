@@ -148,9 +148,8 @@ def optimise(problem: BladeProblem, x0: Array, progress: Progress | None = None,
     start = turned(problem, x0)
     before = problem.values(start)
     if before is None:
-        raise InputError(
-            Fault("", "--thrust-N", "no blade to start from converges", "a point that the solver converges at")
-        )
+        fault = Fault("", "--thrust-N", "no blade to start from converges", "a point that the solver converges at")
+        raise InputError(fault)
     inside, n = start, 0
     if before.margins.min() < 0.0:
         reached, inside, n = most_thrust(problem, x0, progress)

@@ -213,9 +213,8 @@ def point_of(text: str) -> DesignPoint:
                 raise ValueError
             found[names[key]] = float(value)
         except ValueError:
-            faults.append(
-                Fault("--points", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
-            )
+            fault = Fault("--points", "", part or text, "thrust=N,airspeed=M/S,rpm=REV/MIN,weight=SHARE, each once")
+            faults.append(fault)
     if "thrust_N" not in found and not faults:
         faults.append(Fault("--points", "", text, "a thrust", "As in thrust=6,airspeed=15,rpm=7000,weight=1"))
     refuse(faults)

@@ -214,16 +214,13 @@ def circuit(case: Case) -> dict[str, Any] | None:
     idle, limit = drive.esc.idle_A, drive.esc.current_limit_A
     stated = t.rotor_inertia_kg_mm2
     return {
-        "kv_rpm_V": drive.motor.kv_rpm_V,
-        "volts": float(drive.battery.voc(t.soc)) - drive.battery_ohm * idle,
+        "kv_rpm_V": drive.motor.kv_rpm_V, "volts": float(drive.battery.voc(t.soc)) - drive.battery_ohm * idle,
         "ohm": float(drive.motor.resistance(drive.motor.ambient_C)) + drive.esc.resistance_ohm,
-        "battery_ohm": drive.battery_ohm,
-        "no_load_A": drive.motor.no_load_A,
-        "exponent": drive.esc.exponent,
+        "battery_ohm": drive.battery_ohm, "no_load_A": drive.motor.no_load_A, "exponent": drive.esc.exponent,
         "limit_A": limit - idle if math.isfinite(limit) else None,
         "motor_inertia_kg_m2": drive.motor.inertia_kg_m2,
         "rotor_inertia_kg_m2": None if stated is None else 1e-6 * stated,
-    }
+    }  # fmt: skip
 
 
 def _line(case: Case, full: Mapping[str, DriveBand]) -> str:

@@ -242,10 +242,7 @@ def response(drive: Drive, low: float, high: float, soc: float) -> tuple[list[Re
         course = simulate(drive, [(0.0, a), (0.1 * guess, b), (1.1 * guess, a)], end, t, soc)
         up = (t >= 0.05 * guess) & (t < 1.1 * guess)
         down = t >= 1.05 * guess
-        times = [
-            time_to(t[up], course.thrust_N[up], 0.1 * guess),
-            time_to(t[down], course.thrust_N[down], 1.1 * guess),
-        ]
+        times = [time_to(t[up], course.thrust_N[up], 0.1 * guess), time_to(t[down], course.thrust_N[down], 1.1 * guess)]
         if not np.all(np.isfinite(times)) or max(times) < 0.1 * guess:
             break
         guess *= 2.5

@@ -223,9 +223,8 @@ def _torque(file: Path, table: TorqueTable, winding: str) -> tuple[mc.Line, mc.T
     if np.mean(beyond) > 0.5:
         got = f"a loop current of {np.median(mA):.3g} mA"
         hint = "Is shunt_ohm right, and the column in volts?"
-        raise InputError(
-            Fault(file.as_posix(), "torque.shunt_ohm", got, f"{loop.low_mA:g} to {loop.high_mA:g} mA", hint)
-        )
+        fault = Fault(file.as_posix(), "torque.shunt_ohm", got, f"{loop.low_mA:g} to {loop.high_mA:g} mA", hint)
+        raise InputError(fault)
     line = mc.line(amps, loop.torque(volts), trial)
     return line.scaled(mc.current_factor(table.current, table.between, winding) / 1.5), loop
 
@@ -376,9 +375,8 @@ def verdict_text(made: MotorResult) -> list[str]:
     if any(name.endswith("gain") for name in names):
         lines.append("a gain error is not an offset, resistor or convention error: look for a wrong calibration")
     if "torque.offset" in names:
-        lines.append(
-            "a torque offset is the zero of the sensor, friction or cogging: the trials alone do not show which"
-        )
+        text = "a torque offset is the zero of the sensor, friction or cogging: the trials alone do not show which"
+        lines.append(text)
     return lines
 
 

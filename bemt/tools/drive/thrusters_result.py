@@ -246,14 +246,11 @@ def share(
         for d in distance
     ]
     document = {
-        "schema": "bemt.thrusters.result/1",
-        "body": file.body.name,
-        "thrusters": [vars(t) for t in thrusters],
+        "schema": "bemt.thrusters.result/1", "body": file.body.name, "thrusters": [vars(t) for t in thrusters],
         "command": {"force_N": force, "moment_Nm": moment, "priority": priority},
         "allocation": {f.name: getattr(got, f.name) for f in dataclasses.fields(Allocation)},
-        "attainable": corners,
-        "mounting": rows,
-    }
+        "attainable": corners, "mounting": rows,
+    }  # fmt: skip
     if out:
         folder = Path(out)
         outputs.check("--out", folder, RESULTS, [_toml(Path(path))])

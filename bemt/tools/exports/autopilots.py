@@ -42,9 +42,8 @@ class Px4Export(LoadsExport):
         if T <= MOST_CT:
             allocation.append(f"param set-default CA_ROTOR0_CT {T:.9g}")
         else:
-            allocation.append(
-                f"# CA_ROTOR0_CT is left at its default: {T:.6g} N is above the {MOST_CT:g} that PX4 takes"
-            )
+            text = f"# CA_ROTOR0_CT is left at its default: {T:.6g} N is above the {MOST_CT:g} that PX4 takes"
+            allocation.append(text)
         allocation.append(f"param set-default CA_ROTOR0_KM {t.sense * Q / T:.9g}")
         lines = [*head, "# Forward propeller of the SIH (fixed wing, tailsitter, pusher)"]
         lines += [

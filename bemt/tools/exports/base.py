@@ -222,24 +222,9 @@ class Export(ABC):
     turn: ClassVar[int] = 0
 
     def put(self, job: Job, out: Path) -> Manifest:
-        """Write the files into a folder.
+        """Write the files into the folder of the export and give their part of the manifest.
 
-        Parameters
-        ----------
-        job : Job
-            The request.
-        out : Path
-            The folder of the export.
-
-        Returns
-        -------
-        dict
-            Its part of the manifest.
-
-        Raises
-        ------
-        InputError
-            If the request cannot be met; nothing is written then.
+        Nothing is written where the request cannot be met (InputError).
         """
         from bemt.tools.exports.parts import entry
         from geometry.export import MANIFEST, SCHEMA
@@ -257,33 +242,11 @@ class Export(ABC):
         return {"schema": SCHEMA, "name": job.case.name, "files": [], "targets": [made]}
 
     def text(self, part: Mapping[str, Any]) -> list[str]:
-        """Lines for a terminal on its own part of the manifest.
-
-        Parameters
-        ----------
-        part : mapping
-            What the manifest holds under `id`.
-
-        Returns
-        -------
-        list of str
-            Lines.
-        """
+        """Lines for a terminal on its own part of the manifest, what that holds under `id`."""
         return [str(note) for note in part.get("notes", [])]
 
     def faults(self, job: Job) -> list[Fault]:
-        """Requests that the target cannot meet; overriding methods add to this list.
-
-        Parameters
-        ----------
-        job : Job
-            What is asked.
-
-        Returns
-        -------
-        list of Fault
-            All faults.
-        """
+        """All requests that the target cannot meet; overriding methods add to this list."""
         import importlib.util
 
         out = []
@@ -307,54 +270,14 @@ class Export(ABC):
 
     @abstractmethod
     def write(self, job: Job) -> Files:
-        """Create the files.
-
-        Parameters
-        ----------
-        job : Job
-            The request; `faults` is empty.
-
-        Returns
-        -------
-        mapping of str to str or bytes
-            Content by path below the folder of the export.
-
-        Raises
-        ------
-        InputError
-            If the case cannot be solved there.
-        """
+        """Content of the files of a request without `faults`. InputError where the case cannot be solved there."""
 
     def notes(self, job: Job) -> list[str]:
-        """Notes for the user of the files.
-
-        Parameters
-        ----------
-        job : Job
-            What was asked.
-
-        Returns
-        -------
-        list of str
-            Sentences.
-        """
+        """Sentences for the user of the files."""
         return []
 
     def checked(self, job: Job, files: Files) -> Manifest:
-        """Fit error, band and range for the manifest.
-
-        Parameters
-        ----------
-        job : Job
-            What was asked.
-        files : mapping
-            What :meth:`write` gave.
-
-        Returns
-        -------
-        dict
-            ``fit_error_pct``, ``band``, ``range``.
-        """
+        """``fit_error_pct``, ``band`` and ``range`` of what :meth:`write` gave, for the manifest."""
         return {}
 
 
@@ -548,22 +471,7 @@ class BladeExport(Export):
     uses = frozenset({"rpm", "airspeed_m_s"})
 
     def read_back(self, job: Job, files: Files, folder: Path) -> Case:
-        """The written file as a case, by the reader of the same name.
-
-        Parameters
-        ----------
-        job : Job
-            What was asked.
-        files : mapping
-            What :meth:`write` gave.
-        folder : Path
-            An empty folder.
-
-        Returns
-        -------
-        Case
-            The case.
-        """
+        """What :meth:`write` gave as a case in an empty folder, by the reader of the same name."""
         from bemt.data.readers import importers
         from bemt.data.readers.blade import case_text
         from bemt.rotors.case import load_case

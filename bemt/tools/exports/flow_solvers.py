@@ -107,17 +107,10 @@ class Flow360Export(DiskExport):
         f, Re, cl, cd = _tables(job)
         degrees = np.round(np.degrees(f.alpha), 6)
         disk = {
-            "rotationDirectionRule": "rightHand" if p.sense > 0 else "leftHand",
-            "axisOfRotation": [0, 0, 1],
-            "centerOfRotation": [0, 0, 0],
-            "numberOfBlades": p.blades,
-            "radius": p.R,
-            "omega": p.omega / p.a_sound,
-            "chordRef": float(np.interp(0.75 * p.R, p.r, p.chord)),
-            "thickness": 0.05 * p.R,
-            "nLoadingNodes": 40,
-            "tipGap": "inf",
-            "bladeLineChord": 0.0,
+            "rotationDirectionRule": "rightHand" if p.sense > 0 else "leftHand", "axisOfRotation": [0, 0, 1],
+            "centerOfRotation": [0, 0, 0], "numberOfBlades": p.blades, "radius": p.R,
+            "omega": p.omega / p.a_sound, "chordRef": float(np.interp(0.75 * p.R, p.r, p.chord)),
+            "thickness": 0.05 * p.R, "nLoadingNodes": 40, "tipGap": "inf", "bladeLineChord": 0.0,
             "initialBladeDirection": [1, 0, 0],
             "twists": [{"radius": float(r), "twist": float(np.degrees(b))} for r, b in zip(p.r, p.beta, strict=True)],
             "chords": [{"radius": 0.0, "chord": 0.0}, {"radius": p.Rhub * 0.999, "chord": 0.0}]
@@ -130,7 +123,7 @@ class Flow360Export(DiskExport):
             "MachNumbers": f.M.tolist(),
             "ReynoldsNumbers": Re.tolist(),
             "alphas": degrees.tolist(),
-        }
+        }  # fmt: skip
         scales = {
             "grid_unit_m": 1.0, "a_sound_m_s": p.a_sound, "density_kg_m3": p.rho, "viscosity_Pa_s": p.mu,
             "rpm": p.rpm, "airspeed_m_s": p.airspeed_m_s, "rotor_thrust_N": p.thrust_N, "torque_Nm": p.torque_Nm,

@@ -297,9 +297,8 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
             hint = f"Formats that read it: {', '.join(readers) or 'none here'}"
             faults.append(Fault("", _option(key), shown(value).strip("'"), wanted, hint))
     if hold and all(exports()[name].kind == "solid" for name in formats):
-        faults.append(
-            Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")
-        )
+        fault = Fault("", "--hold", ", ".join(hold), "a format of loads, disks or blades", "Solids hold no loads")
+        faults.append(fault)
     faults += [
         Fault("", "--hold", repr(word), f"one of {', '.join(FEATURES)}") for word in hold if word not in FEATURES
     ]

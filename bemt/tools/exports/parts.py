@@ -78,9 +78,8 @@ def hub_of(case: Case, table: Performance) -> HubTable:
     if bad.any():
         at = np.argwhere(bad)[0]
         where = f"{rpm[at[0]]:.0f} rev/min, J {J[at[1]]:.2g} along and {side[at[2]]:.2g} across the shaft"
-        raise InputError(
-            Fault(case.path.as_posix(), where, "not converged", "a converged point", "Nothing was written")
-        )
+        fault = Fault(case.path.as_posix(), where, "not converged", "a converged point", "Nothing was written")
+        raise InputError(fault)
     for k in range(1, side.size):
         values[..., k] = np.where(np.isnan(values[..., k]), values[..., k - 1], values[..., k])
     return HubTable(rpm, J, side, np.nan_to_num(values))

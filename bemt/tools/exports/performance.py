@@ -117,16 +117,14 @@ class Performance:
         """Where the table holds, for the manifest."""
         n = self.rpm / 60.0
         return {
-            "rpm": [float(self.rpm[0]), float(self.rpm[-1])],
-            "J": [float(self.J[0]), float(self.J[-1])],
+            "rpm": [float(self.rpm[0]), float(self.rpm[-1])], "J": [float(self.J[0]), float(self.J[-1])],
             "J_zero_thrust": [float(self.J_zero[0]), float(self.J_zero[-1])],
             "airspeed_m_s_of_zero_thrust_at_greatest_rpm": float(self.J_zero[-1] * n[-1] * self.diameter_m),
             "tip_mach_greatest": float(np.pi * n[-1] * self.diameter_m / self.a_sound),
-            "density_kg_m3": self.rho,
-            "diameter_m": self.diameter_m,
+            "density_kg_m3": self.rho, "diameter_m": self.diameter_m,
             "airspeed_m_s_greatest": float(self.J[-1] * n[0] * self.diameter_m),
             "flight": "J from 0 to zero thrust; axial flow, steady; doubtful in descent and as a windmill",
-        }
+        }  # fmt: skip
 
 
 def table_loads(
@@ -382,9 +380,8 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
     s = solver.solve(prep, rpm, airspeed_m_s, air, radial=True)
     if not s.converged[0]:
         got = "; ".join(s.flags[0]) or "not converged"
-        raise InputError(
-            Fault(case.path.as_posix(), f"{rpm:g} rev/min, {airspeed_m_s:g} m/s", got, "a converged point")
-        )
+        fault = Fault(case.path.as_posix(), f"{rpm:g} rev/min, {airspeed_m_s:g} m/s", got, "a converged point")
+        raise InputError(fault)
     around = [e.id for e in ready.effects if e not in prep.effects]
     if around:
         raise InputError(

@@ -129,27 +129,14 @@ def source(p: Loading) -> dict[str, Any]:
     profiles: dict[str, Any] = {"none": _constant(0.0, 0.0)}
     profiles |= {f"s{i}": _constant(a, b) for i, (a, b) in enumerate(zip(cl, cd, strict=True))}
     return {
-        "type": "rotorDisk",
-        "selectionMode": "cellZone",
-        "cellZone": "rotorDisk",
-        "fields": "(U)",
-        "nBlades": p.blades,
-        "tipEffect": 1.01,
-        "inletFlowType": "fixed",
-        "inletVelocity": vector(0.0, 0.0, -p.airspeed_m_s),
-        "geometryMode": "specified",
-        "origin": "(0 0 0)",
-        "axis": "(0 0 1)",
-        "refDirection": "(1 0 0)",
-        "rpm": f"{p.rpm:.12g}",
-        "trimModel": "fixedTrim",
-        "rhoRef": f"{p.rho:.9g}",
-        "rhoInf": 1,
-        "fixedTrimCoeffs": {"theta0": 0, "theta1c": 0, "theta1s": 0},
-        "flapCoeffs": {"beta0": 0, "beta1c": 0, "beta2s": 0},
-        "blade": {"data": f"({' '.join(rows)})"},
+        "type": "rotorDisk", "selectionMode": "cellZone", "cellZone": "rotorDisk", "fields": "(U)",
+        "nBlades": p.blades, "tipEffect": 1.01, "inletFlowType": "fixed",
+        "inletVelocity": vector(0.0, 0.0, -p.airspeed_m_s), "geometryMode": "specified", "origin": "(0 0 0)",
+        "axis": "(0 0 1)", "refDirection": "(1 0 0)", "rpm": f"{p.rpm:.12g}", "trimModel": "fixedTrim",
+        "rhoRef": f"{p.rho:.9g}", "rhoInf": 1, "fixedTrimCoeffs": {"theta0": 0, "theta1c": 0, "theta1s": 0},
+        "flapCoeffs": {"beta0": 0, "beta1c": 0, "beta2s": 0}, "blade": {"data": f"({' '.join(rows)})"},
         "profiles": profiles,
-    }
+    }  # fmt: skip
 
 
 def _constant(cl: float, cd: float) -> dict[str, str]:
