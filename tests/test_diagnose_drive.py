@@ -23,7 +23,7 @@ def run(seed: int, factor: float = 1.0, bow: float = 0.0) -> Record:
     return from_series(replace(series, values={**series.values, "pulse_width_s": pulse, "pwm_s": pulse}), case())
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
 def test_the_scatter_of_a_speed_follows_nothing(seed: int) -> None:
     """Five pulse widths, again and again: readings of 0.1 % are no law over the speed that was read."""
     pulse = np.tile(np.linspace(0.0014, 0.0019, 5), 12)
