@@ -82,8 +82,9 @@ def build(records: Sequence[Record], cases: Sequence[Case], baseline: str = "bem
         whose = "the reference" if part.record.reference else "the recording"
         for words in _outside(part, groups[key][0]):
             outside.setdefault(words, []).append(whose)
+    same = (words for c in chosen for words in c.as_built().no_check) if baseline == "bemt" else ()
     validity = tuple(_of(" and ".join(dict.fromkeys(whose)), words) for words, whose in outside.items())
-    return replace(problem, between=(*odd, *found), validity=validity)
+    return replace(problem, between=(*odd, *found), validity=validity, no_check=tuple(dict.fromkeys(same)))
 
 
 def _of(whose: str, words: str) -> str:

@@ -96,7 +96,7 @@ def document(d: Diagnosis) -> dict[str, Any]:
         "headline": headline(d),
         "findings": list(d.problem.findings),
         "notes": list(d.problem.notes),
-        "validity": list(d.problem.validity),
+        "validity": [*d.problem.no_check, *d.problem.validity],
         "readings": int(d.problem.y.size),
         "explanation": " ".join(line.strip() for line in explanation(d)),
     }  # fmt: skip
@@ -205,7 +205,8 @@ def _odds(told: Size) -> str:
 def explanation(d: Diagnosis) -> list[str]:
     """Say the answer in a few sentences."""
     decision, catalogue = d.said, effects.catalogue()
-    lines = [headline(d), *(f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note)]
+    lines = [headline(d), *(f"{words[:1].upper()}{words[1:]}." for words in d.problem.no_check)]
+    lines += [f"Before any physics: {note}." for note in d.problem.notes if NO_SPEED in note]
     lines += [f"Before any physics: {f}" for f in d.problem.findings[:_FINDINGS]]
     if len(d.problem.findings) > _FINDINGS:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."

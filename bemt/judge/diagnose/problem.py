@@ -182,6 +182,7 @@ class Problem:
     notes: tuple[str, ...] = ()  # What was assumed or left out
     # Where the recording leaves what the solver was measured against, or its method, in the words of every command
     validity: tuple[str, ...] = ()
+    no_check: tuple[str, ...] = ()  # Readings that the rotor of a case was fitted to
     between: tuple[str, ...] = ()  # What looks wrong in a recording beside the others, its file named in front
     # Scatter of repeats as a share of the median reading, by channel, where there are enough of them [1]
     scatter: dict[str, float] = field(default_factory=dict)
