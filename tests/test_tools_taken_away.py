@@ -23,6 +23,7 @@ CALLS = {
 """An action of each tool."""
 SWEEP = ["sweep", "cases/prop_8x5", "cases/ds30", "--json"]
 """The second case has a drive."""
+MISSED = "The {0} tool is not installed: put the folder bemt/tools/{0} back"
 DIAGNOSE = ["diagnose", "reports/diagnosis/cfd_plate.csv", "--reference", "reports/diagnosis/cfd_reference.csv",
             "--case", "cases/prop_8x5", "--json"]  # fmt: skip
 
@@ -65,10 +66,6 @@ def without(tools: set[str], project: Path, folder: Path) -> Path:
     return folder
 
 
-def sentence(tool: str) -> str:
-    return f"The {tool} tool is not installed: put the folder bemt/tools/{tool} back"
-
-
 def rows_and_notes(swept: str) -> tuple[list[object], list[str]]:
     """Rows of a sweep, and what it notes on tools."""
     document = json.loads(swept)
@@ -106,10 +103,10 @@ def test_the_rest_runs_on_without_tools(
     rows, notes = rows_and_notes(swept[1])
     assert (rows, json.loads(told[1])["ranking"]) == whole
     assert len(notes) == ("drive" in tools), "said where a case has a drive"
-    assert all(sentence("drive") in note for note in notes)
+    assert all(MISSED.format("drive") in note for note in notes)
     assert reported[0] == 0 and (folder / "report" / "report.html").is_file(), reported[2]
     for tool, (code, _, warned) in zip(tools, calls, strict=True):
-        assert code == 2 and warned.startswith(sentence(tool)) and len(warned.splitlines()) == 1
+        assert code == 2 and warned.startswith(MISSED.format(tool)) and len(warned.splitlines()) == 1
 
 
 @pytest.mark.parametrize("tool", ALL)
@@ -119,9 +116,9 @@ def test_without_one_tool_a_sweep_goes_on_and_what_is_missed_is_named(
     folder = without({tool}, project, tmp_path)
     helped, missed, swept = run(folder, ["--help"], CALLS[tool], SWEEP[:1] + SWEEP[2:])
     assert helped[0] == 0
-    assert missed[0] == 2 and missed[2].startswith(sentence(tool)) and len(missed[2].splitlines()) == 1
+    assert missed[0] == 2 and missed[2].startswith(MISSED.format(tool)) and len(missed[2].splitlines()) == 1
     rows, notes = rows_and_notes(swept[1])
-    assert rows == whole[0][1:] and len(notes) == (tool == "drive") and all(sentence("drive") in n for n in notes)
+    assert rows == whole[0][1:] and len(notes) == (tool == "drive") and all(MISSED.format("drive") in n for n in notes)
 
 
 def test_a_target_of_another_tool_is_missed_by_name(project: Path, tmp_path: Path) -> None:
