@@ -56,10 +56,9 @@ def book_html(book: Book) -> str:
 
     about, only = book.about, book.cases
     made = " · ".join(filter(None, (about.author, about.date, about.revision)))
-    lead = (
-        "Propellers and ducted fans: blade element momentum theory, the K1/K2 formula, CFD, bench and vendor data. "
-        "Nothing here is fitted to the value it is compared with."
-    )
+    lead = "Propellers and ducted fans: blade element momentum theory, the K1/K2 formula, CFD, bench and vendor data."
+    if not any(case.result.no_check for case in only):
+        lead += " Nothing here is fitted to the value it is compared with."
     foot = (
         f"Made by bemt {book.version}. Thrust in newtons, CT = T/(ρ n² D⁴), CP = P/(ρ n³ D⁵). "
         "Colours after Okabe and Ito. This file loads nothing from the network."
