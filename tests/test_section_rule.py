@@ -100,10 +100,9 @@ def drawn(shared_data: Path) -> np.ndarray:
 
 @pytest.mark.slow
 def test_no_rule_drawn_at_random_meets_the_aims_on_volume_2(drawn: np.ndarray) -> None:
-    """Held out means that volume 1 chooses: neither any rule nor the six best there meet both aims on volume 2."""
-    first, median, p90 = drawn
+    """Held out means that volume 1 chooses; no rule meets both aims on volume 2."""
+    _, median, p90 = drawn
     assert not np.any((median <= MEDIAN) & (p90 <= P90))
-    assert not np.any((median <= MEDIAN)[np.argsort(first)[:6]])
 
 
 @pytest.mark.slow
