@@ -82,13 +82,10 @@ def test_what_lies_within_the_recordings_own_uncertainty_is_not_named(project: P
 TRUE = {"prop_8x5_pipe": {"duct"}, "prop_8x5_duct": {"duct"}, "prop_8x5_pitch": {"pitch_offset"}}
 
 
-@pytest.mark.slow
-def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
-    """Every converged run beside its case, with or without effects of the Mach number as it was run.
-
-    What is named are effects that these loads cannot tell apart: wrong is a name without the true one among them.
-    """
-    said = {}
+@pytest.fixture(scope="module")
+def named(project: Path) -> list[tuple[str, set[str], set[str]]]:
+    """Every converged run beside its case, with or without effects of the Mach number: run, named and true causes."""
+    told = []
     for path in sorted((project / "reports" / "cfd").glob("*/radial.csv")):
         campaign = load_campaign(path.with_name("campaign.toml"))
         with path.with_name("recording.csv").open(encoding="utf-8") as stream:
@@ -97,10 +94,21 @@ def test_our_campaigns_name_nothing_wrong(project: Path) -> None:
         for solved, off in (("compressible", []), ("incompressible", ["compressibility", "drag_divergence"])):
             case = campaign.case.replaced({"model.effects_off": off})
             for run, found in along(case, path).items():
-                true = TRUE.get(path.parent.name, set())
-                if solver_of[run] == solved and found.named and not true & set(found.named):
-                    said[f"{path.parent.name} {run}"] = found.named
-    assert not said
+                if solver_of[run] == solved:
+                    true = TRUE.get(path.parent.name, set())
+                    told.append((f"{path.parent.name} {run}", set(found.named), true))
+    return told
+
+
+@pytest.mark.slow
+def test_our_campaigns_name_the_cause_among_what_looks_alike(named: list[tuple[str, set[str], set[str]]]) -> None:
+    assert not [one for one in named if one[1] and not one[1] & one[2]]
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="the turned blade is named with the section, which looks alike")
+def test_our_campaigns_name_nothing_wrong(named: list[tuple[str, set[str], set[str]]]) -> None:
+    assert not [one for one in named if not one[1] <= one[2]]
 
 
 def test_a_file_without_its_columns_is_refused(tmp_path: Path) -> None:

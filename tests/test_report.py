@@ -462,13 +462,13 @@ def test_like_stands_beside_like_where_the_recording_is_at_another_speed() -> No
         Row("bemt", "bemt", 4.751, rpm=6000.0, airspeed_m_s=0.0, u=0.4),
         Row("cfd", "cfd 5.250 N", 5.25, rpm=6000.0, airspeed_m_s=0.0, bemt_error_pct=-9.5),
     )
-    line = Comparison(reference="cfd 5.250 N", source="cfd", S=4.751, D=5.25, u_input=0.4)
+    line = Comparison(reference="cfd 5.250 N", source="cfd", S=4.751, D=5.25, u_input=0.4, rpm=6000.0)
     result = Result("one", rows=rows, comparisons=(line,))
     told = [answer(result), verdict(result)[2], summary(Book("0", (CasePage(result),), (), 0))]
     for text in told:
         assert "4.751" in text and "6000" in text and "11.0" not in text and "9000" not in text
     bench = Row("bench", "bench 10 N", 10.0, rpm=9000.0, airspeed_m_s=0.0)
-    second = Comparison(reference="bench 10 N", source="bench", S=11.01, D=10.0)
+    second = Comparison(reference="bench 10 N", source="bench", S=11.01, D=10.0, rpm=9000.0)
     at_both = replace(result, rows=(*rows, bench), comparisons=(line, second))
     assert "BEMT 11.01" in answer(at_both) and "CFD 5.25 N at 6000 rev/min" in answer(at_both)
 

@@ -37,7 +37,7 @@ THICKNESSES = (0.01, 0.5)
 """Thicknesses that a case takes, of the chord."""
 
 
-class Stations(NamedTuple):
+class BladeStations(NamedTuple):
     """Stations of a blade, ascending; (N,) each. `left` says of each column that is not used why."""
 
     r_R: Array
@@ -115,7 +115,7 @@ def _hint(headings: Sequence[str], lacking: Sequence[str]) -> str:
     return _TWIST if "beta" in lacking and any("twist" in plain(h).split() for h in headings) else ""
 
 
-def read_stations(path: Path, R: float) -> Stations:
+def read_stations(path: Path, R: float) -> BladeStations:
     """Stations of a table for a tip radius [m], other columns are named; faults carry line and column.
 
     Cells are parted by commas, semicolons, tabs or blanks; decimal commas are read where they can be nothing else. A
@@ -173,7 +173,7 @@ def read_stations(path: Path, R: float) -> Stations:
         thick = None
     used = {p.at for p in places} | {c.at for c in by_name["thickness"]}
     left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
-    return Stations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
+    return BladeStations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
 
 
 def _thickness(table: SplitTable, columns: Sequence[_Column], decimal: str) -> tuple[Array | None, list[str]]:

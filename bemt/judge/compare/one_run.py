@@ -28,6 +28,7 @@ from bemt.data.recordings.cfd_run import is_run, run_at
 from bemt.data.recordings.cfd_setup import audit_of, conditions_of, faults_first, floor_note, grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
+from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.conditioning import STAND
@@ -41,7 +42,6 @@ _KIND = {"thrust_N": "force", "torque_Nm": "torque"}
 _ROWS = 6  # points on one screen
 _WIDE = 2.0  # combined standard uncertainties within which nothing is shown to differ
 _NEAR_ZERO = 0.1  # share of the largest value of a load below which a difference has no per cent
-_NO_ROTOR = 5.0  # ratio that no rotor of a case has: even a unit that is stated may be wrong
 _FAR = 1.5  # ratio of the loads beyond which a slip is likelier than physics
 _NAMES = {"program": "", "cells": "cells", "grid_level": "grid", "turbulence": "", "solver": "", "domain": "domain"}
 
@@ -253,7 +253,8 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
         return math.inf, ""
     wide = np.array([math.hypot(load.u_cfd / load.cfd if math.isfinite(load.u_cfd) else 0.0,
                                 load.u_bemt / load.bemt, 0.02) for load in said])  # fmt: skip
-    may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > _NO_ROTOR)
+    # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
+    may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > FACTOR)
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may
             if np.all((far := np.abs(np.log(off / e.factor)) / wide) < 1.0)]  # fmt: skip
     if not near:

@@ -226,8 +226,7 @@ def _validation(result: Result) -> Section:
     rows: list[Sequence[object]] = []
     for c in sorted(found, key=lambda c: list(MODELS).index(c.model) if c.model in MODELS else len(MODELS)):
         kind, word = stand(c)
-        at = result.row_of(c) or result.first("bemt")
-        rows.append([MODELS.get(c.model, c.model), c.reference, num(at and at.rpm, 6), _quantity(c), num(c.S), num(c.D),
+        rows.append([MODELS.get(c.model, c.model), c.reference, num(c.rpm, 6), _quantity(c), num(c.S), num(c.D),
                      num(c.E_pct, signed=True), *(num(getattr(c, u), 2, none="unknown") for u in us),
                      Cell(word, badge=kind)])  # fmt: skip
     words = (

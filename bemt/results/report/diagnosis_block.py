@@ -62,31 +62,29 @@ def _thrusts(result: Result) -> list[Comparison]:
     return [c for source in NAMES for c in lines if c.source == source]
 
 
-def beside(row: Row, other: Row) -> bool:
-    """Whether two values are of one speed of rotation and one airspeed."""
-    return not (abs(row.rpm - other.rpm) > 1e-6 * other.rpm or abs(row.airspeed_m_s - other.airspeed_m_s) > 1e-9)
+def beside(one: Row | Comparison, other: Row | Comparison) -> bool:
+    """Whether two values are of one speed of rotation and one airspeed; what states none is of the point shown."""
+    return not (abs(one.rpm - other.rpm) > 1e-6 * other.rpm or abs(one.airspeed_m_s - other.airspeed_m_s) > 1e-9)
 
 
 def lead(result: Result) -> Row | None:
     """BEMT at the point that a front page shows: the case's own, else that of the first recorded thrust."""
-    own = result.first("bemt")
-    at = [row for c in _thrusts(result) if (row := result.row_of(c) or own)]
-    if own is None or not at or any(beside(row, own) for row in at):
+    own, recorded = result.first("bemt"), _thrusts(result)
+    if own is None or not recorded or any(beside(c, own) for c in recorded):
         return own
-    return next((row for row in result.of("bemt") if beside(row, at[0])), own)
+    return next((row for row in result.of("bemt") if beside(row, recorded[0])), own)
 
 
-def _at(row: Row | None) -> str:
+def _at(value: Row | Comparison | None) -> str:
     """The speeds of a value: " at 6000 rev/min, 5 m/s"."""
-    if row is None or not _finite(row.rpm):
+    if value is None or not _finite(value.rpm):
         return ""
-    return f" at {row.rpm:.6g} rev/min" + (f", {row.airspeed_m_s:.4g} m/s" if row.airspeed_m_s > 0.0 else "")
+    return f" at {value.rpm:.6g} rev/min" + (f", {value.airspeed_m_s:.4g} m/s" if value.airspeed_m_s > 0.0 else "")
 
 
-def _elsewhere(result: Result, c: Comparison, at: Row) -> str:
+def _elsewhere(c: Comparison, at: Row) -> str:
     """The speeds of a comparison that is not at a point; nothing of one that is."""
-    row = result.row_of(c)
-    return "" if row is None or beside(row, at) else _at(row)
+    return "" if beside(c, at) else _at(c)
 
 
 def _solved(result: Result) -> Row | tuple[str, str, str]:
@@ -115,7 +113,7 @@ def verdict(result: Result) -> tuple[str, str, str]:
     lines = _thrusts(result)
     if not lines:
         return "unknown", NOTHING_RECORDED, f"{words}. There is no recorded thrust to compare it with."
-    parts = [f"{c.reference}{_elsewhere(result, c, row)}{f' {c.E_pct:+.1f} %' if c.D else ''}" for c in lines]
+    parts = [f"{c.reference}{_elsewhere(c, row)}{f' {c.E_pct:+.1f} %' if c.D else ''}" for c in lines]
     told = [f"{words}. Difference from {'; '.join(parts)}."]
     far = [c for c in lines if c.state == "differs"]
     if far:
@@ -127,7 +125,7 @@ def verdict(result: Result) -> tuple[str, str, str]:
     told += _open(lines)
     told += [f"Flagged: {flag}." for flag in row.flags]
     told += _no_check(result)
-    here = [c for c in lines if not _elsewhere(result, c, row)]
+    here = [c for c in lines if not _elsewhere(c, row)]
     main = next(iter([*far, *(c for c in lines if c.state == "agrees"), *here, *lines]))
     return (*stand(main), " ".join(told))
 
@@ -162,7 +160,7 @@ def answer(result: Result) -> str:
     if isinstance(own, tuple):
         return own[2]
     band = f" ± {_n(own.u, 2)}" if _finite(own.u) else ""
-    lines = sorted(_thrusts(result), key=lambda c: bool(_elsewhere(result, c, own)))
+    lines = sorted(_thrusts(result), key=lambda c: bool(_elsewhere(c, own)))
     if not lines:
         power = f", {_n(own.power_W)} W at the shaft" if _finite(own.power_W) else ""
         return f"BEMT {_n(own.thrust_N, 4)}{band} N{power}{_at(own)}; nothing is recorded to compare it with."
@@ -170,14 +168,14 @@ def answer(result: Result) -> str:
     name = NAMES[c.source]
     share = f" (BEMT {c.E_pct:+.1f} %)" if c.D else ""
     band = f" ± {_n(c.known, 2)}" if _finite(c.known) else ""
-    head = f"BEMT {_n(c.S, 4)}{band} N, {name} {_n(c.D, 4)} N{share}{_at(result.row_of(c) or own)}"
+    head = f"BEMT {_n(c.S, 4)}{band} N, {name} {_n(c.D, 4)} N{share}{_at(c) or _at(own)}"
     told = [f"{head}: {_hangs(c, name)}{_audited(result, c)}."]
     seen = {(c.source, _n(c.D, 3))}
     rest: dict[str, list[str]] = {}
     for c in lines[1:]:
         if (key := (c.source, _n(c.D, 3))) not in seen:
             seen.add(key)
-            rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N{_elsewhere(result, c, own)}")
+            rest.setdefault(stand(c)[1], []).append(f"{NAMES[c.source]} {key[1]} N{_elsewhere(c, own)}")
     told += [f"{', '.join(names)}: {words}." for words, names in rest.items()]
     told += _no_check(result)
     return " ".join(t[:1].upper() + t[1:] for t in told)

@@ -45,6 +45,8 @@ class Comparison(Documented):
     u_D: float = math.nan
     u_val: float = field(default=math.nan, kw_only=True)  # Of both sides, follows likewise
     doubts: tuple[str, ...] = ()  # Flags for which agreement means little here
+    rpm: float = math.nan
+    airspeed_m_s: float = math.nan
 
     def __post_init__(self) -> None:
         """Fill in what follows; a stored line keeps what was computed before its parts were rounded."""
@@ -337,13 +339,6 @@ class Result(Documented):
     def first(self, source: str) -> Row | None:
         """First row of a source, None where there is none."""
         return next(iter(self.of(source)), None)
-
-    def row_of(self, c: Comparison) -> Row | None:
-        """Recorded row of a comparison; None of one that a report added."""
-        rows = [row for row in self.all_rows if (row.label, row.source) == (c.reference, c.source)]
-        key = c.quantity if c.quantity in ("CT", "CP") else "bemt_error_pct"  # a label may stand at several points
-        value = c.D if key == c.quantity else c.E_pct
-        return min(rows, key=lambda row: abs((getattr(row, key) or math.nan) - value), default=None)
 
     def audit_of(self, reference: str) -> Audit | None:
         """Audit of one recorded value."""

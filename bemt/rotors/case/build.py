@@ -21,7 +21,7 @@ from geometry.laws import from_laws
 from geometry.rotor import Blade, Rotor, from_stations
 
 if TYPE_CHECKING:
-    from bemt.data.readers.stations import Stations
+    from bemt.data.readers.stations import BladeStations
 
 T = TypeVar("T")
 
@@ -105,26 +105,26 @@ def _bent(case: CaseFile, blade: Blade) -> Blade:
     return replace(blade, sweep=sweep * grown, rake=rake * grown)
 
 
-def _stations(case: CaseFile, path: Path) -> Stations:
+def _stations(case: CaseFile, path: Path) -> BladeStations:
     """Stations of whichever file of stations the case names."""
     key = next(k for k in ("stations", "uiuc", "apc") if getattr(case.blade, k) is not None)  # a rule of the file
     return stations_in(path.parent / getattr(case.blade, key), 0.5 * case.rotor.diameter_m, key)
 
 
-def stations_in(file: Path, R: float, key: str) -> Stations:
+def stations_in(file: Path, R: float, key: str) -> BladeStations:
     """Stations of a file, by the key of [blade] that names it; tip radius in m."""
-    from bemt.data.readers.stations import Stations, read_stations
+    from bemt.data.readers.stations import BladeStations, read_stations
 
     if key == "uiuc":
         from bemt.data.readers.uiuc_tables import read_geometry
 
         table = read_geometry(file)
-        return Stations(table.r_R, table.c_R, np.radians(table.beta_deg))
+        return BladeStations(table.r_R, table.c_R, np.radians(table.beta_deg))
     if key == "apc":
         from bemt.data.readers.apc import read_pe0
 
         apc = read_pe0(file)
-        return Stations(apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad, apc.t_c)
+        return BladeStations(apc.r_m / apc.radius_m, apc.chord_m / apc.radius_m, apc.beta_rad, apc.t_c)
     return read_stations(file, R)
 
 

@@ -34,7 +34,7 @@ from geometry.common import GeometryError
 from geometry.designation import Designation, parse_designation
 
 if TYPE_CHECKING:
-    from bemt.data.readers.stations import Stations
+    from bemt.data.readers.stations import BladeStations
 
 TIP_SPEED = 120.0
 """Speed of the blade tips at the operating point of a new case, for want of a better one. [m/s]"""
@@ -253,7 +253,7 @@ def _series(told: Designation | None, family: str | None) -> str:
 def stations_text(
     file: str, diameter_m: float, blades: int, rpm: float | None = None, airspeed_m_s: float = 0.0,
     hub_ratio: float = 0.15, key: str = "stations", label: Designation | None = None, family: str | None = None,
-    motor: tuple[float, int] | None = None, name: str = "", found: Stations | None = None,
+    motor: tuple[float, int] | None = None, name: str = "", found: BladeStations | None = None,
 ) -> str:  # fmt: skip
     """Write the case of a blade whose chord and angle stand in a file beside it, with what its label says if known.
 
@@ -352,7 +352,7 @@ recovery = 0.8
 _FEW = 5
 
 
-def of_stations(file: Path, diameter_m: float) -> tuple[float, str, Stations]:
+def of_stations(file: Path, diameter_m: float) -> tuple[float, str, BladeStations]:
     """Hub ratio, key of [blade] of a file of stations (a table in any dialect, or one of UIUC or APC), and them."""
     from bemt.rotors.case.build import key_of, stations_in
 

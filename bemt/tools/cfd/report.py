@@ -261,7 +261,8 @@ def _with_own(page: CasePage, found: Sequence[Runs]) -> CasePage:
     share = run.audit.u_relative if run.audit else math.nan
     u_num, u_input, u_model = (math.nan if u is None else u for u in (bemt.u_num, bemt.u_input, bemt.u_model))
     line = Comparison("bemt", f"own CFD, {run.solver}", "openfoam", "thrust_N", "N", bemt.thrust_N, run.thrust_N, u_num,
-                      u_input, u_model, abs(run.thrust_N) * share, tuple(serious(bemt.flags)))  # fmt: skip
+                      u_input, u_model, abs(run.thrust_N) * share, tuple(serious(bemt.flags)), bemt.rpm,
+                      bemt.airspeed_m_s)  # fmt: skip
     return replace(page, result=replace(result, comparisons=(*result.comparisons, line)))
 
 

@@ -240,38 +240,6 @@ class Steady:
     converged: NDArray[np.bool_]  # (N,) false where the rotor table does not reach; values there are NaN
 
 
-def falls_through_zero(f: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Where a falling function is zero between `low` and `high`, each element for itself, to the last bits, (N,).
-
-    Inverse quadratic interpolation where it is safe, else bisection (T. R. Chandrupatla, Advances in Engineering
-    Software 28, 1997, 145; as in P. O. J. Scherer, Computational Physics, 2nd ed., 2013, section 6.1.7.3).
-
-    >>> falls_through_zero(lambda x: 2.0 - x**2, np.zeros(2), np.array([2.0, 9.0])).round(12).tolist()
-    [1.414213562373, 1.414213562373]
-    """
-    a, b, fa, fb = high, low, f(high), f(low)
-    c, fc, t = a, fa, np.full(np.shape(a), 0.5)
-    out, found = np.where(fb <= 0.0, b, a), (fb <= 0.0) | (fa >= 0.0)
-    for _ in range(200):
-        x = a + t * (b - a)
-        fx = f(x)
-        same = (fx > 0.0) == (fa > 0.0)
-        c, fc, b, fb = np.where(same, a, b), np.where(same, fa, fb), np.where(same, b, a), np.where(same, fb, fa)
-        a, fa = x, fx
-        best = np.where(np.abs(fa) < np.abs(fb), a, b)
-        near = 2.0 * np.finfo(float).eps * np.abs(best)
-        done = ~found & ((np.abs(b - a) <= 2.0 * near) | (fa == 0.0))
-        out, found = np.where(done, best, out), found | done
-        if np.all(found):
-            break
-        with np.errstate(divide="ignore", invalid="ignore"):
-            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-            curve = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-            least = near / np.abs(b - a)
-            t = np.where((phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi), np.clip(curve, least, 1.0 - least), 0.5)
-    return out
-
-
 @dataclass(frozen=True)
 class Drive:
     """One battery share, ESC, motor and rotor."""
@@ -339,21 +307,23 @@ class Drive:
 
         Motor torque falls with speed and rotor torque rises: one root, between rest and twice the speed at no load.
         """
+        from scipy.optimize.elementwise import find_root
+
         pulse, charge, warm = np.broadcast_arrays(
             np.atleast_1d(np.asarray(pulse_us, dtype=float)),
             np.asarray(soc, dtype=float),
             np.asarray(self.motor.ambient_C if temperature_C is None else temperature_C, dtype=float),
         )
         voc, duty = self.battery.voc(charge), self.esc.duty(pulse)
-        k = self.motor.k(warm)
 
-        def surplus(omega: Array) -> Array:
+        def surplus(omega: Array, duty: Array, voc: Array, warm: Array) -> Array:
             amps, _, _ = self.currents(duty, omega, voc, warm)
-            return np.asarray(k * (amps - self.motor.no_load_A) - self.rotor.torque(omega))
+            return np.asarray(self.motor.k(warm) * (amps - self.motor.no_load_A) - self.rotor.torque(omega))
 
         rest = np.zeros(pulse.shape)
-        still = surplus(rest) <= 0.0
-        omega = np.where(still, 0.0, falls_through_zero(surplus, rest, 2.0 * voc / k))
+        still = surplus(rest, duty, voc, warm) <= 0.0
+        found = find_root(surplus, (rest, 2.0 * voc / self.motor.k(warm)), args=(duty, voc, warm))
+        omega = np.where(still, 0.0, np.where(found.success, found.x, np.nan))
         amps, bus, used = self.currents(duty, omega, voc, warm)
         amps, bus = np.where(still, 0.0, amps), np.where(still, self.esc.idle_A, bus)
         inside = omega <= self.rotor.omega_max * (1.0 + 1e-9)
