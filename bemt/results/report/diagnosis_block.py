@@ -154,7 +154,7 @@ def answer(result: Result) -> str:
     >>> cfd = Comparison(source="cfd", reference="cfd", S=119.1, D=104.9, u_num=0.1, u_input=13.0)
     >>> audit = Audit("cfd", (), math.nan, 0.041)
     >>> answer(Result("mine", rows=(Row("bemt", "bemt", 119.1, u=13.0),), comparisons=(cfd,), audit=(audit,)))
-    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; by our audit the recording itself is off by 4 % or more (that of its grid is not known).'
+    'BEMT 119.1 ± 13 N, CFD 104.9 N (BEMT +13.5 %): they agree if the CFD is uncertain by 5.4 % or more; by our audit the recording itself is off by 4 % or more (the error of its grid is not known).'
     """  # noqa: E501
     own = _solved(result)
     if isinstance(own, tuple):
@@ -203,7 +203,7 @@ def _audited(result: Result, c: Comparison) -> str:
         return ""
     lines = audit.lines if audit else ()
     grid = next((line.u_relative for line in lines if line.topic == "grid study"), math.nan)
-    rest = f"the grid alone makes {100.0 * grid:.1g} %" if _finite(grid) else "that of its grid is not known"
+    rest = f"the grid alone makes {100.0 * grid:.1g} %" if _finite(grid) else "the error of its grid is not known"
     return f"; by our audit the recording itself is off by {100.0 * share:.1g} % or more ({rest})"
 
 
