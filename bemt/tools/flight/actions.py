@@ -160,25 +160,53 @@ def fly(
     InputError
         For logs that cannot be read, another number of rotors, an unknown layout, or a mass that cannot have flown.
     """
-    from bemt.base.errors import Fault, InputError
-    from bemt.tools.flight.answer import answer_on
-
     if layout == "list":
         return Told(layouts(), "\n".join(f"{name:<14} {places}" for name, places in layouts().items()))
     given = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
-    faults = []
-    if not given:
-        faults.append(Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg"))
+    refuse(_unusable(given, healthy, out_case, case))
+    folder = any(Path(p).is_dir() for p in given)
+    answers, refused = _answers(given, _grouped(healthy), folder, mass_kg, layout, healthy_mass_kg, healthy_day)
+    if case is not None:
+        answers = [_with_model(answer, os.fspath(case)) for answer in answers]
+    learnt, converged = "", True
+    if out_case is not None:
+        learnt, converged = _learn(answers, os.fspath(case or ""), os.fspath(out_case), mass_kg)
+    out = FlightsAnswer(tuple(answers), tuple(refused), folder, learnt, converged, mass_kg)
+    if picture is not None:
+        Path(picture).write_bytes(out.figure())
+    if out_csv is not None:
+        Path(out_csv).write_text(out.csv(), encoding="utf-8")
+    return out
+
+
+def _unusable(
+    given: Sequence[StrPath], healthy: Sequence[StrPath | Sequence[StrPath]], out_case: StrPath | None,
+    case: StrPath | None,
+) -> list[Fault]:  # fmt: skip
+    """What is wrong with the words, before any log is read."""
+    from bemt.base.errors import Fault
+
+    faults = [] if given else [Fault("", "logs", "none", "a flight log", "bemt fly flight.ulg")]
     if out_case is not None and case is None:
         faults.append(Fault("--out-case", "", "no --case", "the case or label of the propeller"))
     named = [Path(p) for one in healthy for p in ([one] if isinstance(one, str | os.PathLike) else one)]
-    own = {p.resolve() for p in named if p.is_file()} & {Path(p).resolve() for p in given if Path(p).is_file()}
-    faults += [Fault(os.fspath(p), "", "a flight that is to be its own healthy flight", "other flights with --healthy",
-                     "Beside itself a flight shows nothing") for p in given if Path(p).resolve() in own]  # fmt: skip
-    refuse(faults)
-    folder = any(Path(p).is_dir() for p in given)
+    calm = {p.resolve() for p in named if p.is_file()}
+    return faults + [
+        Fault(os.fspath(p), "", "a flight that is to be its own healthy flight", "other flights with --healthy",
+              "Beside itself a flight shows nothing")
+        for p in given if Path(p).is_file() and Path(p).resolve() in calm
+    ]  # fmt: skip
+
+
+def _answers(
+    given: Sequence[StrPath], calm: Sequence[tuple[str, str]], folder: bool, mass_kg: float | None, layout: str,
+    healthy_mass_kg: float | None, healthy_day: str,
+) -> tuple[list[FlightAnswer], list[Fault]]:  # fmt: skip
+    """Answer on each log beside healthy flights and their sessions; of a folder, also what could not be read."""
+    from bemt.base.errors import InputError
+    from bemt.tools.flight.answer import answer_on
+
     mine = [f for p in given for f in _files(p)]
-    calm = _grouped(healthy)
     found, refused = _read(dict.fromkeys([*mine, *(p for p, _ in calm)]))
     strict = [f for f in refused if not folder or f.file in {p for p, _ in calm}]
     if strict or not any(p in found for p in mine):
@@ -192,25 +220,16 @@ def fly(
         day = healthy_day or (inside if any(d == inside for _, d in others) else "")
         days = [d for _, d in others] if stated else []
         try:
-            answer = answer_on(found[path], [found[p] for p, _ in others], mass_kg, layout, healthy_mass_kg,
-                               days, day)  # fmt: skip
+            answers.append(
+                answer_on(found[path], [found[p] for p, _ in others], mass_kg, layout, healthy_mass_kg, days, day)
+            )
         except InputError as error:
             if not folder:
                 raise
             refused += error.faults
-            continue
-        answers.append(_with_model(answer, os.fspath(case)) if case is not None else answer)
     if not answers:
         raise InputError(refused)
-    learnt, converged = "", True
-    if out_case is not None:
-        learnt, converged = _learn(answers, os.fspath(case or ""), os.fspath(out_case), mass_kg)
-    out = FlightsAnswer(tuple(answers), tuple(refused), folder, learnt, converged, mass_kg)
-    if picture is not None:
-        Path(picture).write_bytes(out.figure())
-    if out_csv is not None:
-        Path(out_csv).write_text(out.csv(), encoding="utf-8")
-    return out
+    return answers, refused
 
 
 _LOOSE = "files"  # session of healthy flights that are given one by one

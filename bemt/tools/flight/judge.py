@@ -8,7 +8,7 @@ evidence. :func:`bemt.judge.loss.decide` says the answer; one that names only a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 
@@ -209,67 +209,83 @@ def posterior(
 ) -> FlightPosterior:  # fmt: skip
     """Weigh all explanations of the features of a flight, (B,), and say the answer; arguments as of :func:`judge`."""
     B, n, beside = flight.size, len(calm), beside or BesideBalance()
-    axes, ways, known = axes_of(layout, B), directions(B, layout), layout is not None
+    axes, ways = axes_of(layout, B), directions(B, layout)
     label = np.array(days if len(days) == n else [0] * n, dtype=int)
-    worlds = _worlds(calm, axes, known, label, day)
-    blades = [i for i in ways if i.startswith(BLADE)]
-    loads = [i for i in ways if i.startswith(WEIGHT)]
-    # A damaged blade is as likely as a weight, wherever each is.
-    prior = {Explanation.of(i): 1.0 if i in blades else len(blades) / len(loads) for i in ways}
-    prior |= {Explanation.of(WIND): _USUAL} if windy else {}
-    prior |= {Explanation.of(WEAK + str(k)): LEFT_OUT for k in beside.slower}
-    prior |= {Explanation.of(_shaking(k)): LEFT_OUT for k in beside.shaken}
-    prior |= {Explanation.of(_worn(k)): 1.0 for k in beside.shaken}
-    total = sum(prior.values())
-    prior = {e: PRIOR["single"] * w / total for e, w in prior.items()}
-    both = [Explanation.of(i, j) for i, j in combinations(blades, 2)]
-    prior |= {e: PRIOR["pair"] / len(both) for e in both}
+    worlds = _worlds(calm, axes, layout is not None, label, day)
+    prior = _priors(ways, windy, beside)
+    seen = _factors([NONE, UNKNOWN, *prior], beside)
     weight: dict[Explanation, list[float]] = {}
     found: dict[Explanation, tuple[float, FlightEvidence]] = {}
-    seen = _factors([NONE, UNKNOWN, *prior], beside)
-
-    def add(e: Explanation, p: float, log: float, factor: float) -> None:
-        weight.setdefault(e, []).append(float(np.log(p)) + log + factor)
-
     for w in worlds:
-        total, sd, z = np.isfinite(w.total), w.sd, (flight @ axes.T - w.mean) / w.sd
-        if total:
+        sd, z = w.sd, (flight @ axes.T - w.mean) / w.sd
+        moved = {name: axes @ way for name, way in ways.items()}
+        if np.isfinite(w.total):
             sd, z = np.append(sd, w.total), np.append(z, (flight.mean() - calm.mean()) / w.total)
-        r = FlightReadings(z, sd, w.free)
-        chi2 = float(r.z @ r.z)
-        add(w.still, PRIOR["none"], w.log + r.density(chi2), seen[NONE])
-        if not w.usual:
-            continue
-        D = {name: np.append(axes @ way, [way.mean()] * int(total)) / sd for name, way in ways.items()}
-        scale = np.sqrt(np.mean([D[i] ** 2 for i in blades], axis=0) * LARGEST**2 / 3.0)
-        free = 0.5 * np.log1p(scale**2)
-        for e, p in prior.items():
-            names, v = [_as_blade(i) for i in e], None
-            if e == Explanation.of(WIND):
-                # Wind tilts the body and loads it; of yaw it knows nothing.
-                yaw = np.arange(z.size) == 2 if known and len(axes) == 3 else np.zeros(z.size, dtype=bool)
-                add(e, p, w.log + r.density(float(np.sum(z[yaw] ** 2)), float(np.sum(free[~yaw]))), seen[e])
-            elif e.pair:
-                v = r.two(*(D[i] for i in names))
-            elif names[0] in D and np.any(D[names[0]]):
-                v = r.one(D[names[0]])
-            if e in (Explanation.of(i) for k in beside.shaken for i in (_shaking(k), _worn(k))):
-                # What shakes need not move the balance.
-                add(e, p if v is None else 0.5 * p, w.log + r.density(chi2), seen[e])
-            if v is None:
-                continue
-            add(e, p, w.log + v.log, seen[e])
-            if not e.pair:
-                add(w.still, p, w.log + v.log_small, seen[NONE])
-            if e not in found or w.log + v.log > found[e][0]:
-                found[e] = w.log + v.log, v
-        add(UNKNOWN, PRIOR["unknown"], w.log + r.density(float(np.sum(r.z**2 / (1.0 + scale**2))), float(free.sum())),
-            seen[UNKNOWN])  # fmt: skip
+            moved = {name: np.append(v, ways[name].mean()) for name, v in moved.items()}
+        yaw = np.arange(z.size) == 2 if layout is not None and len(axes) == 3 else np.zeros(z.size, dtype=bool)
+        units = {name: v / sd for name, v in moved.items()}
+        for e, log, size in _weighed(w, FlightReadings(z, sd, w.free), units, prior, beside, yaw):
+            weight.setdefault(e, []).append(w.log + log + seen[NONE if e == w.still else e])
+            if size is not None and (e not in found or w.log + size.log > found[e][0]):
+                found[e] = w.log + size.log, size
     logs = {e: float(np.logaddexp.reduce(v)) for e, v in weight.items()}
     top = float(np.logaddexp.reduce(list(logs.values())))
     P = {e: float(np.exp(v - top)) for e, v in logs.items()}
     said = _said(decide(P, still=frozenset(ELSEWHERE)), P, n)
     return FlightPosterior(P, {e: v for e, (_, v) in found.items()}, said, float(np.sqrt(np.sum(worlds[0].sd ** 2))))
+
+
+def _priors(ways: Mapping[str, Array], windy: bool, beside: BesideBalance) -> dict[Explanation, float]:
+    """Prior of every single and every pair of damaged blades."""
+    blades = [i for i in ways if i.startswith(BLADE)]
+    loads = [i for i in ways if i.startswith(WEIGHT)]
+    # A damaged blade is as likely as a weight, wherever each is.
+    singles = {Explanation.of(i): 1.0 if i in blades else len(blades) / len(loads) for i in ways}
+    singles |= {Explanation.of(WIND): _USUAL} if windy else {}
+    singles |= {Explanation.of(WEAK + str(k)): LEFT_OUT for k in beside.slower}
+    singles |= {Explanation.of(_shaking(k)): LEFT_OUT for k in beside.shaken}
+    singles |= {Explanation.of(_worn(k)): 1.0 for k in beside.shaken}
+    total = sum(singles.values())
+    both = [Explanation.of(i, j) for i, j in combinations(blades, 2)]
+    return {e: PRIOR["single"] * w / total for e, w in singles.items()} | dict.fromkeys(
+        both, PRIOR["pair"] / max(len(both), 1)
+    )
+
+
+def _weighed(
+    w: _World, r: FlightReadings, D: Mapping[str, Array], prior: Mapping[Explanation, float], beside: BesideBalance,
+    yaw: Array,
+) -> Iterator[tuple[Explanation, float, FlightEvidence | None]]:  # fmt: skip
+    """Explanations in one world, each with the logarithm of prior times evidence, and its size where it has one.
+
+    ``D`` are the readings per unit of each cause, in standard deviations; ``yaw`` marks the reading that wind spares.
+    """
+    chi2 = float(r.z @ r.z)
+    yield w.still, float(np.log(PRIOR["none"])) + r.density(chi2), None
+    if not w.usual:
+        return
+    scale = np.sqrt(np.mean([v**2 for i, v in D.items() if i.startswith(BLADE)], axis=0) * LARGEST**2 / 3.0)
+    free = 0.5 * np.log1p(scale**2)
+    shakes = {Explanation.of(i) for k in beside.shaken for i in (_shaking(k), _worn(k))}
+    for e, p in prior.items():
+        names, size, log = [_as_blade(i) for i in e], None, float(np.log(p))
+        if e == Explanation.of(WIND):
+            # Wind tilts the body and loads it; of yaw it knows nothing.
+            yield e, log + r.density(float(np.sum(r.z[yaw] ** 2)), float(np.sum(free[~yaw]))), None
+        elif e.pair:
+            size = r.two(*(D[i] for i in names))
+        elif names[0] in D and np.any(D[names[0]]):
+            size = r.one(D[names[0]])
+        if e in shakes:
+            # What shakes need not move the balance.
+            yield e, log + (0.0 if size is None else float(np.log(0.5))) + r.density(chi2), None
+        if size is None:
+            continue
+        yield e, log + size.log, size
+        if not e.pair:
+            yield w.still, log + size.log_small, None
+    unlisted = r.density(float(np.sum(r.z**2 / (1.0 + scale**2))), float(free.sum()))
+    yield UNKNOWN, float(np.log(PRIOR["unknown"])) + unlisted, None
 
 
 def _shaking(motor: int) -> str:
