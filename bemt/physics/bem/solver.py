@@ -172,31 +172,10 @@ def prepare(
         duct = _enclosed(duct, e.duct(rotor.R, duct is not None))
     if duct is not None:
         duct = replace(duct, area=rotor.annulus_area, span=rotor.R - rotor.Rhub)
-    blade = rotor.blade
-    s = stations if stations is not None else blade.midpoints(n_stations, spacing="cosine")
+    s = stations if stations is not None else rotor.blade.midpoints(n_stations, spacing="cosine")
     if not np.all(np.isfinite([s.r, s.dr, s.chord, s.beta])) or np.any(s.r <= 0) or np.any(s.chord < 0):
         raise ValueError("stations: got non-finite values, a radius <= 0 or a negative chord")
-    x = np.array([p[0] for p in polars])
-    if np.any(np.diff(x) <= 0):
-        raise ValueError(f"polars: got r/R {x.tolist()}; expected ascending, distinct values")
-    with_mach = any(p.M.size > 1 for _, p in polars) or any(e.uses_mach for e in eff)
-    M2 = arrays.mach_grid(mach_max) if with_mach else np.zeros(1)
-    tabulated = np.sqrt(M2) if any(p.M.size > 1 for _, p in polars) else np.zeros(1)
-    Re, cl, cd = arrays.common_grid([p for _, p in polars], tabulated, re_range)
-    rR = s.r / blade.R
-    w = arrays.blend_weights(rR, x)
-    alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
-    shapes = [(a[0], a[1].thickness) for a in blade.anchors] or [(0.0, THICKNESS)]
-    bake = RotorBuild(
-        r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
-        R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
-        cl=_blended(w, cl), cd=_blended(w, cd), alpha0=w @ alpha0, cla=w @ cla,
-        Vx_factor=np.ones(s.r.size), Vy_factor=np.ones(s.r.size), Vx_add=np.zeros(s.r.size),
-        Vy_add=np.zeros(s.r.size), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
-        own_mach=w @ np.array([float(p.M.size > 1) for _, p in polars]),
-        gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
-        sections=blade.anchors,
-    )  # fmt: skip
+    bake = _build(rotor, s, polars, any(e.uses_mach for e in eff), mach_max, re_range, duct, level)
     for hook in ("blade", "inflow", "section", "momentum"):
         for e in (e for e in eff if getattr(type(e), hook) is not getattr(Effect, hook)):
             if hook == "section" and bake.mach_apart and not e.uses_mach:
@@ -204,12 +183,40 @@ def prepare(
             # behind a change of Mach number, one that is written into the tables would come before it
             bake.cl.flags.writeable = bake.cd.flags.writeable = not bake.mach_apart
             getattr(e, hook)(bake)
-    if Re.size == 1:
+    if bake.Re.size == 1:
         bake.spread()  # nothing to save
     num = _numbers(bake, duct)
     st, tab, grid = arrays.pack_stations(bake, num), arrays.pack_tables(bake), arrays.pack_grid(bake)
     cone = None if math.isnan(bake.num.cone) else bake.num.cone
-    return Prepared(rotor, s, eff, duct, st, tab, (M2.size, Re.size), num, grid, cone)
+    return Prepared(rotor, s, eff, duct, st, tab, (bake.M2.size, bake.Re.size), num, grid, cone)
+
+
+def _build(
+    rotor: Rotor, s: Stations, polars: Sequence[tuple[float, Polar]], uses_mach: bool, mach_max: float,
+    re_range: tuple[float, float] | None, duct: DuctFlow | None, level: float,
+) -> RotorBuild:  # fmt: skip
+    """Stations, section tables blended to them, and the numbers that effects start from."""
+    blade, x = rotor.blade, np.array([p[0] for p in polars])
+    if np.any(np.diff(x) <= 0):
+        raise ValueError(f"polars: got r/R {x.tolist()}; expected ascending, distinct values")
+    own_mach = np.array([p.M.size > 1 for _, p in polars])
+    M2 = arrays.mach_grid(mach_max) if uses_mach or own_mach.any() else np.zeros(1)
+    tabulated = np.sqrt(M2) if own_mach.any() else np.zeros(1)
+    Re, cl, cd = arrays.common_grid([p for _, p in polars], tabulated, re_range)
+    rR = s.r / blade.R
+    w = arrays.blend_weights(rR, x)
+    alpha0, cla = arrays.zero_and_slope(ALPHA_GRID, cl[:, 0])
+    shapes = [(a[0], a[1].thickness) for a in blade.anchors] or [(0.0, THICKNESS)]
+    return RotorBuild(
+        r=s.r, dr=s.dr, chord=s.chord, beta=s.beta.copy(), sigma=rotor.B * s.chord / (2.0 * np.pi * s.r),
+        R=blade.R, Rhub=blade.Rhub, B=rotor.B, alpha=ALPHA_GRID, Re=Re, M2=M2,
+        cl=_blended(w, cl), cd=_blended(w, cd), alpha0=w @ alpha0, cla=w @ cla,
+        Vx_factor=np.ones(s.r.size), Vy_factor=np.ones(s.r.size), Vx_add=np.zeros(s.r.size),
+        Vy_add=np.zeros(s.r.size), thickness=np.interp(rR, [x for x, _ in shapes], [t for _, t in shapes]),
+        own_mach=w @ own_mach.astype(float),
+        gap=duct.gap if duct is not None else float("nan"), ducted=duct is not None, level=level,
+        sections=blade.anchors,
+    )  # fmt: skip
 
 
 def _blended(w: Array, tables: Array) -> Array:

@@ -16,7 +16,9 @@ from bemt.physics import coefficients as co
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from numpy.typing import NDArray
 
+    from bemt.base.arrays import Array
     from bemt.physics.dataset.points import Dataset
 
 __all__ = ["plot", "to_html", "to_pandas", "to_xarray"]
@@ -78,14 +80,7 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
     """Draw channels over another one, with bands where uncertainties are known: :meth:`Dataset.plot`."""
     import matplotlib.pyplot as plt
 
-    ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in d and np.unique(d[k].round(9)).size > 1]
-    x = x or (ways[0] if ways else "rpm")
-    wanted = list(y) or [k for k in ("CT", "CP") if k in d and x == "J"] or ["thrust_N"]
-    wanted = [y] if isinstance(y, str) else wanted
-    unknown = [key for key in (x, *wanted) if key not in d]
-    if unknown:
-        known = ", ".join(d.values)
-        raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}"))
+    x, wanted = _axes(d, x, y)
     beside, points = ax is not None, d.kind in ("bench", "cfd", "vendor")
     if ax is None:
         from bemt.base.canvas import CYCLE
@@ -108,15 +103,32 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
             if np.any(u > 0.0) and points:
                 ax.errorbar(at, value, np.nan_to_num(u), fmt="none", ecolor=line.get_color(), lw=1)
             elif np.any(u > 0.0):
-                top = value + u
-                if channel == "eta" and {"J", "CT"} <= d.values.keys():
-                    ducted = "duct_share" in d and np.any(d["duct_share"] != 0.0)
-                    least = 0.0 if ducted else d["CT"][rows] - np.nan_to_num(d.u["CT"][rows])
-                    top = np.fmax(value, np.minimum(top, co.eta_limit(d["J"][rows], least)))
-                ax.fill_between(at, value - u, top, alpha=0.2, color=line.get_color(), lw=0)
+                ax.fill_between(at, value - u, _top(d, channel, rows), alpha=0.2, color=line.get_color(), lw=0)
     ax.set_xlabel(x)
     ax.set_ylabel(", ".join(wanted))
     if not beside:
         ax.set_title(d.name, fontsize=10)
     ax.legend(fontsize=8, frameon=False)
     return ax
+
+
+def _axes(d: Dataset, x: str | None, y: Sequence[str] | str) -> tuple[str, list[str]]:
+    """Channels to draw: those asked for, else what varies, and coefficients over J."""
+    ways = [k for k in ("J", "airspeed_m_s", "rpm") if k in d and np.unique(d[k].round(9)).size > 1]
+    x = x or (ways[0] if ways else "rpm")
+    wanted = [y] if isinstance(y, str) else list(y) or [k for k in ("CT", "CP") if k in d and x == "J"] or ["thrust_N"]
+    unknown = [key for key in (x, *wanted) if key not in d]
+    if unknown:
+        known = ", ".join(d.values)
+        raise InputError(Fault(d.name, ", ".join(unknown), "no such channel", f"one of {known}"))
+    return x, wanted
+
+
+def _top(d: Dataset, channel: str, rows: NDArray[np.int_]) -> Array:
+    """Upper edge of a band; no efficiency is above what momentum allows."""
+    value, u = d[channel][rows], d.u[channel][rows]
+    if channel != "eta" or not {"J", "CT"} <= d.values.keys():
+        return value + u
+    ducted = "duct_share" in d and np.any(d["duct_share"] != 0.0)
+    least = 0.0 if ducted else d["CT"][rows] - np.nan_to_num(d.u["CT"][rows])
+    return np.fmax(value, np.minimum(value + u, co.eta_limit(d["J"][rows], least)))

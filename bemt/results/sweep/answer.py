@@ -92,28 +92,8 @@ def _percent(t: _Thrust) -> str:
 def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
     moving = any(r.airspeed_m_s for result in solved for r in result.of("bemt"))
     header = ["thrust [N]", "rpm", *(["V"] if moving else []), "BEMT", "K1/K2", "recorded", "difference", "agree?"]
-    keep = {id(t) for t in found[: max(ROWS - len(solved), 4)]}
-    body: list[list[str]] = []
-    for result in solved:
-        points = result.of("bemt")
-        formula = {(r.rpm, r.airspeed_m_s): r.thrust_N for r in result.of("k1k2")}
-        first = True
-        for k, row in enumerate(points):
-            own = [t for t in found if t.case is result and t.rpm == row.rpm
-                   and t.airspeed_m_s == row.airspeed_m_s and id(t) in keep]  # fmt: skip
-            if k and not own:
-                continue
-            u = "" if not math.isfinite(row.u) else f" ± {number_text(row.u, 2)}"
-            simple = formula.get((row.rpm, row.airspeed_m_s))
-            at = [f"{row.rpm:.0f}", *([f"{row.airspeed_m_s:g}"] if moving else [])]
-            cells = [*at, f"{number_text(row.thrust_N, 3)}{u}", number_text(simple, 3)]
-            some: list[_Thrust | None] = [*own] or [None]
-            for t in some:
-                told = ["-", "", ""] if t is None else [
-                    f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g}{_percent(t)}",
-                    _agreement(t.c)]  # fmt: skip
-                body.append([_name(result.name) if first else "", *cells, *told])
-                cells, first = [""] * len(cells), False
+    kept = found[: max(ROWS - len(solved), 4)]
+    body = [row for result in solved for row in _rows(result, [t for t in kept if t.case is result], moving)]
     shown = body[:ROWS]
     lines = [line.rstrip() for line in text_table(header, shown, left=(0, len(header) - 1)).splitlines()]
     left = len(found) - sum(1 for row in shown if row[-3] != "-")
@@ -125,6 +105,23 @@ def _table(solved: Sequence[Result], found: Sequence[_Thrust]) -> list[str]:
         if any(t.c.doubts for t in found):
             lines.append("!: do not take it for agreement; the flag below says why")
     return lines
+
+
+def _rows(result: Result, found: Sequence[_Thrust], moving: bool) -> list[list[str]]:
+    """Rows of a case: its first point, and those with a recorded value beside them; what repeats is left blank."""
+    formula = {(r.rpm, r.airspeed_m_s): r.thrust_N for r in result.of("k1k2")}
+    body: list[list[str]] = []
+    for k, row in enumerate(result.of("bemt")):
+        here = (row.rpm, row.airspeed_m_s)
+        told = [[f"{number_text(t.c.D, 3)} {t.c.source}", f"{t.c.E:+.3g}{_percent(t)}", _agreement(t.c)]
+                for t in found if (t.rpm, t.airspeed_m_s) == here]  # fmt: skip
+        u = "" if not math.isfinite(row.u) else f" ± {number_text(row.u, 2)}"
+        cells = [f"{row.rpm:.0f}", *([f"{row.airspeed_m_s:g}"] if moving else []),
+                 f"{number_text(row.thrust_N, 3)}{u}", number_text(formula.get(here), 3)]  # fmt: skip
+        for words in told or ([] if k else [["-", "", ""]]):
+            body.append([_name(result.name) if not body else "", *cells, *words])
+            cells = [""] * len(cells)
+    return body
 
 
 def _name(name: str) -> str:

@@ -235,7 +235,30 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
     made: dict[str, Any] = copy.deepcopy(dict(document))
     if gone := out_of_place(made):
         made["assumptions"] = [x for x in made["assumptions"] if not (isinstance(x, dict) and x.get("key") in gone)]
-    rotor, blade, declared = made.get("rotor"), made.get("blade"), made.get("assumptions", [])
+    unknowns, declared = _left_out(made), made.get("assumptions", [])
+    if not isinstance(declared, list):
+        return made
+    named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}
+    for unknown in unknowns:
+        home, _, name = unknown.key.rpartition(".")
+        table = made
+        for part in home.split("."):
+            table = table.setdefault(part, {})
+        if not isinstance(table, dict) or name in table:
+            continue
+        table[name] = unknown.value
+        own = named.get(unknown.key)
+        if own is None:
+            item = {"key": unknown.key, "low": unknown.low, "high": unknown.high, "why": unknown.why}
+            made.setdefault("assumptions", []).append(item)
+        elif all(isinstance(own.get(end), (int, float)) for end in ("low", "high")):
+            table[name] = 0.5 * (own["low"] + own["high"])  # the user's range, in the middle of it
+    return made
+
+
+def _left_out(made: dict[str, Any]) -> list[Unknown]:
+    """What a short document leaves out; its kind of rotor and of chord are written into it."""
+    rotor, blade = made.get("rotor"), made.get("blade")
     fan = "duct" in made
     unknowns: list[Unknown] = []
     if isinstance(rotor, dict):
@@ -255,21 +278,4 @@ def completed(document: Mapping[str, Any]) -> dict[str, Any]:
         unknowns += PAIR
     if isinstance(drive := made.get("drive"), dict):
         unknowns += _of_drive(drive)
-    if not isinstance(declared, list):
-        return made
-    named = {str(item.get("key")): item for item in declared if isinstance(item, dict)}
-    for unknown in unknowns:
-        home, _, name = unknown.key.rpartition(".")
-        table = made
-        for part in home.split("."):
-            table = table.setdefault(part, {})
-        if not isinstance(table, dict) or name in table:
-            continue
-        table[name] = unknown.value
-        own = named.get(unknown.key)
-        if own is None:
-            item = {"key": unknown.key, "low": unknown.low, "high": unknown.high, "why": unknown.why}
-            made.setdefault("assumptions", []).append(item)
-        elif all(isinstance(own.get(end), (int, float)) for end in ("low", "high")):
-            table[name] = 0.5 * (own["low"] + own["high"])  # the user's range, in the middle of it
-    return made
+    return unknowns

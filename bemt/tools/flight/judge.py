@@ -222,7 +222,7 @@ def posterior(
         if np.isfinite(w.total):
             sd, z = np.append(sd, w.total), np.append(z, (flight.mean() - calm.mean()) / w.total)
             moved = {name: np.append(v, ways[name].mean()) for name, v in moved.items()}
-        yaw = np.arange(z.size) == 2 if layout is not None and len(axes) == 3 else np.zeros(z.size, dtype=bool)
+        yaw = (np.arange(z.size) == 2) & (layout is not None and len(axes) == 3)
         units = {name: v / sd for name, v in moved.items()}
         for e, log, size in _weighed(w, FlightReadings(z, sd, w.free), units, prior, beside, yaw):
             weight.setdefault(e, []).append(w.log + log + seen[NONE if e == w.still else e])
@@ -246,15 +246,14 @@ def _priors(ways: Mapping[str, Array], windy: bool, beside: BesideBalance) -> di
     singles |= {Explanation.of(_shaking(k)): LEFT_OUT for k in beside.shaken}
     singles |= {Explanation.of(_worn(k)): 1.0 for k in beside.shaken}
     total = sum(singles.values())
+    prior = {e: PRIOR["single"] * w / total for e, w in singles.items()}
     both = [Explanation.of(i, j) for i, j in combinations(blades, 2)]
-    return {e: PRIOR["single"] * w / total for e, w in singles.items()} | dict.fromkeys(
-        both, PRIOR["pair"] / max(len(both), 1)
-    )
+    return prior | {e: PRIOR["pair"] / len(both) for e in both}
 
 
 def _weighed(
-    w: _World, r: FlightReadings, D: Mapping[str, Array], prior: Mapping[Explanation, float], beside: BesideBalance,
-    yaw: Array,
+    w: _World, r: FlightReadings, D: Mapping[str, Array], prior: Mapping[Explanation, float],
+    beside: BesideBalance, yaw: NDArray[np.bool_],
 ) -> Iterator[tuple[Explanation, float, FlightEvidence | None]]:  # fmt: skip
     """Explanations in one world, each with the logarithm of prior times evidence, and its size where it has one.
 
