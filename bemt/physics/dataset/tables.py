@@ -126,9 +126,11 @@ def _axes(d: Dataset, x: str | None, y: Sequence[str] | str) -> tuple[str, list[
 
 def _top(d: Dataset, channel: str, rows: NDArray[np.int_]) -> Array:
     """Upper edge of a band; no efficiency is above what momentum allows."""
-    value, u = d[channel][rows], d.u[channel][rows]
+    value: Array = d[channel][rows]
+    top: Array = value + d.u[channel][rows]
     if channel != "eta" or not {"J", "CT"} <= d.values.keys():
-        return value + u
+        return top
     ducted = "duct_share" in d and np.any(d["duct_share"] != 0.0)
     least = 0.0 if ducted else d["CT"][rows] - np.nan_to_num(d.u["CT"][rows])
-    return np.fmax(value, np.minimum(value + u, co.eta_limit(d["J"][rows], least)))
+    limited: Array = np.fmax(value, np.minimum(top, co.eta_limit(d["J"][rows], least)))
+    return limited

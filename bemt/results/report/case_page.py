@@ -189,6 +189,11 @@ def _fan(fan: Fan | None) -> Section:
         ["exhaust speed", num(fan.exhaust_speed_m_s), "m/s"],
         ["u of the exhaust speed", num(fan.u_exhaust_speed_m_s, 2, none="unknown"), "m/s"],
         ["momentum through the exit", num(fan.exit_momentum_N), "N"],
+        [
+            "pressure in the exit plane and on the outer wall",
+            num(fan.rotor_thrust_N + fan.duct_thrust_N + fan.stator_thrust_N - fan.exit_momentum_N, 3),
+            "N",
+        ],
         ["pitch speed", num(fan.geometric_pitch_speed_m_s), "m/s"],
     ]
     return "Duct and fan", [("table", table(["part", "value", "unit"], rows, sort=False))]

@@ -82,17 +82,23 @@ def looks_like_label(text: str) -> bool:
     return not is_path(text) and (text.strip().isdigit() or _LABEL.search(text) is not None)
 
 
+def _case_for_label(path: str) -> Fault:
+    hint = f"A path is a case: bemt sweep {path} solves it, and so does bemt.load({path!r})"
+    return Fault("label", "", repr(path), "a label, such as 10x5", hint)
+
+
 def read_label(label: str, blades: int | None = None) -> Designation:
     """What a label such as ``10x5`` or ``APC 8x4.5x3`` says, with the blades filled in: as told, else two."""
     if not isinstance(label, str):
         raise InputError(Fault("", "label", f"{type(label).__name__} {label!r:.40}", "a label, such as 10x5"))
     if is_path(label):
-        hint = f"A path is a case: bemt sweep {label} solves it, and so does bemt.load({label!r})"
-        raise InputError(Fault("label", "", repr(label), "a label, such as 10x5", hint))
+        raise InputError(_case_for_label(label))
     try:
         one = records().get(label.strip())
         found = parse_designation(label, blades) if one is None else one.designation
     except GeometryError as error:
+        if Path(label).exists():
+            raise InputError(_case_for_label(label)) from None
         raise InputError([Fault("label", *fault) for fault in error.faults]) from None
     if blades and found.blades and blades != found.blades:
         raise InputError(Fault("--blades", "", str(blades), f"{found.blades}, as in {label}"))

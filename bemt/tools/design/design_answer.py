@@ -211,7 +211,7 @@ def _bought(d: Design) -> list[str]:
         if gain > 0.0 and any(p.rpm is not None for p in d.need.points):
             lines.append("leave the rpm out, and the speed is found too")
     ideal, name = (d.disk_W, "ideal disk") if math.isnan(d.betz_W) else (d.betz_W, "best blade without drag")
-    lines.append(f"{_ratio(d.mean_W / ideal)} the {name}")
+    lines.append(f"{_ratio(d.mean_W / ideal)} the {name}, which no real blade reaches")
     least = min(d.values.thrust_N / [p.thrust_N for p in d.need.points])
     if least > MUCH:
         lines.append(f"{least:.3g} times the thrust asked for: at this speed less of it takes no less power. "

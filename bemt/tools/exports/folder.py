@@ -305,19 +305,24 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
     return faults
 
 
+def _errors_text(error: Mapping[str, Any]) -> list[str]:
+    """Greatest errors: of a target of many points at rest and in flight, else of its one point."""
+    parted = any(isinstance(error.get(word), dict) for word in ("thrust", "torque"))
+    lines = []
+    for at, words in (("at_rest", " at rest"), ("flight", ", flight included")) if parted else (("", ""),):
+        worst = {w: v.get(at) if isinstance(v := error.get(w), dict) else v for w in ("thrust", "torque")}
+        told = (f"{w} {'not held' if v is None else number_text(v, 3) + ' %'}" for w, v in worst.items())
+        lines.append(f"  greatest error{words}: {', '.join(told)} (of {error['of']})")
+    return lines if error else []
+
+
 def _targets_text(manifest: Manifest, out: Path) -> list[str]:
     """What each target holds, and how well."""
     lines = []
     for one in _targets(manifest):
         files = ", ".join(f.path for f in one.files)
         lines += [f"{manifest['name']} as {one.title}, in {out / one.target}: {files}", f"  holds {one.holds}"]
-        error, shown_errors = one.fit_error_pct, []
-        for word in ("thrust", "torque"):
-            value = error.get(word)
-            worst = value.get("flight") if isinstance(value, dict) else value
-            shown_errors.append(f"{word} {'not held' if worst is None else number_text(worst, 3) + ' %'}")
-        if error:
-            lines.append(f"  greatest error {', '.join(shown_errors)} (of {error['of']})")
+        lines += _errors_text(one.fit_error_pct)
         if one.section_error:
             cl, cd = (number_text(e, 2) for e in (one.section_error.cl, one.section_error.cd_pct))
             lines.append(f"  sections: cl within {cl}, cd within {cd} % between the stalls")

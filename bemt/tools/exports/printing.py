@@ -138,7 +138,9 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
                 raise GeometryError([(*f[:3], _fine(rotor, case, request)) for f in still.faults]) from None
             told |= _changes(case, rotor, wider)
             rotor = wider
-        out.append(Shape(end, rotor, None, options, model, told))
+        # A slicer takes each named solid for a part, and blade and hub alone are open.
+        whole = replace(model.rotor, group=np.zeros_like(model.rotor.group), names=("rotor",))
+        out.append(Shape(end, rotor, None, options, replace(model, rotor=whole), told))
     return out
 
 

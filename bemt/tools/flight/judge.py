@@ -90,6 +90,11 @@ class FlightVerdict:
     sessions: int = 1  # Sessions of them that are known
     in_flight: bool = False  # Whether what is said changed within the flight
 
+    @property
+    def total_moved(self) -> bool:
+        """Whether the total drive is further from the healthy mean than healthy flights are."""
+        return abs(self.total) > self.total_half
+
 
 def judge(
     flight: Array, healthy: Sequence[Array], layout: Array | None, windy: bool = False,
@@ -118,6 +123,10 @@ def judge(
         _visible(calm, layout, label, day), total=float(change.mean()) if n else float("nan"), total_half=half,
         given=n, in_flight=bool(sure.said.effects) and set(sure.said.effects) <= set(cause),
     )  # fmt: skip
+    if sure.said.verdict == "none" and out.total_moved:
+        step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
+               "healthy flights, gives that of this one"  # fmt: skip
+        out = replace(out, next=Suggestion(step, (), (), 0.0, 0.0, "run"))
     if n < 3:
         return out
     bad, several = [], np.unique(label).size > 1

@@ -91,7 +91,7 @@ def read(path: Path) -> FlightLog:
         return _betaflight(name, frame, said, ends)
     if any(_rotor(c) is not None for c in frame.columns):
         return _speeds(name, frame, ends)
-    raise InputError(Fault(name, "", f"headings {', '.join(map(str, frame.columns[:8]))}", _READ))
+    raise InputError(Fault(name, "", f"no speed of a motor beside {', '.join(map(str, frame.columns[:8]))}", _READ))
 
 
 def _label(heading: str) -> str:

@@ -47,10 +47,6 @@ def text(a: FlightAnswer, details: bool = False) -> str:
         lines.append(f"  A damaged rotor shows from a change of its drive by {100 * j.visible:.0f} %, {against}.")
     if j.said.verdict == "none" and j.healthy:
         lines.append("  Not visible in this log: smaller damage; tape and imbalance without fast accelerometer data.")
-    if j.said.verdict == "none" and np.isfinite(j.total_half) and abs(j.total) > j.total_half:
-        lines.append(f"  Total drive {100 * j.total:+.1f} % against healthy flights (they differ by "
-                     f"±{100 * j.total_half:.1f} %): weight at the centre, battery, air, or damaged "
-                     "rotors that balance each other.")  # fmt: skip
     lines += _seen(a)
     lines += _details(a) if details else ["", "Constants, and what the log cannot show: --details, --json."]
     return "\n".join(lines)
@@ -103,6 +99,8 @@ def _look(a: FlightAnswer) -> str:
     """What is wrong, in a sentence of a mechanic."""
     j, said = a.judged, a.judged.said
     others = "in the healthy flights" if j.given else "the others"
+    if said.verdict == "none" and j.total_moved:
+        return _together(j)
     if said.verdict == "none":
         return "Nothing to look at: the motors share the work as in the healthy flights."
     if not said.effects:
@@ -138,6 +136,14 @@ def _look(a: FlightAnswer) -> str:
     more = f" {_alternatives(rest)} would do the same." if rest else ""
     return f"Look where battery and payload sit: the load moved {where.replace('near', 'towards')}." + \
            (more[:1] + more[1:2].upper() + more[2:] if more else "")  # fmt: skip
+
+
+def _together(j: FlightVerdict) -> str:
+    """All motors do more, or less, than in the healthy flights."""
+    how = "harder" if j.total > 0.0 else "less"
+    return f"All motors are driven {100 * abs(j.total):.0f} % {how} than in the healthy flights (they differ by " \
+           f"±{100 * j.total_half:.0f} %), and share the work as there: weight at the centre, battery, air, or " \
+           "damage that balances."  # fmt: skip
 
 
 def _alternatives(names: Sequence[str]) -> str:
