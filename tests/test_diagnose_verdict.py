@@ -11,14 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge import loss
-from bemt.judge.diagnose import (
-    chain,
-    confusion,
-    fit,
-    interval_scales,
-    noise,
-    prior,
-)
+from bemt.judge.diagnose import chain, fit, form, noise, prior
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
@@ -68,7 +61,7 @@ def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
-    assert confusion.nearest(answer.found) == "compressibility"
+    assert form.nearest(answer.found) == "compressibility"
 
 
 def test_references_are_in_no_block() -> None:
@@ -125,13 +118,13 @@ def pair(**changed: Any) -> Any:
 
 def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
     told = {"untwist": {"tip_deg": Size(1.0, 0.8, 1.3, "deg")}, "rpm_scale": {"factor": Size(2.0, 2.0, 2.0, "1")}}
-    s = interval_scales.scale_of("untwist", "tip_deg")
-    wide = interval_scales.widened(told)
+    s = fit.scale_of("untwist", "tip_deg")
+    wide = fit.widened(told)
     assert wide["untwist"]["tip_deg"].low == pytest.approx(1.0 - 0.2 * s)
     assert wide["untwist"]["tip_deg"].high == pytest.approx(1.0 + 0.3 * s)
     assert wide["rpm_scale"] == told["rpm_scale"]  # a ratio has odds, no half-width
     far = {"untwist": {"tip_deg": Size(4.9, 4.0, 5.0, "deg")}}
-    assert interval_scales.widened(far)["untwist"]["tip_deg"].high == 5.0
+    assert fit.widened(far)["untwist"]["tip_deg"].high == 5.0
 
 
 def test_factors_hold_as_often_as_they_say() -> None:

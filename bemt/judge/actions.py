@@ -365,7 +365,7 @@ def prove(
     from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
     from bemt.base.plugins import load, missing, offered
     from bemt.judge.proof import follow as following
-    from bemt.judge.proof import intervals, proof_text
+    from bemt.judge.proof import intervals, score
     from bemt.judge.proof import loop as looping
     from bemt.judge.proof.prove import prove as run
 
@@ -391,4 +391,4 @@ def prove(
     if loop and out is not None:
         taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say, hands)))
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
-    return Told(found.document(), "\n\n".join([proof_text.text(found), *taken]), exit_code=code)
+    return Told(found.document(), "\n\n".join([score.text(found), *taken]), exit_code=code)

@@ -19,8 +19,7 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.judge.compare.change_document import ComparedRuns
-from bemt.judge.compare.contrast_text import WORD, headline
+from bemt.judge.compare.change_document import WORD, ComparedRuns, headline
 from bemt.judge.compare.matched import POWER_OF_SPEED
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case

@@ -16,8 +16,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
-from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
-from bemt.judge.compare.stand_run import StandRun
+from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, StandRun, advance, density_change
 from bemt.judge.explanation import NONE, Size
 from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 

@@ -26,9 +26,9 @@ from bemt.physics.bem.model import acts_on_rotor
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
+    from bemt.judge.compare.matched import StandRun
     from bemt.judge.compare.recordings import RunChange
     from bemt.judge.compare.smooth_change import Scatter
-    from bemt.judge.compare.stand_run import StandRun
     from bemt.judge.diagnose.problem import Part
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.physics.dataset import Dataset

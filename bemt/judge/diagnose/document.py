@@ -10,12 +10,12 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.judge.compare.contrast_text import families
+from bemt.judge.compare.change_document import families
 from bemt.judge.compare.drive_laws import law
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
-from bemt.judge.diagnose.confusion import nearest
-from bemt.judge.diagnose.locate import bare
+from bemt.judge.diagnose.answer import bare
+from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
@@ -23,8 +23,7 @@ from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.judge.diagnose.locate import Location
+    from bemt.judge.diagnose.answer import Diagnosis, Location
     from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"

@@ -16,7 +16,7 @@ from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED,
 from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
 from bemt.judge.compare.first_picture import PredictionView, against_band
-from bemt.judge.diagnose import figures_effects, figures_posterior
+from bemt.judge.diagnose import figures_effects
 from bemt.judge.diagnose.document import headline
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.dataset import Dataset
@@ -62,7 +62,7 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
     import matplotlib
 
     makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
-        "residual": residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
+        "residual": residual, "before_after": _before_after, "posterior": figures_effects.posterior,
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
     written = []

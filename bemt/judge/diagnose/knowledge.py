@@ -18,8 +18,8 @@ import numpy as np
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
+from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
-from bemt.judge.compare.stand_run import StandRun, stand_run
 from bemt.judge.diagnose import other_rotor
 from bemt.judge.diagnose.record import merged
 from bemt.judge.explanation import DOUBT, UNKNOWN, Explanation

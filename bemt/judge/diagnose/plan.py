@@ -13,8 +13,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
-from bemt.judge.diagnose import confusion as look
-from bemt.judge.diagnose import noise, posterior, prior, problem, signatures
+from bemt.judge.diagnose import form, noise, posterior, prior, problem, signatures
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
 from bemt.judge.diagnose.record import Record
@@ -41,7 +40,7 @@ DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
 class Plan:
     """What a plan can do."""
 
-    confusion: look.Confusion  # Distances
+    confusion: form.Confusion  # Distances
     # (N,) What the readings will say for each effect against nothing, usually and if the solver is at its best, as
     # standard deviations: the square root of twice the expected log odds [1]
     size: Array
@@ -138,7 +137,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         whole, None, (lambda n: progress(f"solving with {n}")) if progress else None
     )
     found = posterior.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
-    alike = look.confusion(found)
+    alike = form.confusion(found)
     size, best = _sizes(whole, candidates, [noise.Hyper(*h, 1.0) for h in (_HYPER, _BEST)])
     added = None
     groups = sorted(alike.classes(), key=len, reverse=True)
@@ -199,7 +198,7 @@ def text(answer: Plan) -> str:
     order = np.argsort(-answer.size)
     rows = []
     for a in order:
-        near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= look.ALIKE]
+        near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= form.ALIKE]
         nearest = min(near, default=(float("nan"), "-"))
         rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}",
                      DETECTABLE[answer.sight[c.ids[a]]],

@@ -14,7 +14,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
-from bemt.judge.diagnose.confusion import ALIKE
+from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bemt.judge.proof import rigs
+from bemt.judge.proof import causes
 from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED
 from bemt.judge.proof.items import Bench, Item, make_item
 
@@ -29,7 +29,7 @@ class ProofSize:
     code: str = "vortex"  # Code of the truth
 
 
-_OPEN, _DUCTED, _POOR = rigs.OPEN_PLANS, rigs.DUCTED_PLANS, rigs.UNDERPOWERED
+_OPEN, _DUCTED, _POOR = causes.OPEN_PLANS, causes.DUCTED_PLANS, causes.UNDERPOWERED
 SIZES = {
     "small": ProofSize(
         {"single": 16, "pair": 3, "null": 5, "mismatch": 3, "unlisted": 5, "sensor": 6, "underpowered": 3},
@@ -64,7 +64,7 @@ def benches(size: ProofSize, seeds: np.random.SeedSequence) -> list[Bench]:
     out = []
     for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
         rng = np.random.default_rng(seed)
-        rig = rigs.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng, size.code)
+        rig = causes.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng, size.code)
         out += [Bench.draw(rig, plan, rng) for plan in plans]
     return out
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
-from bemt.judge.proof import prove, score, seal
+from bemt.judge.proof import prove, rows, score
 from bemt.judge.proof.items import recording_text
 from bemt.judge.proof.pairs import followed, pair_files
 from bemt.judge.proof.real import DENSITY, POUND, WRONG_DENSITY
@@ -74,10 +74,10 @@ class FollowedItems(Documented):
 
 def follow(out: Path, jobs: int = 2, say: Callable[[str], None] | None = None) -> FollowedItems:
     """Take the steps for all silent items of a proof of published recordings."""
-    key = seal.unseal(out)
+    key = rows.unseal(out)
     todo = []
     for entry in key.items:
-        answer = seal.stored(out / "answers" / f"{entry.folder}.json").answer
+        answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer
         if not entry.causes or not answer:
             continue
         before = score.answered(score.judge(entry, answer))

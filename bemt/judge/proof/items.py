@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, applied
-from bemt.judge.proof.rigs import Rig, conditions, extended
+from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, Rig, applied, conditions, extended
 from bemt.judge.proof.rows import Entry, TrueValue
-from bemt.judge.proof.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.judge.proof.stand import StandErrors, full_scales, record
+from bemt.judge.proof.stand import FREEDOM, StandErrors, Yardstick, freedom, full_scales, record, yardstick
 from bemt.judge.proof.truth import TrueAnswer
 from bemt.judge.proof.truth_ccblade import EXPRESSIBLE
 from bemt.judge.proof.truth_section import SectionPhysics

@@ -32,10 +32,9 @@ import numpy as np
 from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.judge.diagnose.suggest import minutes
-from bemt.judge.proof import draw, prove, score, seal
-from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof import draw, prove, rows, score
+from bemt.judge.proof.causes import CAUSES, Rig
 from bemt.judge.proof.items import Bench, further_run, recorded_again
-from bemt.judge.proof.rigs import Rig
 from bemt.judge.proof.rows import Entry, Step, ToldAnswer
 from bemt.physics import effects
 
@@ -427,14 +426,14 @@ def loop(
 
     With ``hands`` everything is measured by these, in ``loop_wired``; the loop then ends where a run is not worth it.
     """
-    key = seal.unseal(out)
+    key = rows.unseal(out)
     kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
     found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
     todo = []
     for entry in sorted(key.items, key=_rank):
-        answer = seal.stored(out / "answers" / f"{entry.folder}.json").answer
+        answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer
         if entry.set in _SETS and answer:
             todo.append((entry, answer))
 

@@ -146,8 +146,8 @@ def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
 def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     """Steady points of one recording, in SI."""
     from bemt.data.recordings.load import import_file
+    from bemt.judge.compare.matched import stand_run
     from bemt.judge.compare.selection import selected
-    from bemt.judge.compare.stand_run import stand_run
 
     if "mass_kg" in how:
         columns = _flight(path, float(how["mass_kg"]))

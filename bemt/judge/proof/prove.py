@@ -23,13 +23,11 @@ from bemt import __version__
 from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.proof import draw, items, proof_text, real, score, seal
-from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof import draw, items, real, rows, score
+from bemt.judge.proof.causes import CAUSES, extended
 from bemt.judge.proof.items import Bench
-from bemt.judge.proof.rigs import extended
 from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ToldAnswer
-from bemt.judge.proof.separation import yardstick
-from bemt.judge.proof.stand import StandErrors
+from bemt.judge.proof.stand import StandErrors, yardstick
 
 __all__ = [
     "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
@@ -55,7 +53,7 @@ def conceal(
     """Draw and write all items, and the sealed key."""
     from bemt.physics import effects
 
-    if (out / "items").exists() or (out / seal.KEY).exists():
+    if (out / "items").exists() or (out / rows.KEY).exists():
         raise InputError(Fault(out.as_posix(), "", "a proof", "a folder without one", "Choose another --out"))
     known = set(effects.catalogue())
     standard = {e.id for e in effects.standard()}
@@ -74,9 +72,9 @@ def conceal(
             (out / ASKED / name).mkdir(parents=True)
             for file, text in {**item.files, "reference.csv": item.reference}.items():
                 write_atomic(out / ASKED / name / file, text)
-        hashes = {file: seal.sha256(text) for file, text in item.files.items()}
+        hashes = {file: rows.sha256(text) for file, text in item.files.items()}
         entries.append(replace(item.entry, folder=name, files=hashes))
-    return seal.seal(out, Key(KEY_SCHEMA, __version__, str(seed), size, tuple(entries)))
+    return rows.seal(out, Key(KEY_SCHEMA, __version__, str(seed), size, tuple(entries)))
 
 
 def teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
@@ -135,7 +133,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
     Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
     """
     _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, teller("diagnosed", say))
-    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.stored(out / "answers" / f"{f.name}.json").answer)]
+    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(rows.stored(out / "answers" / f"{f.name}.json").answer)]
     _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, teller("reference given", say))
 
 
@@ -162,17 +160,17 @@ def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: C
 
 def proof(out: Path, digest: str | None = None) -> Proof:
     """Open the key and score the answers."""
-    key = seal.unseal(out, digest)
+    key = rows.unseal(out, digest)
     judged, again, seconds, errors = [], [], [], {}
     settled: list[bool] = []
     made = key.size != REAL
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
     found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)} if made else {}
     for entry in key.items:
-        stored = seal.stored(out / "answers" / f"{entry.folder}.json")
+        stored = rows.stored(out / "answers" / f"{entry.folder}.json")
         judged.append(score.judge(entry, stored.answer))
         if made and asks(stored.answer) and (out / ASKED / entry.folder).exists():
-            again.append(score.judge(entry, seal.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
+            again.append(score.judge(entry, rows.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
         if made and stored.answer:
             settles = resolves(found[entry.rig, entry.plan], entry, stored.answer)
             settled += [] if settles is None else [settles]
@@ -185,10 +183,10 @@ def proof(out: Path, digest: str | None = None) -> Proof:
              tuple((r.effect, r.probability) for r in j.answer.ranking[:4]), errors.get(j.entry.folder, ""))
         for j in judged if not j.right and (j.claims or j.visible or not j.answer)
     )  # fmt: skip
-    rows = score.score(judged, settled, again) if made else score.score_real(judged)
+    scored = score.score(judged, settled, again) if made else score.score_real(judged)
     return Proof(
         SCHEMA, __version__, key.size, key.seed, _commit(),
-        digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(rows),
+        digest or (out / rows.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(scored),
         baselines=tuple(score.baselines(judged)) if made else (), strata=tuple(score.strata(judged)) if made else (),
         risk_coverage=tuple(score.risk_coverage(judged)), confusion=score.confusion(judged),
         answers={} if made else score.answers(judged), misses=misses,
@@ -221,9 +219,9 @@ def prove(
     with tempfile.TemporaryDirectory(prefix="bemt-proof-") as spare:
         folder = Path(out) if out else Path(spare)
         began = time.monotonic()
-        if seed is None and (folder / seal.SEAL).exists():  # an interrupted run: its key stays as it is
-            digest = (folder / seal.SEAL).read_text(encoding="utf-8").strip()
-            words = f"going on with the sealed key of size {seal.unseal(folder, digest).size}, SHA-256 {digest}"
+        if seed is None and (folder / rows.SEAL).exists():  # an interrupted run: its key stays as it is
+            digest = (folder / rows.SEAL).read_text(encoding="utf-8").strip()
+            words = f"going on with the sealed key of size {rows.unseal(folder, digest).size}, SHA-256 {digest}"
         else:
             digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say, jobs)
             words = f"key sealed, SHA-256 {digest}"
@@ -236,8 +234,8 @@ def prove(
         )
         if out:
             write_atomic(folder / "proof.json", json_text(found.document()))
-            write_atomic(folder / "proof.txt", proof_text.text(found) + "\n")
-            write_atomic(folder / "proof.html", proof_text.html(found))
+            write_atomic(folder / "proof.txt", score.text(found) + "\n")
+            write_atomic(folder / "proof.html", score.html(found))
     return found
 
 
