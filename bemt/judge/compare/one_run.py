@@ -338,7 +338,7 @@ def text(found: RunComparison, details: bool = False) -> str:
         head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
         for name, load in p.loads.items():
             rows.append([
-                *head, _LOADS[name], _pm(load.cfd, load.u_cfd), _pm(load.bemt, load.u_bemt),
+                *head, _LOADS[name], plus_minus(load.cfd, load.u_cfd), plus_minus(load.bemt, load.u_bemt),
                 f"{number_text(load.difference, 3)} ({load.percent})", number_text(load.times, 2), load.verdict,
             ])  # fmt: skip
             head = ["", ""]
@@ -370,5 +370,6 @@ def _filled(words: str, lead: str = "", indent: str = "  ") -> str:
     )
 
 
-def _pm(value: float, u: float) -> str:
-    return number_text(value, 4) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else " ± ?")
+def plus_minus(value: float, u: float) -> str:
+    """Number with its standard uncertainty."""
+    return f"{number_text(value, 4)} ± {number_text(u if math.isfinite(u) else math.nan, 2, none='?')}"

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.diagnose import fit as fitting
-from bemt.judge.diagnose import prior
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
+from bemt.judge.explanation import Sizes
 from bemt.judge.loss import Decision
 from bemt.physics import effects
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.fit import Fit
     from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
-    from bemt.judge.diagnose.signatures import Candidate
 
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
@@ -147,43 +145,8 @@ _NEAR_ZERO, _FAR = 0.1, 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
-    """Readings of all recordings, stacked: (M,) values, with (P,) variables of the points that they belong to."""
-
-    channels: tuple[str, ...]
-    values: Array  # (M,) [units of the channel]
-    u: Array  # (M,) standard uncertainty [units of the channel]
-    channel: NDArray[np.intp]  # (M,) place in CHANNELS
-    point: NDArray[np.intp]  # (M,) place in the variables
-    tested: NDArray[np.bool_]  # (M,) False: of a reference
-    variables: dict[str, Array]  # (P,) each
-    notes: tuple[str, ...]
-    findings: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Baseline:
-    """Model of the case without any cause."""
-
-    effects: tuple[effects.Effect, ...]
-    values: Array  # (M,) [units of the channel]
-    level: dict[str, float]  # Median of each load over what the case gives, less 1 [1]
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """What the readings say of the explanations."""
-
-    probability: dict[Explanation, float]  # Adds up to 1 [1]
-    log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
-    inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
-    parameters: Sizes  # Of the leading explanation
-    p_value: float  # Of as large a misfit without a cause [1]
-
-
-@dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong, in named groups; text, JSON, figures and report are views of it."""
+    """What is wrong; text, JSON, figures and report are views of it."""
 
     found: posterior.Evidence  # Outcome of the weighing, with the problem in it
     decision: Decision  # Verdict of the evidence in the case
@@ -208,40 +171,12 @@ class Diagnosis:
     change: RunChange | None = None  # Change from the references, where there is one recording beside them
 
     @property
-    def readings(self) -> Readings:
-        """What was measured."""
-        p = self.problem
-        channels = tuple(CHANNELS[c] for c in np.unique(p.channel))
-        return Readings(channels, p.y, p.u, p.channel, p.point, p.free, p.covariates, p.notes, p.findings)
-
-    @property
-    def baseline(self) -> Baseline:
-        """What the case gives there."""
-        return Baseline(self.problem.baseline, self.problem.f0, self.problem.level)
-
-    @property
-    def prior(self) -> dict[Explanation, float]:
-        """Probability of every explanation before a reading was looked at [1]."""
-        weights = prior.prior_weights(self.problem, list(self.found.spans))
-        return {k: float(np.exp(v)) for k, v in prior.log_priors(weights, of=prior.kinds(self.problem)).items()}
-
-    @property
-    def explanations(self) -> tuple[Candidate, ...]:
-        """Effects that were tried, with what each changes in the readings."""
-        return self.found.candidates
-
-    @property
-    def posterior(self) -> Posterior:
-        """What the readings say of them."""
-        odds = {e: self.found.log_bayes(e) for e in (*map(Explanation.of, self.found.spans), UNKNOWN)}
-        return Posterior(self.found.probability, odds, self.found.inclusion, self.parameters, self.p_value)
-
-    @property
     def systems(self) -> dict[str, dict[str, Any]]:
         """Verdict and effects of air, stand and drive, each for itself."""
         said = self.said
         listed = said.verdict in ("named", "class", "sensor")
-        kinds = {i: _kind(i) for i in said.effects}
+        known = effects.catalogue()
+        kinds = {i: known[i].kind if i in known else "drive" for i in said.effects}  # a law of the drive is no effect
         out: dict[str, dict[str, Any]] = {}
         for system in ("air", "stand", "drive"):
             mine = [i for i, kind in kinds.items() if kind == system]
@@ -284,8 +219,3 @@ class Diagnosis:
     def marked(self) -> Location | None:
         """Location of the mismatch; None without one."""
         return None if self.decision.verdict == "none" else self.where
-
-
-def _kind(name: str) -> str:
-    """Sub-system of an effect, or of a cause in the drive that is none."""
-    return effects.catalogue()[name].kind if name in effects.catalogue() else "drive"

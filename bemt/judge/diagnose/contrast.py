@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING, Any
 from bemt.base.action import Told, as_html
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, Invocation, RankedCause, document, next_step
+from bemt.judge.compare.change_document import (
+    DIAGNOSED,
+    ComparedRuns,
+    Invocation,
+    RankedCause,
+    document,
+    next_step,
+    text,
+)
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
 from bemt.judge.compare.selection import conditions_of, selected, with_air
@@ -71,15 +79,11 @@ class Contrast:
     @property
     def text(self) -> str:
         """The answer on one screen."""
-        from bemt.judge.compare.change_document import text
-
         return text(self.said)
 
     @property
     def details(self) -> str:
         """The answer with its ranking, sub-systems and all notes."""
-        from bemt.judge.compare.change_document import text
-
         return text(self.said, details=True)
 
     def to_dict(self) -> dict[str, Any]:

@@ -254,17 +254,13 @@ def _next(d: Diagnosis) -> list[str]:
     step = d.next
     if not step.text:
         return []
-    gain = ""
-    if step.separates:
-        both = f"{step.after:.1f} instead of {step.before:.1f}"
-        gain = f" (tells {' from '.join(step.separates)} at {both} standard deviations)"
     cost = ""
     if step.minutes and step.gain:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
     case = "if nothing is wrong with it" if step.kind == "mend" else "without such a reference"
     other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
     unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
-    return [f"Next: {step.text}{gain}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
+    return [f"Next: {step.text}{step.tells}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
 def _not_tried(d: Diagnosis) -> list[str]:

@@ -57,7 +57,10 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
 
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
     """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
-    P = _exact(found.problem, found.probability)
+    # relations that must hold: power is torque times speed, two counters of one shaft agree
+    broken = {name for name, _ in other_rotor.exact_faults(found.problem)}
+    odds = {k: p * (EXACT if k.ids & broken else 1.0) for k, p in found.probability.items()}
+    P = {k: p / sum(odds.values()) for k, p in odds.items()}
     if change is not None and change.loads.ranked:
         P = both(P, change.loads.ranked)
     return _doubted(found.problem, another_rotor(P, UNKNOWN))
@@ -99,12 +102,6 @@ def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Ex
     return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == rotor else 0.0) for k, p in P.items()}
 
 
-def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Broken relations of the recording: power is torque times speed, two counters of one shaft agree."""
-    broken = {name for name, _ in other_rotor.exact_faults(problem)}
-    return _normal({k: p * (EXACT if k.ids & broken else 1.0) for k, p in P.items()})
-
-
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
     where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
@@ -124,11 +121,6 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
 
 
-def _normal(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    total = sum(P.values())
-    return {k: p / total for k, p in P.items()}
-
-
 def change_of(
     records: Sequence[Record],
     diameter_m: float,
@@ -141,7 +133,8 @@ def change_of(
     ``absent``: effects that cannot show; ``judge`` of the loads; ``files``: reference and test as a command names them.
     """
     known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
-    if len(tested) != 1 or not known or _transient(absent):
+    # where the speed changes within a second the rows are no steady points
+    if len(tested) != 1 or not known or {"inflow_lag", "rotor_inertia"} - set(absent):
         return None
     pair = [merged(known), tested[0]]
     if _turned(pair):
@@ -152,11 +145,6 @@ def change_of(
         return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
-
-
-def _transient(absent: Collection[str]) -> bool:
-    """Whether the speed changes within a second in what was recorded: these rows are no steady points."""
-    return bool({"inflow_lag", "rotor_inertia"} - set(absent))
 
 
 def _turned(pair: Sequence[Record]) -> bool:

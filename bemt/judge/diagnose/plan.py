@@ -72,11 +72,37 @@ class Plan:
     @property
     def text(self) -> str:
         """Tables for a terminal."""
-        return text(self)
+        c = self.confusion
+        rows = []
+        for a in np.argsort(-self.size):
+            near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= form.ALIKE]
+            nearest = min(near, default=(float("nan"), "-"))
+            rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{self.size[a]:.1f}",
+                         self.detectable[c.ids[a]],
+                         f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
+        header = ["effect", "", "size", "detectable", "nearest look-alike"]
+        out = [f"plan of {self.points} points: size of each effect at typical strength, in standard deviations",
+               text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
+        for group in c.classes():
+            out.append(f"  cannot be distinguished: {', '.join(group)}")
+        if self.added is not None:
+            out.append(f"  to add: {self.added.text}{self.added.tells}")
+        out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
+        return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of schema ``bemt.plan/1``."""
-        return document(self)
+        c = self.confusion
+        return {
+            "schema": SCHEMA, "points": self.points, "sight": self.sight,
+            "size": {i: float(s) for i, s in zip(c.ids, self.size, strict=True)},
+            "size_at_best": {i: float(s) for i, s in zip(c.ids, self.best, strict=True)},
+            "classes": c.classes(),
+            "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
+            "not_tried": self.absent,
+            "next_measurement": None if self.added is None else self.added.document(),
+            "notes": list(self.notes),
+        }  # fmt: skip
 
 
 def given(points: Any, case: Case) -> Record:
@@ -175,44 +201,3 @@ def _sizes(
             apart = true(c.signatures - shown[:, i, None])
             least[k, i] += log_sum(-0.5 * np.sum(apart**2, axis=0), np.log(c.weight))
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
-
-
-def document(answer: Plan) -> dict[str, Any]:
-    """Give the document ``bemt.plan/1``."""
-    c = answer.confusion
-    return {
-        "schema": SCHEMA, "points": answer.points, "sight": answer.sight,
-        "size": {i: float(s) for i, s in zip(c.ids, answer.size, strict=True)},
-        "size_at_best": {i: float(s) for i, s in zip(c.ids, answer.best, strict=True)},
-        "classes": c.classes(),
-        "distance": {i: {j: float(c.distance[a, b]) for b, j in enumerate(c.ids)} for a, i in enumerate(c.ids)},
-        "not_tried": answer.absent,
-        "next_measurement": None if answer.added is None else answer.added.document(),
-        "notes": list(answer.notes),
-    }  # fmt: skip
-
-
-def text(answer: Plan) -> str:
-    """Tables for a terminal."""
-    c = answer.confusion
-    order = np.argsort(-answer.size)
-    rows = []
-    for a in order:
-        near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= form.ALIKE]
-        nearest = min(near, default=(float("nan"), "-"))
-        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}",
-                     DETECTABLE[answer.sight[c.ids[a]]],
-                     f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
-    header = ["effect", "", "size", "detectable", "nearest look-alike"]
-    out = [f"plan of {answer.points} points: size of each effect at typical strength, in standard deviations",
-           text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
-    for group in c.classes():
-        out.append(f"  cannot be distinguished: {', '.join(group)}")
-    if answer.added is not None:
-        a = answer.added
-        both = f"{a.after:.1f} instead of {a.before:.1f}"
-        gain = f" (tells {' from '.join(a.separates)} at {both} standard deviations)" if a.separates else ""
-        out.append(f"  to add: {a.text}{gain}")
-    out += [f"  not visible: {i}: {why}" for i, why in answer.absent.items()]
-    out += [f"  note: {note}" for note in answer.notes]
-    return "\n".join(out)

@@ -104,6 +104,14 @@ class Suggestion:
     gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
     otherwise: Suggestion | None = None  # What to do if there can be no such reference or run, or nothing to mend
 
+    @property
+    def tells(self) -> str:
+        """What it separates and by how much, in words."""
+        if not self.separates:
+            return ""
+        both = f"{self.after:.1f} instead of {self.before:.1f}"
+        return f" (tells {' from '.join(self.separates)} at {both} standard deviations)"
+
     def document(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -223,36 +224,23 @@ def _sign(rng: np.random.Generator) -> float:
     return float(rng.choice((-1.0, 1.0)))
 
 
-def _world(name: str, size: float, parameter: str = "", unit: str = "1", signed: bool = False) -> Make:
-    """Make a field of the world of this size."""
+def _field(
+    of: str, name: str, size: float, parameter: str = "", unit: str = "1", signed: bool = True, scale: float = 1.0
+) -> Make:  # fmt: skip
+    """Make one field of world, section or stand of this size; ``scale`` turns our value into that of the library.
 
-    def make(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:
-        value = f * size * (_sign(rng) if signed else 1.0)
-        said = {parameter: (value, unit)} if parameter else {}
-        return Change(world={name: value}, parameters=said)
-
-    return make
-
-
-def _section(name: str, size: float, parameter: str = "", signed: bool = False) -> Make:
-    def make(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:
-        value = f * size * (_sign(rng) if signed else 1.0)
-        return Change(section={name: value}, parameters={parameter: (value, "1")} if parameter else {})
-
-    return make
-
-
-def _stand(name: str, size: float, parameter: str, unit: str = "1", scale: float = 1.0) -> Make:
-    """Make a fault of the stand; ``scale`` turns our value into that of the library.
-
-    Its full scale is the largest load, ours 1.2 of it; its airspeed is the recorded one plus an offset.
+    Full scale of its cells is the largest load, ours 1.2 of it; its airspeed is the recorded one plus an offset.
     """
 
     def make(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:
-        value = f * size * _sign(rng)
-        return Change(stand={name: value}, parameters={parameter: (value * scale, unit)} if parameter else {})
+        value = f * size * (_sign(rng) if signed else 1.0)
+        return Change(**{of: {name: value}, "parameters": {parameter: (value * scale, unit)} if parameter else {}})  # type: ignore[arg-type]
 
     return make
+
+
+_world, _section = (partial(_field, of, signed=False) for of in ("world", "section"))
+_stand = partial(_field, "stand")
 
 
 def _untwist(f: float, rig: Rig, c: Conditions, rng: np.random.Generator) -> Change:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, Rig, applied, conditions, extended
@@ -196,10 +196,10 @@ def make_item(
     on = ("ground_effect",) if bench.plan == "wall" and "ground_effect" not in ids else ()
     files = {
         "recording.csv": recording_text({n: v[good] for n, v in shown.items()}),
-        "case.toml": case_text(
+        "case.toml": case_of(
             bench, [e for e in off if e in standard], [e for e in on if e in known], with_duct="duct" not in off
         ),
-        "stations.csv": stations_text(bench.rig),
+        "stations.csv": stations_text(bench.rig.rotor.r_R, bench.rig.rotor.c_R, np.degrees(bench.rig.rotor.beta)),
     }
     kept = [(c, ch) for c, ch in zip(causes, changes, strict=True) if not c.removable]
     for _, change in kept:
@@ -342,58 +342,52 @@ def recording_text(columns: Mapping[str, Array]) -> str:
     return "\n".join([*head[1:], *(",".join(row) for row in body)]) + "\n"
 
 
-def stations_text(rig: Rig) -> str:
+def stations_text(r_R: ArrayLike, c_R: ArrayLike, beta_deg: ArrayLike) -> str:
     """Stations of a blade as CSV."""
-    rows = zip(rig.rotor.r_R, rig.rotor.c_R, np.degrees(rig.rotor.beta), strict=True)
+    rows = np.column_stack([r_R, c_R, beta_deg]).tolist()
     return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
 
 
-def case_text(bench: Bench, off: Collection[str], on: Collection[str], with_duct: bool = True) -> str:
+Cell = str | float | list[str] | tuple[float, str]
+"""Value of a case: words, a number, effects, or a number with its format."""
+
+
+def case_text(name: str, tables: Mapping[str, Mapping[str, Cell]], form: str = ".7g") -> str:
+    """Case file."""
+
+    def shown(v: Cell) -> str:
+        if isinstance(v, list):
+            return f"[{', '.join(map(shown, v))}]"
+        return f'"{v}"' if isinstance(v, str) else f"{v[0]:{v[1]}}" if isinstance(v, tuple) else f"{v:{form}}"
+
+    lines = ['schema = "bemt.case/1"', f'name = "{name}"']
+    for head, rows in tables.items():
+        lines += ["", f"[{head}]", *(f"{k} = {shown(v)}" for k, v in rows.items())]
+    return "\n".join(lines) + "\n"
+
+
+def case_of(bench: Bench, off: Sequence[str], on: Sequence[str], with_duct: bool = True) -> str:
     """Case file of a rig: its geometry, its laboratory's air, and what the baseline leaves out."""
     rig, rows = bench.rig, bench.rows
     rotor, section = rig.rotor, rig.rotor.section
     duct = rig.duct if with_duct else None
-    lines = [
-        'schema = "bemt.case/1"',
-        f'name = "{rig.name}"',
-        "",
-        "[rotor]",
-        f'kind = "{"fan" if duct is not None else "propeller"}"',
-        f"blades = {rotor.blades}",
-        f"diameter_mm = {2e3 * rotor.radius:.4f}",
-        f"hub_ratio = {rotor.hub:g}",
-        "",
-        "[blade]",
-        'stations = "stations.csv"',
-        "",
-        "[blade.section]",
-        f"camber = {section.camber:.5f}",
-        f"camber_position = {section.position:g}",
-        f"thickness = {section.thickness:.5f}",
-        "",
-        "[operating]",
-        f"rpm = {float(np.median(rows.rpm)):.1f}",
-        "airspeed_m_s = 0",
-        "",
-        "[air]",
-        f"pressure_hPa = {float(np.max(rows.pressure_Pa)) / 100.0:.2f}",
-        f"temperature_C = {float(np.median(rows.temperature_C)):.2f}",
-        "",
-        "[model]",
-        "stations = 30",
-        f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]",
-        f"effects_on = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in on)}]",
-    ]
+    tables: dict[str, dict[str, Cell]] = {
+        "rotor": {"kind": "fan" if duct is not None else "propeller", "blades": rotor.blades,
+                  "diameter_mm": (2e3 * rotor.radius, ".4f"), "hub_ratio": (rotor.hub, "g")},
+        "blade": {"stations": "stations.csv"},
+        "blade.section": {"camber": (section.camber, ".5f"), "camber_position": (section.position, "g"),
+                          "thickness": (section.thickness, ".5f")},
+        "operating": {"rpm": (float(np.median(rows.rpm)), ".1f"), "airspeed_m_s": 0},
+        "air": {"pressure_hPa": (float(np.max(rows.pressure_Pa)) / 100.0, ".2f"),
+                "temperature_C": (float(np.median(rows.temperature_C)), ".2f")},
+        "model": {"stations": 30, "effects_off": [*off], "effects_on": [*on]},
+    }  # fmt: skip
     if duct is not None:
         R = rotor.radius * 1e3
         gap = float(np.nanmax(rows.gap)) * 1e3 if np.any(np.isfinite(rows.gap)) else duct.gap * R
-        lines += [
-            "",
-            "[duct]",
-            f"tip_gap_mm = {gap:.4f}",
-            f"length_mm = {duct.length * R:.3f}",
-            f"lip_radius_mm = {duct.lip_radius * R:.3f}",
-            f"rotor_position_mm = {duct.position * R:.3f}",
-            f"exit_area_ratio = {duct.exit_ratio:.5f}",
-        ]
-    return "\n".join(lines) + "\n"
+        tables["duct"] = {
+            "tip_gap_mm": (gap, ".4f"), "length_mm": (duct.length * R, ".3f"),
+            "lip_radius_mm": (duct.lip_radius * R, ".3f"), "rotor_position_mm": (duct.position * R, ".3f"),
+            "exit_area_ratio": (duct.exit_ratio, ".5f"),
+        }  # fmt: skip
+    return case_text(rig.name, tables)

@@ -20,7 +20,6 @@ import math
 import shlex
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise, product
@@ -452,12 +451,7 @@ def loop(
         write_atomic(file, json.dumps(course.document()))
         return course
 
-    courses: list[Course] = []
-    with ThreadPoolExecutor(jobs) as pool:
-        for k, course in enumerate(pool.map(one, todo), 1):
-            courses.append(course)
-            if say:
-                say(f"followed {k}/{len(todo)}")
+    courses = prove.on_threads(one, todo, jobs, prove.teller("followed", say))
     scored = _scored([e for e, _ in todo], courses, runs, fixed)
     write_atomic(out / f"{kept.name}.json", json_text(scored.document()))
     write_atomic(out / f"{kept.name}.txt", text(scored) + "\n")

@@ -18,7 +18,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.given import data_roots
-from bemt.judge.proof.items import Item, recording_text
+from bemt.judge.proof.items import Item, case_text, recording_text
 from bemt.judge.proof.rows import Entry
 
 _KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
@@ -178,12 +178,9 @@ def _case(label: Mapping[str, Any]) -> str:
     blade |= {"chord_law": label.get("chord_law", "apc_like")} | ({"max_chord_over_R": 0.35} if fan else {})
     section = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
 
-    def table(name: str, rows: Mapping[str, Any]) -> list[str]:
-        return [f"[{name}]", *(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:g}" for k, v in rows.items()), ""]
-
-    lines = ['schema = "bemt.case/1"', 'name = "label"', "", *table("rotor", rotor), *table("blade", blade)]
-    lines += table("blade.section", section) + table("operating", {"rpm": label["rpm"], "airspeed_m_s": 0.0})
-    return "\n".join([*lines, *table("air", {"density_kg_m3": 1.2})])
+    operating = {"rpm": label["rpm"], "airspeed_m_s": 0.0}
+    return case_text("label", {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
+                               "air": {"density_kg_m3": 1.2}}, "g")  # fmt: skip
 
 
 def draw_pairs() -> Iterator[Item]:

@@ -19,7 +19,7 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.given import data_roots, find_data
 from bemt.data.readers.uiuc_names import class_of
-from bemt.judge.proof.items import Item, recording_text
+from bemt.judge.proof.items import Cell, Item, case_text, recording_text, stations_text
 from bemt.judge.proof.pairs import draw_pairs
 from bemt.judge.proof.rows import Entry
 from bemt.physics.sections import rule as section_rule
@@ -62,22 +62,12 @@ def _item(
     return Item(files | ({} if reference is None else {"reference.csv": recording_text(reference)}), entry)
 
 
-def _case(name: str, rotor: Mapping[str, Any], section: Mapping[str, float], rpm: float, air: Mapping[str, float],
+def _case(name: str, rotor: Mapping[str, Cell], section: Mapping[str, Cell], rpm: float, air: Mapping[str, Cell],
           off: Collection[str] = ()) -> str:  # fmt: skip
-    def table(head: str, rows: Mapping[str, Any]) -> list[str]:
-        words = (f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.7g}" for k, v in rows.items())
-        return [f"[{head}]", *words, ""]
-
-    lines = ['schema = "bemt.case/1"', f'name = "{name}"', "", *table("rotor", rotor),
-             *table("blade", {"stations": "stations.csv"}), *table("blade.section", section),
-             *table("operating", {"rpm": rpm, "airspeed_m_s": 0.0}), *table("air", air), "[model]", "stations = 30",
-             f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]"]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
-def _stations(r_R: Array, c_R: Array, beta_deg: Array) -> str:
-    rows = zip(r_R, c_R, beta_deg, strict=True)
-    return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
+    return case_text(name, {
+        "rotor": rotor, "blade": {"stations": "stations.csv"}, "blade.section": section,
+        "operating": {"rpm": rpm, "airspeed_m_s": 0.0}, "air": air, "model": {"stations": 30, "effects_off": [*off]},
+    })  # fmt: skip
 
 
 def change_over_speed(rpm: Array, coefficient: Array) -> float:
@@ -96,7 +86,7 @@ def change_over_speed(rpm: Array, coefficient: Array) -> float:
 
 
 def _uiuc_case(
-    p: UiucPropeller, rpm: float, air: Mapping[str, float], off: Collection[str] = (), turned: float = 0.0
+    p: UiucPropeller, rpm: float, air: Mapping[str, Cell], off: Collection[str] = (), turned: float = 0.0
 ) -> tuple[str, str]:
     g = p.geometry
     assert g is not None
@@ -107,7 +97,7 @@ def _uiuc_case(
     keep = (g.r_R <= 1.0) & (g.r_R > 0.1)
     name = p.name.replace(".", "p")
     return (_case(name, rotor, section, rpm, air, off),
-            _stations(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
+            stations_text(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
 
 
 def _dimensional(p: UiucPropeller) -> dict[str, Array]:
@@ -181,7 +171,7 @@ def _x22a() -> Iterator[Item]:
         text = _case(f"x22a_{angle}", rotor, {"camber": 0.02, "thickness": 0.08}, 1200.0, {"density_kg_m3": 1.225},
                      ("duct",))  # fmt: skip
         keep = shape[:, 0] <= 1.0
-        blade = _stations(shape[keep, 0], shape[keep, 3] / R, shape[keep, 2] + angle - 20.0)
+        blade = stations_text(shape[keep, 0], shape[keep, 3] / R, shape[keep, 2] + angle - 20.0)
         yield _item("real duct", f"x22a_{angle}", columns, text, blade, ["J", "airspeed_m_s"])
 
 
@@ -200,7 +190,7 @@ def _caradonna_tung() -> Iterator[Item]:
                    "thrust_N": q[:, 3] * 1.225 * np.pi * 1.143**2 * (q[:, 1] * np.pi / 30.0 * 1.143) ** 2}  # fmt: skip
         text = _case(f"caradonna_tung_{angle:g}", rotor, {"camber": 0.0, "thickness": 0.12}, float(q[0, 1]),
                      {"density_kg_m3": 1.225}, ("compressibility", "drag_divergence"))  # fmt: skip
-        blade = _stations(r_R, np.full(r_R.size, 0.1905 / 1.143), np.full(r_R.size, float(angle)))
+        blade = stations_text(r_R, np.full(r_R.size, 0.1905 / 1.143), np.full(r_R.size, float(angle)))
         yield _item("real mach", f"caradonna_tung_{angle:g}", columns, text, blade, ["M_tip", "rpm"])
 
 
@@ -215,7 +205,7 @@ def _tmotor() -> Iterator[Item]:
         if name.strip() in ("radius", "chord", "pitch"):
             given[name.strip()] = np.array([float(v) for v in values.split()])
     R = 0.3556
-    blade = _stations(given["radius"] / R, given["chord"] / R, given["pitch"])
+    blade = stations_text(given["radius"] / R, given["chord"] / R, given["pitch"])
     rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
     section = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
     columns = {"rpm": rows[:, 0], "airspeed_m_s": np.zeros(len(rows)), "thrust_N": rows[:, 3], "torque_Nm": rows[:, 4]}
