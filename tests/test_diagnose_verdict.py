@@ -11,7 +11,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge import loss
-from bemt.judge.diagnose import chain, fit, form, noise, prior
+from bemt.judge.diagnose import chain, fit, form, knowledge, noise
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
@@ -57,7 +57,7 @@ def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnos
 def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis) -> None:
     parts = [SimpleNamespace(baseline=p.baseline, model=SimpleNamespace(duct=walls)) for p in answer.problem.parts]
     problem: Any = SimpleNamespace(parts=parts)
-    assert ("duct" in prior.present(problem)) == (walls is not None)
+    assert ("duct" in knowledge.present(problem)) == (walls is not None)
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:

@@ -89,7 +89,6 @@ MAY: dict[str, set[str]] = {
     "bemt.judge.proof.prove": {"files", "clock", "environment"},
     "bemt.judge.proof.follow": {"files"},
     "bemt.judge.proof.loop": {"files"},
-    "bemt.judge.proof.pairs": {"files"},
     "bemt.judge.proof.real": {"files"},
     "bemt.judge.proof.rows": {"files"},
     "bemt.tools.exports.*": {"files"},

@@ -15,20 +15,7 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.proof import (
-    causes,
-    draw,
-    items,
-    loop,
-    prove,
-    real,
-    rows,
-    score,
-    truth,
-    truth_ccblade,
-    truth_section,
-    truth_world,
-)
+from bemt.judge.proof import causes, items, loop, prove, real, rows, score, truth, truth_section, truth_world
 from bemt.judge.proof.items import Bench, Item
 from bemt.judge.proof.rows import Entry, Estimate, Key, Ranked, Step, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, covariance, full_scales, record
@@ -261,7 +248,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
 # The promise of the sealing: the key is fixed before the diagnosis, which sees recording and case only; and the score
 
 
-TINY = draw.ProofSize(
+TINY = prove.ProofSize(
     {"single": 2, "pair": 0, "null": 1, "mismatch": 1, "unlisted": 0, "sensor": 2, "underpowered": 1},
     ((False, ("static_narrow",)),),
 )
@@ -270,10 +257,10 @@ TINY = draw.ProofSize(
 @pytest.fixture(scope="module")
 def patched() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(draw.SIZES, "tiny", TINY)
+        patch.setitem(prove.SIZES, "tiny", TINY)
         # the quickest plan stands for the good ones, too
-        patch.setattr(draw, "_POOR", ("single_line",))
-        patch.setattr(draw, "_OPEN", (*draw._OPEN, "static_narrow"))
+        patch.setattr(prove, "_POOR", ("single_line",))
+        patch.setattr(prove, "_OPEN", (*prove._OPEN, "static_narrow"))
         patch.setitem(TINY.items, "underpowered", 0)
         patch.setattr(items.Bench, "signatures", lambda self: {})  # look-alikes cost time and are tested with the truth
         yield patch
@@ -421,7 +408,7 @@ def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
 
 def test_the_reference_lacks_the_cause_and_nothing_else(patched: Any) -> None:
     """A thrust cell 10 % off: the same rotor reads a tenth less in the reference, torque and points are the same."""
-    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    bench = prove.benches(TINY, np.random.SeedSequence(3))[0]
     item = items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
     off = item.entry.parameters["thrust_gain"]["gain"].value
     here, there = (
@@ -552,7 +539,7 @@ def test_no_answer_is_no_virtue() -> None:
 @pytest.fixture(scope="module")
 def weighed(patched: Any) -> tuple[items.Bench, Item]:
     """Item whose thrust cell is 10 % off, without a reference of its own."""
-    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    bench = prove.benches(TINY, np.random.SeedSequence(3))[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(items, "_REFERENCED", 0.0)
         return bench, items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
@@ -754,8 +741,8 @@ def test_two_truths_agree_where_both_hold(bench: Bench) -> None:
 
 def test_causes_are_those_it_can_express(bench: Bench) -> None:
     allowed = {c.id for c in bench.allowed()}
-    assert allowed <= truth_ccblade.EXPRESSIBLE and {"reynolds", "pitch_offset", "thrust_gain"} <= allowed
-    plans = {plan for _, plans in draw.SIZES["ccblade"].plans for plan in plans}
+    assert allowed <= truth_world.EXPRESSIBLE and {"reynolds", "pitch_offset", "thrust_gain"} <= allowed
+    plans = {plan for _, plans in prove.SIZES["ccblade"].plans for plan in plans}
     assert plans <= {"grid_shuffled", "grid_ordered", "two_air"}  # most of their points are in flight
 
 
@@ -775,6 +762,6 @@ def test_without_the_extra_it_says_so(bench: Bench, monkeypatch: pytest.MonkeyPa
 @pytest.mark.slow
 def test_the_items_of_a_seed_do_not_depend_on_the_number_of_processes() -> None:
     plans = ((False, ("static_sweep",)), (False, ("static_sweep", "wall")))
-    size = draw.ProofSize({**TINY.items, "underpowered": 0}, plans)
-    one, two = (list(draw.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
+    size = prove.ProofSize({**TINY.items, "underpowered": 0}, plans)
+    one, two = (list(prove.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
     assert [(i.files, i.reference) for i in one] == [(i.files, i.reference) for i in two]

@@ -19,8 +19,8 @@ from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.answer import Diagnosis, locate
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.fit import fit, form_covariance
+from bemt.judge.diagnose.knowledge import ALWAYS
 from bemt.judge.diagnose.nuisance import following
-from bemt.judge.diagnose.prior import ALWAYS
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects

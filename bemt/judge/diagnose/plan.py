@@ -13,7 +13,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
-from bemt.judge.diagnose import form, noise, posterior, prior, problem, signatures
+from bemt.judge.diagnose import form, knowledge, noise, posterior, problem, signatures
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
 from bemt.judge.diagnose.record import Record
@@ -171,7 +171,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, [suggestion.Rival(i, settings[i], 0.5) for i in (a, b)])
-    before = prior.log_priors(prior.prior_weights(whole, alike.ids), pairs=False)
+    before = knowledge.log_priors(knowledge.prior_weights(whole, alike.ids), pairs=False)
     odds = float(np.log(COSTS.wrong / COSTS.silent))  # from which a name is the answer of least loss
     bar = np.array([odds + before[NONE] - before[Explanation.of(i)] for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)

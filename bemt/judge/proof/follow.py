@@ -18,8 +18,7 @@ from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.judge.proof import prove, rows, score
 from bemt.judge.proof.items import recording_text
-from bemt.judge.proof.pairs import followed, pair_files
-from bemt.judge.proof.real import DENSITY, POUND, WRONG_DENSITY
+from bemt.judge.proof.real import DENSITY, POUND, WRONG_DENSITY, followed, pair_files
 from bemt.judge.proof.rows import Entry
 
 SCHEMA = "bemt.followed/1"

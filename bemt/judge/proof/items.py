@@ -13,9 +13,8 @@ from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, Rig, applied,
 from bemt.judge.proof.rows import Entry, TrueValue
 from bemt.judge.proof.stand import FREEDOM, StandErrors, Yardstick, freedom, full_scales, record, yardstick
 from bemt.judge.proof.truth import TrueAnswer
-from bemt.judge.proof.truth_ccblade import EXPRESSIBLE
 from bemt.judge.proof.truth_section import SectionPhysics
-from bemt.judge.proof.truth_world import Conditions, TrueLoads, World, loads
+from bemt.judge.proof.truth_world import EXPRESSIBLE, Conditions, TrueLoads, World, loads
 
 _DIGITS = 6
 # Share of the items that state the uncertainty of their readings, and that come with a run without the cause.

@@ -31,7 +31,7 @@ import numpy as np
 from bemt.base.document import Documented
 from bemt.base.tables import json_text, text_table, write_atomic
 from bemt.judge.diagnose.suggest import minutes
-from bemt.judge.proof import draw, prove, rows, score
+from bemt.judge.proof import prove, rows, score
 from bemt.judge.proof.causes import CAUSES, Rig
 from bemt.judge.proof.items import Bench, further_run, recorded_again
 from bemt.judge.proof.rows import Entry, Step, ToldAnswer
@@ -429,7 +429,7 @@ def loop(
     kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
+    found = {(b.rig.name, b.plan): b for b in prove.benches(prove.SIZES[key.size], first)}
     todo = []
     for entry in sorted(key.items, key=_rank):
         answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer

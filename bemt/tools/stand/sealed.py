@@ -12,7 +12,7 @@ import numpy as np
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
-from bemt.judge.proof import draw, rows
+from bemt.judge.proof import prove, rows
 from bemt.judge.proof.causes import CAUSES, WALL, Rig, draw_rig
 from bemt.judge.proof.items import Bench
 from bemt.judge.proof.prove import KEY_SCHEMA
@@ -44,7 +44,7 @@ def bench_of(folder: Path, item: str) -> tuple[Bench, Entry]:
         rig = rig_of(load_case(told["case"]), told["top_rpm"])
         return Bench(rig, entry.plan, rows_of(told["points"])), entry
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
+    found = {(b.rig.name, b.plan): b for b in prove.benches(prove.SIZES[key.size], first)}
     return found[entry.rig, entry.plan], entry
 
 
