@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bemt.judge.compare.matched import MatchedChannel
     from bemt.judge.compare.recordings import RunChange
 
-_LABEL = {
+LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",
     "CP": "$C_P$ = P/($\\rho n^3 D^5$) [1]", "rpm": "speed of rotation [rev/min]", "J": "advance ratio J = V/(n D) [1]",
 }  # fmt: skip
@@ -97,7 +97,7 @@ class PredictionView:
             figure.set_figwidth(4.4)
             for axis, channel in zip(axes[:, 0], self.channels, strict=True):
                 self._panel(axis, channel)
-            axes[-1, 0].set_xlabel(_LABEL[self.over])
+            axes[-1, 0].set_xlabel(LABEL[self.over])
             axes[-1, 0].locator_params(axis="x", nbins=6)
             handles, labels = axes[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -117,7 +117,7 @@ class PredictionView:
             axis.errorbar(part[self.over], part[channel], u if np.any(u > 0.0) else None, fmt=mark, color=colour,
                           markersize=4, elinewidth=0.8, markerfacecolor="none" if k else colour, zorder=3,
                           label=part.name[:28])  # fmt: skip
-        axis.set_ylabel(_LABEL[channel])
+        axis.set_ylabel(LABEL[channel])
         axis.margins(x=0.04)
         if self.over == "rpm":
             axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))

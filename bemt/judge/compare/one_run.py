@@ -30,6 +30,7 @@ from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
+from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.conditioning import STAND
 from bemt.rotors.propeller import rotor_of
@@ -152,7 +153,7 @@ def compare_run(
     ):
         if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
             notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {words} of the case")
-            points = _with(points, channel, float(value))
+            points = replace(points, values={**points.values, channel: np.full(len(points), float(value))})
     full = points.derive(made.diameter_m)
     keep = np.any([np.isfinite(full[k]) for k in ("thrust_N", "torque_Nm") if k in full], axis=0)
     rows = np.flatnonzero(keep & np.isfinite(full["rpm"]))
@@ -173,7 +174,8 @@ def compare_run(
     lines: list[AuditLine] = []
     if computed:
         at = int(rows[0])
-        lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, _pitch(made), made.ducted,
+        pitch = float(prepare_case(made, oblique=True).pitch_m)
+        lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, pitch, made.ducted,
                            float(made.air().a_sound), at)]  # fmt: skip
         if not is_run(imported):
             flies = full["airspeed_m_s"][rows] > 0.5
@@ -203,17 +205,6 @@ def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> ND
     return np.full(rows.size, case.angle_deg)
 
 
-def _with(d: Dataset, channel: str, value: float) -> Dataset:
-    values = {**d.values, channel: np.full(len(d), value)}
-    return Dataset(d.kind, d.name, values, d.u, d.flags, d.provenance, d.labels, notes=d.notes, units=d.units)
-
-
-def _pitch(case: Case) -> float:
-    from bemt.rotors.case.prepare import prepare_case
-
-    return float(prepare_case(case, oblique=True).pitch_m)
-
-
 def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
     """Loads at one point."""
     loads = {
@@ -234,13 +225,9 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads
     ours, band = float(bemt[name][k]), float(bemt.u[name][k])
     both = math.hypot(u if math.isfinite(u) else 0.0, band)
     parts = {origin: float(part[name][k]) for origin, part in bemt.u_by.items() if name in part}
-    return BothLoads(value, u, ours, band, parts, ours - value, both, _verdict(ours - value, both))
-
-
-def _verdict(E: float, u: float) -> str:
-    if not (math.isfinite(E) and math.isfinite(u)):
-        return "no result"
-    return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
+    E = ours - value
+    said = "agrees" if abs(E) <= both else "within 2 u" if abs(E) <= _WIDE * both else "differs"
+    return BothLoads(value, u, ours, band, parts, E, both, said if math.isfinite(E + both) else "no result")
 
 
 def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
@@ -263,13 +250,6 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
     size = max(error.factor, error.repair)
     return score, (f" {name.split('_')[0].capitalize()} is off by about a factor of {size:.4g}, as of {error.actual} "
                    f"taken for {error.stated}: check the unit.")  # fmt: skip
-
-
-def _size(load: BothLoads, largest: float) -> str:
-    """A difference as a share: of the value, near zero of the largest one."""
-    if abs(load.cfd) >= _NEAR_ZERO * largest:
-        return load.percent
-    return f"{100.0 * load.difference / largest:+.0f} % of the largest"
 
 
 def open_units(imported: Dataset) -> frozenset[str]:
@@ -295,7 +275,9 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
         said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
         tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {_size(load, top[k])}"
+        near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
+        share_of = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
+        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {share_of}"
         return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
     if near:
         worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest

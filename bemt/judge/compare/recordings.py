@@ -159,6 +159,11 @@ class RunChange:
         return f"thrust of {letter} is negative below {rpm:.0f} rev/min, {IN_WIND}"
 
     @property
+    def no_pair(self) -> str:
+        """Why the runs cannot be compared; "" where they can."""
+        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else "")
+
+    @property
     def by_density(self) -> str:
         """Why the densities, where both recordings tell them and they differ, are a cause of their own."""
         size = max((abs(c.log_density) for c in self.loads_by_name.values()), default=0.0)

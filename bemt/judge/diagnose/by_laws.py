@@ -83,7 +83,7 @@ def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collectio
     said = pair.with_density(said)
     if pair.turned and said.effects == ("unit_slip",):
         said = replace(said, why=recordings.REVERSED)
-    elif said.verdict == "insufficient" and (why := _not_comparable(pair)):
+    elif said.verdict == "insufficient" and (why := pair.no_pair):
         said = replace(said, why=why)
     return Judgement.of(said, P, parameters)
 
@@ -105,11 +105,6 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     slips = set() if pair.wind else {"rpm_scale", "unit_slip"}
     kept = {k: p for k, p in P.items() if k.ids & slips or (pair.wind and k == NONE)}
     return {**kept, DOUBT: 1.0 - sum(kept.values())}
-
-
-def _not_comparable(pair: RunChange) -> str:
-    """Why two recordings are no pair."""
-    return pair.wind or (recordings.NOTHING_SHARED if pair.apart else recordings.OTHER_STAND if pair.far_off else "")
 
 
 def weighed(

@@ -175,8 +175,12 @@ def compare(
     said = document(found)
     if case is not None and not found.wind:
         said = _diagnosed(said, asked, read, case, found, progress)
-    step = next_step(found, asked) if said.diagnosis is None else _after(said.diagnosis)
-    step = step | {"command": ""} if step["command"] == asked.command() else step
+    if said.diagnosis is None:
+        step: Mapping[str, Any] = next_step(found, asked)
+    else:
+        step = said.diagnosis["next_measurement"]
+        step = {**step, "command": [*step["commands"], ""][0]}
+    step = {**step, "command": ""} if step["command"] == asked.command() else step
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
         notes=(*_errors(findings), *said.notes), next_measurement=step,
@@ -320,13 +324,6 @@ def _given(asked: Invocation) -> Given:
             return (asked.with_days(),)
 
     return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
-
-
-def _after(diagnosis: Mapping[str, Any]) -> dict[str, Any]:
-    """Run that the diagnosis recommends, and the command that takes it in."""
-    told = dict(diagnosis.get("next_measurement") or {})
-    commands = told.get("commands") or [""]
-    return {**told, "command": commands[0]}
 
 
 def label_diameter(label: str | None) -> float | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -236,7 +235,9 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
-        lines.append(f"{lead} ({decision.probability:.2f}): {_members(decision.effects)}.")
+        large = len(decision.effects) > _A_GROUP
+        members = ", ".join(i if large else f"{i} ({_title(i)})" for i in decision.effects)
+        lines.append(f"{lead} ({decision.probability:.2f}): {members}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
         lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
@@ -284,7 +285,8 @@ def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     said = d.said
     titles = [_title(i) for i in said.effects]
-    off = _off(d)
+    apart = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
+    off = " and ".join(apart)
     if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
@@ -297,7 +299,8 @@ def headline(d: Diagnosis) -> str:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
-    end = f"{_moved(d)}{_in_both(d)}."
+    moved = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
+    end = f"{f' ({moved} against the reference)' if moved else ''}{_in_both(d)}."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
         return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
@@ -305,7 +308,9 @@ def headline(d: Diagnosis) -> str:
         if said.beside:
             return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{end}"
         if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{end}"
+            each = (" / ".join(map(_title, s)) for s in said.sets)
+            words = (f"one of ({w})" if len(s) > 1 else w for w, s in zip(each, said.sets, strict=True))
+            return f"Two causes: {' and '.join(words)}{end}"
         if len(titles) > _A_GROUP:
             return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{end}"
         return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{end}"
@@ -343,28 +348,6 @@ def _from_reference(d: Diagnosis) -> str:
     """What the recording differs from the reference by, in words."""
     words = " and ".join(f"{name} by {_share(v)}" for name, v in _ratios(d))
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
-
-
-def _moved(d: Diagnosis) -> str:
-    """The same behind a cause."""
-    words = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
-    return f" ({words} against the reference)" if words else ""
-
-
-def _members(ids: Sequence[str]) -> str:
-    """Members of a class; of a large one only their names."""
-    return ", ".join(i if len(ids) > _A_GROUP else f"{i} ({_title(i)})" for i in ids)
-
-
-def _one_of(ids: Sequence[str]) -> str:
-    titles = [_title(i) for i in ids]
-    return titles[0] if len(titles) == 1 else f"one of ({' / '.join(titles)})"
-
-
-def _off(d: Diagnosis) -> str:
-    """By how much each channel differs from the case."""
-    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
-    return " and ".join(words)
 
 
 def _share(v: float) -> str:

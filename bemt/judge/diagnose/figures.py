@@ -15,7 +15,7 @@ from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
 from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
-from bemt.judge.compare.first_picture import PredictionView, against_band
+from bemt.judge.compare.first_picture import LABEL, PredictionView, against_band
 from bemt.judge.diagnose import figures_effects
 from bemt.judge.diagnose.document import headline
 from bemt.judge.diagnose.record import CHANNELS
@@ -37,10 +37,7 @@ LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
 
 _CHANNEL = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
-_COEFFICIENT = {
-    "thrust_N": "$C_T$ = T/($\\rho n^2 D^4$) [1]", "torque_Nm": "$C_P$ = P/($\\rho n^3 D^5$) [1]",
-    "rpm": "rpm [rev/min]",
-}  # fmt: skip
+_COEFFICIENT = {"thrust_N": LABEL["CT"], "torque_Nm": LABEL["CP"], "rpm": "rpm [rev/min]"}
 _AXIS = {
     "J": "advance ratio J [1]", "M_tip": "tip Mach number [1]", "Re": "Reynolds number at 0.75 R [1]",
     "rpm": "speed of rotation [rev/min]", "time_s": "time [s]", "temperature_K": "temperature [K]",
@@ -68,7 +65,8 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
     written = []
     for old in out.glob(f"{FIRST}*.png"):
         old.unlink()
-    for view in _views(answer, cases):
+    records = [part.record for part in answer.problem.parts if not part.record.reference]
+    for view in first_picture(records, cases) if len(cases) in (1, len(records)) else ():
         stem = FIRST if len({c.path.resolve() for c in cases}) == 1 else f"{FIRST}_{view.case}"
         written.append(out / f"{stem}.png")
         write_atomic(written[-1], slim(view.png()))
@@ -81,12 +79,6 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
                 written.append(out / f"{name}.png")
                 write_atomic(written[-1], slim(png(figure, DPI, optimize=True)))
     return written
-
-
-def _views(answer: Diagnosis, cases: Sequence[Case]) -> list[PredictionView]:
-    """Recordings that are judged, beside their cases."""
-    records = [part.record for part in answer.problem.parts if not part.record.reference]
-    return first_picture(records, cases) if len(cases) in (1, len(records)) else []
 
 
 def slim(whole: bytes) -> bytes:
@@ -142,10 +134,6 @@ def _lines(x: Array) -> Index:
     return line
 
 
-def _percent(d: Array) -> str:
-    return f"{100.0 * float(d):+.1f} %"
-
-
 # Residual
 
 
@@ -190,7 +178,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
     text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
-        text += f": mean {_percent(np.asarray(where.size))} of the largest, in the marked region"
+        text += f": mean {100.0 * where.size:+.1f} % of the largest, in the marked region"
     return text
 
 

@@ -9,7 +9,7 @@ World, ch. 4; Lei et al. 2018, J. Am. Stat. Assoc. 113:1094). The file says whic
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -260,7 +260,7 @@ def _quantile(q: float, a: Array, b: Array) -> Array:
     return np.asarray(np.clip(np.where(right, -x, x), a, b))
 
 
-def _told(grid: Size | None, value: Any, unit: str) -> Size:
+def _told(grid: Size | None, value: object, unit: str) -> Size:
     """What a fit says of a parameter that it took from the grid."""
     if grid is None or not isinstance(value, (int, float)):
         return Size(value, value, value, unit, None if grid is None else grid.odds)
@@ -319,18 +319,15 @@ def smooth(found: Evidence, best: Fit) -> Array:
 FILE = "interval_scales.json"
 
 
-@cache
-def _scales() -> dict[str, Any]:
-    text = resources.files("bemt.judge.diagnose").joinpath(FILE).read_text(encoding="utf-8")
-    found: dict[str, Any] = json.loads(text)
-    return found
-
-
 def scale_of(effect: str, parameter: str) -> float:
     """Factor on the half-widths of a parameter [1]."""
-    table = _scales()
-    own = table["parameters"].get(f"{effect}.{parameter}")
-    return float((own or table["kinds"].get(effects.catalogue()[effect].kind, {"scale": 1.0}))["scale"])
+    own = _scales()["parameters"].get(f"{effect}.{parameter}")
+    return float((own or _scales()["kinds"].get(effects.catalogue()[effect].kind, {"scale": 1.0}))["scale"])
+
+
+@cache
+def _scales() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    return json.loads(resources.files("bemt.judge.diagnose").joinpath(FILE).read_text(encoding="utf-8"))  # type: ignore[no-any-return]
 
 
 def widened(told: Sizes) -> dict[str, dict[str, Size]]:

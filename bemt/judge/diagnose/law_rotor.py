@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.problem import Part
+from bemt.judge.diagnose.problem import BY_LAWS, Part
 from bemt.judge.diagnose.record import Record
 from bemt.physics.effects.base import Effect, Flow, Loads
 
@@ -345,11 +345,6 @@ class LawPart(Part):
 
     rotor: LawRotor = field(default_factory=lambda: LawRotor(1.0, {}))
 
-    @property
-    def by_laws(self) -> bool:
-        """Yes."""
-        return True
-
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         loads, met = self.rotor.respond(effects, self.flow)
         return loads.T, loads.Q, met
@@ -357,4 +352,4 @@ class LawPart(Part):
 
 def law_part(record: Record, rotor: LawRotor) -> LawPart:
     """Part of a recording."""
-    return LawPart(record, rotor, (), rotor.flow(record), "laws", rotor=rotor)  # type: ignore[arg-type]
+    return LawPart(record, rotor, (), rotor.flow(record), BY_LAWS, rotor=rotor)  # type: ignore[arg-type]

@@ -29,6 +29,10 @@ _SLIPPED = 3.0
 _SLOWER, _FASTER = 0.7, 1.1
 
 
+BY_LAWS = "laws"
+"""Key of a rotor that is known by its reference alone (:mod:`bemt.judge.diagnose.law_rotor`)."""
+
+
 @dataclass(frozen=True, eq=False)
 class SpeedCurve:
     """Speed over the pulse width, which is a parabola over the speed.
@@ -131,11 +135,6 @@ class Part:
         return (*(e for e in self.baseline if e.id != blade.id), blade)
 
     @property
-    def by_laws(self) -> bool:
-        """Whether its rotor is known by its reference alone (:mod:`bemt.judge.diagnose.law_rotor`)."""
-        return False
-
-    @property
     def channels(self) -> tuple[str, ...]:
         """Channels that were measured, in the order of :data:`CHANNELS`."""
         return tuple(c for c in CHANNELS if c in self.record.measured)
@@ -200,7 +199,7 @@ class Problem:
     @property
     def by_laws(self) -> bool:
         """Whether there is no case, and signatures are those of scaling laws."""
-        return any(p.by_laws for p in self.parts)
+        return any(p.key == BY_LAWS for p in self.parts)
 
     @property
     def findings(self) -> tuple[str, ...]:

@@ -117,7 +117,8 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         values["rpm"] = np.full(n, case.rpm)
         notes.append(f"{NO_SPEED}; {case.rpm:g} rev/min of the case")
     air, recorded = _states(values, case, notes, series.name)
-    filled = series.derive(case.diameter_m, air.rho) if "rpm" in series else _with_rpm(series, case, air)
+    turning = series if "rpm" in series else replace(series, values={**series.values, "rpm": values["rpm"]})
+    filled = turning.derive(case.diameter_m, air.rho)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
     measured: dict[str, Array] = {}
     u: dict[str, Array] = {}
@@ -224,11 +225,6 @@ def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
     large = np.abs(rise) > 0.01 * np.abs(rpm[1:])
     out[1:-1] = dense[:-1] & dense[1:] & (np.abs(right - left) > 0.6 * size) & (large[:-1] | large[1:])
     return out
-
-
-def _with_rpm(series: Dataset, case: Case, air: Air) -> Dataset:
-    rpm = np.full(len(series), case.rpm)
-    return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
 
 
 def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str) -> tuple[Air, bool]:
