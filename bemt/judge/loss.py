@@ -90,12 +90,36 @@ def decide(
     >>> decide({NONE: 0.9, gain: 0.1}).verdict, decide({NONE: 0.5, gain: 0.5}).verdict
     ('none', 'insufficient')
     """
-    c = costs
     none, unknown, doubt = (P.get(k, 0.0) for k in (NONE, UNKNOWN, DOUBT))
     listed = dict(sorted(((k, p) for k, p in P.items() if k.ids and p > _NOTHING), key=lambda kv: -kv[1]))
-    counted = {**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}
-    moved = sum(p for k, p in listed.items() if k.ids & still)
-    cause, calm = sum(listed.values()) - moved, none + moved
+    verdict, said, least = _least({**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}, costs, still)
+    decision = Decision(verdict, said, next(iter(listed), NONE), 0.0, "", loss=least)
+    if verdict == "named":
+        what, known = Explanation.of(*said), effects.catalogue()
+        stand = all(i in known and known[i].kind == "stand" for i in said)
+        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
+        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
+                       why=why, sets=tuple((i,) for i in said))  # fmt: skip
+    if verdict == "class":
+        return _of_class(decision, {k: p for k, p in listed.items() if k.ids <= set(said)})
+    if verdict == "none":
+        return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")
+    if verdict == "unknown":
+        return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
+    if doubt >= 0.5:
+        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
+    most = max(none, unknown, *listed.values(), 0.0)
+    return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
+
+
+def _least(
+    counted: Mapping[Explanation, float], c: Costs, still: frozenset[str]
+) -> tuple[str, tuple[str, ...], dict[str, float]]:
+    """Answer of least expected loss, and the least of each kind of answer."""
+    none, unknown, doubt = (counted[k] for k in (NONE, UNKNOWN, DOUBT))
+    listed = [k for k in counted if k.ids]
+    moved = sum(counted[k] for k in listed if k.ids & still)
+    cause, calm = sum(counted[k] for k in listed) - moved, none + moved
     answers: dict[tuple[str, tuple[str, ...]], float] = {
         ("none", ()): c.missed * (cause + unknown) + c.wrong * doubt,
         ("unknown", ()): c.phantom * calm + c.missed * cause + c.wrong * doubt,
@@ -111,35 +135,21 @@ def decide(
                 break
             if len(members) > 1 and not still.issuperset(members):
                 answers["class", members] = expected(frozenset(members), False, counted, c, still)
-    verdict, said = min(answers, key=lambda k: answers[k])
     least: dict[str, float] = {}
     for (kind, _), v in answers.items():
         least[kind] = min(v, least.get(kind, v))
-    first = next(iter(listed), NONE)
-    decision = Decision(verdict, said, first, 0.0, "", loss=least)
-    if verdict == "named":
-        what = Explanation.of(*said)
-        stand = all(i in effects.catalogue() and effects.catalogue()[i].kind == "stand" for i in said)
-        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
-        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
-                       why=why, sets=tuple((i,) for i in said))  # fmt: skip
-    if verdict == "class":
-        inside = {k: p for k, p in listed.items() if k.ids <= set(said)}
-        surest, sets = _sets(said, inside)
-        alone = inside.get(Explanation.of(surest), 0.0)
-        beside = len(sets) > 1 and alone > _ALONE * sum(inside.values())
-        why = "these readings do not tell them apart"
-        if len(sets) > 1:
-            why = f"{surest} is present; whether another is, too, is left open" if beside else "two causes are present"
-        return replace(decision, probability=sum(inside.values()), why=why, sets=sets, beside=beside)
-    if verdict == "none":
-        return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")
-    if verdict == "unknown":
-        return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
-    if doubt >= 0.5:
-        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
-    most = max(none, unknown, *listed.values(), 0.0)
-    return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
+    return *min(answers, key=lambda k: answers[k]), least
+
+
+def _of_class(decision: Decision, inside: Mapping[Explanation, float]) -> Decision:
+    """Answer that is a class, with the probability of what lies in it."""
+    surest, sets = _sets(decision.effects, inside)
+    total, alone = sum(inside.values()), inside.get(Explanation.of(surest), 0.0)
+    beside = len(sets) > 1 and alone > _ALONE * total
+    why = "these readings do not tell them apart"
+    if len(sets) > 1:
+        why = f"{surest} is present; whether another is, too, is left open" if beside else "two causes are present"
+    return replace(decision, probability=total, why=why, sets=sets, beside=beside)
 
 
 def _sets(

@@ -226,7 +226,7 @@ class ComparedRuns(Documented):
     diagnosis: Mapping[str, Any] | None = None
     told: tuple[str, ...] | None = None  # Lines of the diagnosis
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values; verdict and ranking in the words of the diagnosis where there is one."""
         said = {k: self.diagnosis[k] for k in DIAGNOSED} if self.diagnosis else {}
         return {"schema": SCHEMA, "version": __version__, **super().document(), **said}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,7 +81,7 @@ class PredictionView:
         tail = f"; in the median they are {middle} from the model" if middle else ""
         return f"{counts} readings lie inside the 95 % band of {self.case}{tail}."
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """Give the sentence and the counts as plain values."""
         told = {c: dict(zip(("inside", "readings", "median_change"), self.inside(c), strict=True))
                 for c in self.channels}  # fmt: skip

@@ -100,7 +100,7 @@ class RunComparison(Documented):
     sentence: str
     next: str
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values."""
         return {"schema": SCHEMA, "version": __version__, **super().document()}
 

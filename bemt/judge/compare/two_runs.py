@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +80,7 @@ class TwoRuns(Documented):
     ratios: Mapping[str, GridRatio] | None = None
     notes: tuple[str, ...] | None = None
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values."""
         own = super().document()
         step = {"next_measurement": {"text": own.pop("next"), "command": ""}}

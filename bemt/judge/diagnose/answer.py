@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ class Location:
         repr=False, compare=False, default_factory=lambda: np.empty(0)
     )  # (M,) Of every reading, in its unit; what `size` is the mean of
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
         return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items() if k != "mismatch"}
 
@@ -171,13 +172,13 @@ class Diagnosis:
     change: RunChange | None = None  # Change from the references, where there is one recording beside them
 
     @property
-    def systems(self) -> dict[str, dict[str, Any]]:
+    def systems(self) -> dict[str, Mapping[str, object]]:
         """Verdict and effects of air, stand and drive, each for itself."""
         said = self.said
         listed = said.verdict in ("named", "class", "sensor")
         known = effects.catalogue()
         kinds = {i: known[i].kind if i in known else "drive" for i in said.effects}  # a law of the drive is no effect
-        out: dict[str, dict[str, Any]] = {}
+        out: dict[str, Mapping[str, object]] = {}
         for system in ("air", "stand", "drive"):
             mine = [i for i, kind in kinds.items() if kind == system]
             word = ("none" if not mine else said.verdict) if listed else said.verdict

@@ -208,7 +208,7 @@ def _record(
     V = np.nan_to_num(points["airspeed_m_s"]) if "airspeed_m_s" in points else np.zeros(len(run))
     if "J" in points:
         V = np.nan_to_num(points["J"]) * n * D
-    unit: dict[str, Any] = {
+    unit: dict[str, Array | float] = {
         "thrust_N": 1.0, "torque_Nm": 1.0, "power_W": 1.0 / (2.0 * np.pi * n),
         "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
         "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,

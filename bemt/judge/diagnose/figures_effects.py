@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from bemt.base.canvas import BLACK, BLUE, GREY, ORANGE, PURPLE, RED, SKY, blank
 from bemt.judge.diagnose import form
 from bemt.judge.diagnose.fit import fit, weights
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.diagnose.signatures import Setting, effect_of
 from bemt.judge.explanation import NONE, Explanation, Size
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
@@ -238,7 +238,7 @@ def _numeric(candidate: Candidate, key: str) -> bool:
     return all(isinstance(s.get(key), (int, float)) for s in candidate.settings)
 
 
-def _words(setting: dict[str, Any]) -> str:
+def _words(setting: Setting) -> str:
     return ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else str(v) for k, v in setting.items())
 
 

@@ -21,7 +21,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.form import form_modes
-from bemt.judge.diagnose.signatures import effect_of
+from bemt.judge.diagnose.signatures import Setting, effect_of
 from bemt.judge.explanation import Explanation, Size, Sizes
 from bemt.physics import effects
 from bemt.physics.effects.base import FORM
@@ -46,7 +46,7 @@ class Fit:
     """An explanation at its best setting."""
 
     ids: tuple[str, ...]  # Effects; of nothing none
-    settings: tuple[dict[str, Any], ...]  # Parameters of each
+    settings: tuple[Setting, ...]  # Parameters of each
     columns: tuple[int, ...]  # Columns of ``State.S``
     signature: Array  # (M,) Change of the readings, solved together (not added up) [units of the readings]
 
@@ -57,12 +57,9 @@ def fit(found: Evidence, what: Explanation) -> Fit:
     ids = tuple(what)
     if not ids:
         return Fit((), (), (), np.zeros_like(problem.y))
-    if len(ids) == 1:
-        span = found.spans[ids[0]]
-        own = state.gains(ids[0], span, state.r[:, None])[:, 0] + found.log_w[span]
-        columns: tuple[int, ...] = (span.start + int(np.argmax(own)),)
-    else:
-        columns = state.best_of(what, found.spans, found.log_w)
+    total = state.scores(what, found.spans, found.log_w)
+    at = np.unravel_index(int(np.argmax(total)), total.shape)
+    columns = tuple(found.spans[i].start + int(k) for i, k in zip(ids, at, strict=True))
     settings = tuple(found.of(i).settings[c - found.spans[i].start] for i, c in zip(ids, columns, strict=True))
     signature = problem.signature(tuple(effect_of(i, s) for i, s in zip(ids, settings, strict=True)))
     if not np.isfinite(signature).all():
@@ -84,11 +81,7 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     share = np.exp(share - share.max())
     out = {i: np.zeros(found.of(i).weight.size) for i in ids}
     for s, w in zip(states, share / share.sum(), strict=True):
-        if len(ids) == 1:
-            span = found.spans[ids[0]]
-            total = s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span]
-        else:
-            total = s.both(what, found.spans, found.log_w)
+        total = s.scores(what, found.spans, found.log_w)
         p = np.exp(total - total.max())
         p /= p.sum()
         for k, i in enumerate(ids):
@@ -274,7 +267,7 @@ def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:
     return (inside[0], inside[1]) if inside[1] > inside[0] else (p.low, p.high)
 
 
-def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
+def _continuous(id_: str, setting: Setting) -> list[Any]:
     """Parameters of a setting that may take any value in their range."""
     cls = type(effect_of(id_, setting))
     return [p for p in cls.parameters if p.name in setting and p.name not in cls.discrete]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from bemt.rotors.case import Case
 
 
-def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Case], figures: bool = True) -> None:
+def write(
+    folder: str, answer: Any, document: Mapping[str, object], cases: Sequence[Case], figures: bool = True
+) -> None:
     """Write everything; improved cases of an earlier answer go."""
     out = Path(folder)
     out.mkdir(parents=True, exist_ok=True)

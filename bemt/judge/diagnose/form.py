@@ -144,22 +144,18 @@ class State:
     best: dict[str, int] = field(default_factory=dict)  # Best setting of each candidate
     best_rival: str = ""  # Unknown smooth effect of largest evidence
 
-    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
-        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
+    def scores(self, what: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
+        """Log likelihood over that of "none" of every setting of an effect, priors included, (A,), or of two, (A, B).
 
-        Signatures are added.
+        Signatures of two are added, and their forms left out.
         """
-        A, B = (spans[i] for i in pair)
+        if not what.pair:
+            (name,) = what
+            return self.gains(name, spans[name], self.r[:, None])[:, 0] + log_w[spans[name]]
+        A, B = (spans[i] for i in what)
         a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
         total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
         return np.asarray(total)
-
-    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
-        """Columns of the best setting of two effects."""
-        total = self.both(pair, spans, log_w)
-        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
-        A, B = (spans[k] for k in pair)
-        return A.start + int(i), B.start + int(j)
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
         """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""

@@ -90,7 +90,7 @@ class Plan:
         out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
         return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Mapping[str, object]:
         """Plain values of schema ``bemt.plan/1``."""
         return document(self)
 
@@ -193,7 +193,7 @@ def _sizes(
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
 
 
-def document(answer: Plan) -> dict[str, Any]:
+def document(answer: Plan) -> Mapping[str, object]:
     """Give the document ``bemt.plan/1``."""
     c = answer.confusion
     return {

@@ -6,7 +6,7 @@ import copy
 import math
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -210,7 +210,7 @@ class CalibratedRotor:
         lines += [f"      bemt drive {typed}"] if self.source.case.file.drive is not None else []
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Mapping[str, object]:
         """Plain values of schema ``bemt.rotor_calibration/1``."""
         case, one = self.source.case, self.found
         numbers = {
@@ -219,7 +219,7 @@ class CalibratedRotor:
             for k, name in enumerate(NAMES)
         }  # fmt: skip
         airspeed = flight_point(case, one)
-        out: dict[str, Any] = plain({
+        out: Mapping[str, object] = plain({
             "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in self.recordings],
             "points": one.points, "converged": one.found.converged, "steps": one.found.steps,
             "log_evidence": one.found.log_evidence, "size": _size(one), "excess": one.found.excess,

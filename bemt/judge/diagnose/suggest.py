@@ -112,7 +112,7 @@ class Suggestion:
         both = f"{self.after:.1f} instead of {self.before:.1f}"
         return f" (tells {' from '.join(self.separates)} at {both} standard deviations)"
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,

@@ -89,7 +89,7 @@ def calibrate(found: Sequence[Off], sets: Sequence[Mapping[str, Any]]) -> dict[s
     }  # fmt: skip
 
 
-def _factor(scores: Sequence[float]) -> dict[str, Any]:
+def _factor(scores: Sequence[float]) -> dict[str, float]:
     """Conformal quantile of the scores, their number, and the share that needed no factor.
 
     Between ranks: the next higher one holds 95 % where there are eighteen.

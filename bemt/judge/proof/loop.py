@@ -69,7 +69,7 @@ class Course:
         """Course that was kept."""
         return cls(**{**document, "answers": [ToldAnswer.from_document(a) for a in document["answers"]]})
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """The course to be kept."""
         return {**vars(self), "answers": [a.document() for a in self.answers]}
 

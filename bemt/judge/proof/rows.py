@@ -137,7 +137,7 @@ class ToldAnswer(Documented):
         """Whether there is an answer."""
         return bool(self.verdict)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """The answer as it was printed, with what a check has found since."""
         now = {"effects": list(self.effects), "confirmed": True} if self.confirmed else {}
         return {**self.whole, "verdict": self.verdict, **now}

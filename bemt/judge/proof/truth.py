@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -242,7 +241,7 @@ def air(temperature_C: Array, pressure_Pa: Array) -> tuple[Array, Array, Array]:
 
 def solve(
     rotor: TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
-    physics: ts.SectionPhysics | None = None, extra: Mapping[str, Any] | None = None, start: TrueAnswer | None = None,
+    physics: ts.SectionPhysics | None = None, extra: Mapping[str, Array] | None = None, start: TrueAnswer | None = None,
 ) -> TrueAnswer:  # fmt: skip
     """Find circulations and loads at P points at once."""
     rpm, airspeed, temperature, pressure = (
@@ -273,7 +272,7 @@ def _solve(
     rotor: TruthRotor,
     state: list[Array],
     physics: ts.SectionPhysics,
-    extra: Mapping[str, Any],
+    extra: Mapping[str, Array],
     rounds: int,
     most: float,
     start: TrueAnswer | None,

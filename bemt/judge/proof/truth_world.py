@@ -26,7 +26,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +69,7 @@ class _Foil:
 
 def solve(
     rotor: truth.TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
-    physics: ts.SectionPhysics, extra: Mapping[str, Any],
+    physics: ts.SectionPhysics, extra: Mapping[str, Array],
 ) -> truth.TrueAnswer:  # fmt: skip
     """Loads of an open rotor in axial flow."""
     try:
@@ -287,7 +286,7 @@ def _solve(
     c: Conditions,
     pressure: Array,
     world: World,
-    extra: dict[str, Any],
+    extra: dict[str, Array],
     start: truth.TrueAnswer | None,
 ) -> truth.TrueAnswer:
     v = c.airspeed * np.cos(np.radians(world.oblique))
@@ -309,7 +308,7 @@ def loads(
     twist = np.full(shape, np.radians(world.pitch_offset))
     if world.untwist:
         twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
-    extra: dict[str, Any] = {"twist": twist}
+    extra: dict[str, Array] = {"twist": twist}
     span = (1.0 - rotor.hub) * rotor.radius
     leak = np.zeros(c.rpm.size)
     per_v: Array = np.zeros(rotor.x.size)
@@ -386,7 +385,7 @@ def _round(
     c: Conditions,
     pressure: Array,
     world: World,
-    extra: dict[str, Any],
+    extra: dict[str, Array],
     start: truth.TrueAnswer | None,
 ) -> truth.TrueAnswer:
     """Mean of eight azimuths of a blade in a stream across the disk.
