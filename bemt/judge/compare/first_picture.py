@@ -128,8 +128,7 @@ def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
 
     Each has ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as bars.
     """
-    parts = [_usable(d) for d in recordings]
-    parts = [d for d in parts if len(d)]
+    parts = list(filter(len, map(_usable, recordings)))
     if not parts:
         raise InputError(Fault(case.name, "recording", "no point with a speed and a load", "one or more"))
     D = case.diameter_m

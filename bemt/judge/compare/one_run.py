@@ -238,8 +238,9 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
     off = np.array([load.cfd / load.bemt for load in said])
     if name not in _KIND or not off.size or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
         return math.inf, ""
-    wide = np.array([math.hypot(load.u_cfd / load.cfd if math.isfinite(load.u_cfd) else 0.0,
-                                load.u_bemt / load.bemt, 0.02) for load in said])  # fmt: skip
+    wide = np.array(
+        [math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02) for load in said]
+    )
     # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
     may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > FACTOR)
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -221,35 +221,40 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
     told = named(imported).values
     if "rpm" in told:
         return
-    headings, faults = imported.provenance.get("headings", {}), []
+    headings = imported.provenance.get("headings", {})
+    heading = {name: headings.get(name) or name for name in (*imported.values, *imported.texts)}
+    faults = []
     for name, v in imported.values.items():
-        heading, unit = headings.get(name) or name, imported.unit(name)
-        apart = name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v))
-        if not apart and not unit and may_be_shaft_speed(heading):
-            faults.append(_no_unit(path, heading, "a speed without a unit"))
-        elif not apart and (unit == "rpm" or (unit == "rad_s" and may_be_shaft_speed(heading))):
-            line = f'[columns] rpm = {{ column = "{heading}", unit = "{unit}" }}'
+        unit, may = imported.unit(name), may_be_shaft_speed(heading[name])
+        if name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v)):
+            continue
+        if not unit and may:
+            faults.append(_no_unit(path, heading[name], "a speed without a unit"))
+        elif unit == "rpm" or (unit == "rad_s" and may):
+            line = f'[columns] rpm = {{ column = "{heading[name]}", unit = "{unit}" }}'
             hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
             hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
             got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
-            faults.append(Fault(path, f"column {heading}", got, expected, hint))
+            faults.append(Fault(path, f"column {heading[name]}", got, expected, hint))
     for name, cells in imported.texts.items():
-        heading = headings.get(name) or name
-        if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
-            faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
+        if may_be_shaft_speed(heading[name]) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
+            faults.append(_no_unit(path, heading[name], f"a speed as text, such as {cells[0].strip()[:20]!r}"))
     if faults and not set(LOAD_CHANNELS) & told.keys():  # said with the speed, not after it
-        for name, units in _UNITS_OF.items():
-            if name in imported.values and not imported.unit(name):
-                heading = headings.get(name) or name
-                hint = "Head it " + " or ".join(f"{heading} ({unit})" for unit in units)
-                got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
-                faults.append(Fault(path, f"column {heading}", got, expected, hint))
+        faults += _loads_in_doubt(imported, heading, path)
     if faults and (step := in_one_step(imported)):
         faults[-1] = replace(faults[-1], hint=f"{faults[-1].hint}{step}")
     beside = Path(path).with_name("recording.toml")
     if faults and any("names this file" in note for note in imported.notes):
         faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]
     refuse(faults)
+
+
+def _loads_in_doubt(imported: Dataset, heading: Mapping[str, str], path: str) -> Iterator[Fault]:
+    for name, units in _UNITS_OF.items():
+        if name in imported.values and not imported.unit(name):
+            hint = "Head it " + " or ".join(f"{heading[name]} ({unit})" for unit in units)
+            got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
+            yield Fault(path, f"column {heading[name]}", got, expected, hint)
 
 
 def wind_of(imported: Dataset) -> float | None:

@@ -156,15 +156,7 @@ def records_of(
 
     ``scatter`` of single readings as both recordings show it, by thrust and torque.
     """
-    channels = {}
-    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
-        for c in LOADS[name]:
-            if c == "electrical_power_W" and not like_voltage(a, b):
-                continue
-            if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b)):
-                channels[quantity] = c
-                break
-    channels = {k: c for k, c in channels.items() if c in ("CT", "CP", "CQ") or all("rpm" in r.points for r in (a, b))}
+    channels = _channels_of(a, b)
     if not channels:
         return None
     log_ratio, unsure = density_change(a, b)
@@ -182,6 +174,17 @@ def records_of(
         return None
     known, test = (_without_strays(r, D) for r in (known, test))
     return thinned(known, MOST), thinned(_in_reach(test, known), MOST)
+
+
+def _channels_of(a: StandRun, b: StandRun) -> dict[str, str]:
+    """Channels that thrust and torque are read from in both; loads need a speed, coefficients none."""
+    out = {}
+    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
+        known = [c for c in LOADS[name] if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b))]
+        c = next((c for c in known if c != "electrical_power_W" or like_voltage(a, b)), "")
+        if c in ("CT", "CP", "CQ") or (c and all("rpm" in r.points for r in (a, b))):
+            out[quantity] = c
+    return out
 
 
 def _in_reach(test: Record, known: Record) -> Record:
@@ -213,20 +216,10 @@ def _record(
         "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
         "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,
     }  # fmt: skip
-    measured: dict[str, Array] = {}
-    u: dict[str, Array] = {}
-    zero: dict[str, float] = {}
-    for k, c in channels.items():
-        measured[k] = np.asarray(points[c] * unit[c], dtype=float)
-        if k == "torque_Nm":  # its sign is the sense of rotation
-            measured[k] *= np.sign(np.nansum(measured[k])) or 1.0
-        full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
-        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
-        u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
-        if shift[c]:
-            zero[k] = shift[c] * full
-        if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), BY_POWER * full)
+    measured = {k: np.asarray(points[c] * unit[c], dtype=float) for k, c in channels.items()}
+    if "torque_Nm" in measured:  # its sign is the sense of rotation
+        measured["torque_Nm"] *= np.sign(np.nansum(measured["torque_Nm"])) or 1.0
+    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
@@ -253,6 +246,23 @@ def _record(
         electrical=channels.get("torque_Nm") == "electrical_power_W",
     )  # fmt: skip
     return record.take(np.flatnonzero(good))
+
+
+def _errors(
+    readings: Mapping[str, tuple[str, Array, Array | float]], points: Dataset, scatter: Mapping[str, Scatter],
+    shift: Mapping[str, float],
+) -> tuple[dict[str, Array], dict[str, float]]:  # fmt: skip
+    """Standard uncertainties of loads, and of their zeros; ``readings`` by channel with their unit."""
+    u, zero = {}, {}
+    for c, (k, y, unit) in readings.items():
+        full, s = float(np.nanmax(np.abs(y))), scatter["thrust" if k == "thrust_N" else "torque"]
+        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit)
+        u[k] = np.sqrt(stated**2 + (s.share * y) ** 2 + (s.floor * full) ** 2)
+        if shift[c]:
+            zero[k] = shift[c] * full
+        if c == "electrical_power_W":  # a motor takes power without any load
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
+    return u, zero
 
 
 def _angle(points: Dataset) -> Array | None:

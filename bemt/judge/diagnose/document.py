@@ -23,6 +23,7 @@ from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.answer import Diagnosis, Location
+    from bemt.judge.loss import Decision
     from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
@@ -284,7 +285,6 @@ def _title(name: str) -> str:
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     said = d.said
-    titles = [_title(i) for i in said.effects]
     apart = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
     off = " and ".join(apart)
     if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
@@ -305,20 +305,24 @@ def headline(d: Diagnosis) -> str:
         where = "" if said.verdict == "named" else " in the stand, not the air"
         return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
     if said.verdict == "class":
-        if said.beside:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{end}"
-        if len(said.sets) > 1:
-            each = (" / ".join(map(_title, s)) for s in said.sets)
-            words = (f"one of ({w})" if len(s) > 1 else w for w, s in zip(each, said.sets, strict=True))
-            return f"Two causes: {' and '.join(words)}{end}"
-        if len(titles) > _A_GROUP:
-            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{end}"
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{end}"
-    if said.verdict == "unknown":
-        what = _from_reference(d) or f"Recording and model differ ({off})"
-        return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
+        return f"{_of_class(said)}{end}"
     what = _from_reference(d) or f"Recording and model differ ({off})"
-    return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
+    why = "and no effect in the library explains it"
+    why = why if said.verdict == "unknown" else f"but these readings do not show why{_guess(d)}"
+    return f"{what[0].upper()}{what[1:]}, {why}."
+
+
+def _of_class(said: Decision) -> str:
+    """What is said of a class."""
+    titles = [_title(i) for i in said.effects]
+    if said.beside:
+        return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}"
+    if len(said.sets) > 1:
+        each = [" / ".join(map(_title, s)) for s in said.sets]
+        return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
+    if len(titles) > _A_GROUP:
+        return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
+    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
 
 
 def _in_both(d: Diagnosis) -> str:
@@ -361,7 +365,6 @@ def _share(v: float) -> str:
 
 def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
-    found = d.found
     first, *rest = explanation(d)
     first = f"{lead} {first}".strip()
     # it explains little and takes lines
@@ -381,13 +384,22 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
             out += wrapped if told else []
         return "\n".join(out)
     out += [line for wrapped in shown.values() for line in wrapped]
+    out += _tables(d)
+    out += [f"  note: {note}" for note in d.problem.notes]
+    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
+    return "\n".join(out)
+
+
+def _tables(d: Diagnosis) -> list[str]:
+    """The numbers behind the sentences."""
+    found = d.found
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
         odds = "-" if name not in found.states[0].log_z else f"{found.log_bayes(name):.1f}"
         rows.append([str(name), f"{p:.3f}", odds, seen])
-    out += [
+    out = [
         "",
         text_table(
             ["explanation", "probability", "ln odds over none", "typical size [sd]"], rows, left=(0,), indent="  "
@@ -401,6 +413,4 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     beside = "the stated or observed noise" if d.problem.u_known else "that of a typical stand (none is stated)"
     out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
                f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
-    out += [f"  note: {note}" for note in d.problem.notes]
-    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
-    return "\n".join(out)
+    return out

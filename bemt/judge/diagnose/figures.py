@@ -258,8 +258,7 @@ def _groups(answer: Diagnosis, name: str) -> list[_Line]:
     problem = answer.problem
     X, P = problem.covariates, problem.covariates["rpm"].size
     part = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
-    held = next((n for n in ("rpm", "J") if n != name and _varies(X[n])), "") if name != "rpm" else (
-        "J" if _varies(X["J"]) else "")  # fmt: skip
+    held = next((n for n in ("rpm", "J") if n != name and _varies(X[n])), "")
     found = []
     for i, p in enumerate(problem.parts):
         if name not in (*_CONDITIONS, *p.record.extra):
@@ -271,12 +270,12 @@ def _groups(answer: Diagnosis, name: str) -> list[_Line]:
             line[mine] = _lines(X[held][mine])
         own = [mine & (line == k) for k in np.unique(line[mine])]
         sweeps = _sweeps(X, mine, own) if name == "J" else []
-        drawn = np.any(sweeps, axis=0) if sweeps else np.zeros(P, dtype=bool)
+        drawn = np.any([np.zeros(P, dtype=bool), *sweeps], axis=0)
         own = [here for here in own if _count(X[name][here]) >= _LONG or not drawn[here].all()]
         for over, what, lines in ((name, held, own), ("rpm", "J", sweeps)):
             for here in lines:
-                words = ", ".join(t for t in (tag, _label(what, X[what][here]) if what else "") if t)
-                found.append(_Line(words, here, i, over))
+                words = [tag, _label(what, X[what][here]) if what else ""]
+                found.append(_Line(", ".join(filter(None, words)), here, i, over))
     return found
 
 

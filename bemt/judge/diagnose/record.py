@@ -121,15 +121,7 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     turning = series if "rpm" in series else replace(series, values={**series.values, "rpm": values["rpm"]})
     filled = turning.derive(case.diameter_m, air.rho)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
-    told = [k for k in ("thrust_N", "torque_Nm") if k in got and np.isfinite(got[k]).any()]
-    loads = [k for k in told if np.any(np.nan_to_num(got[k]))]
-    notes += [f"{k} is 0 in every row: not measured, ignored" for k in told if k not in loads]
-    if not loads:
-        channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
-        raise InputError(
-            Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients",
-                  "`bemt import` shows how each column was read and what names one")
-        )  # fmt: skip
+    loads = _loads_of(series, got, notes)
     measured, rpm = {k: got[k].copy() for k in loads}, got["rpm"].copy()
     if "airspeed_m_s" in got:
         V = got["airspeed_m_s"].copy()
@@ -166,6 +158,20 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     gain, zero = ({k: float(v[of]) for k, v in (correlated or {}).items() if v.get(of)} for of in ("gain", "zero"))
     record = Record(series.name, rpm, V, air, measured, u, extra, gain, zero, recorded, tuple(notes))
     return thinned(record.take(np.flatnonzero(keep)))
+
+
+def _loads_of(series: Dataset, got: Mapping[str, Array], notes: list[str]) -> list[str]:
+    """Loads that were measured; refused where there is none."""
+    told = [k for k in ("thrust_N", "torque_Nm") if k in got and np.isfinite(got[k]).any()]
+    loads = [k for k in told if np.any(np.nan_to_num(got[k]))]
+    notes += [f"{k} is 0 in every row: not measured, ignored" for k in told if k not in loads]
+    if not loads:
+        channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
+        raise InputError(
+            Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients",
+                  "`bemt import` shows how each column was read and what names one")
+        )  # fmt: skip
+    return loads
 
 
 def _without_flicker(series: Dataset, notes: list[str]) -> Dataset:

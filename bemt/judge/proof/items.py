@@ -181,16 +181,14 @@ def make_item(
 ) -> Item:  # fmt: skip
     """Measure a truth with concealed causes."""
     h = hidden(bench, ids, strengths, seed, kind)
-    causes, changes, world, stand, stated, referenced = h.causes, h.changes, h.world, h.stand, h.stated, h.referenced
-    own_world, own_stand, rng, more = h.own_world, h.own_stand, h.rng, h.more
-    real, columns = bench.measure(world, stand, rng)
+    causes, stand, rng = h.causes, h.stand, h.rng
+    real, columns = bench.measure(h.world, stand, rng)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     if np.mean(good) < 0.8:
         raise ValueError(f"{bench.rig.name} {bench.plan} {ids}: the truth has no solution at most rows")
 
-    rows = bench.rows
     air_known = "air_density" not in ids and (bench.plan == "two_air" or bool(rng.random() < 0.5))
-    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
+    shown = _shown(bench, real, columns, stand, air_known, rng, h.stated)
     off = tuple(dict.fromkeys(e for c in causes for e in c.off))
     on = ("ground_effect",) if bench.plan == "wall" and "ground_effect" not in ids else ()
     files = {
@@ -200,38 +198,36 @@ def make_item(
         ),
         "stations.csv": stations_text(bench.rig.rotor.r_R, bench.rig.rotor.c_R, np.degrees(bench.rig.rotor.beta)),
     }
-    kept = [(c, ch) for c, ch in zip(causes, changes, strict=True) if not c.removable]
-    for _, change in kept:
-        own_world, own_stand = applied(own_world, own_stand, change)
-    taken = [c for c in causes if c.removable]
-    reference = _reference(bench, taken, own_world, own_stand, air_known, more, stated)
-    if referenced and reference:
+    reference = _reference(bench, h, air_known)
+    if h.referenced and reference:
         files["reference.csv"] = reference
+    entry = Entry(
+        set=kind, causes=ids, kinds=tuple(c.kind for c in causes), strengths=strengths, plan=bench.plan,
+        rig=bench.rig.name, ducted=bench.rig.duct is not None, seed=seed, referenced="reference.csv" in files,
+        stated=h.stated, air_known=air_known, rows=int(np.count_nonzero(good)),
+        stand={k: v for k, v in vars(stand).items() if k in _QUALITY},
+    )  # fmt: skip
+    return Item(files, _judged(entry, bench, h), reference)
 
-    base = StandErrors(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
-    signed = [bench.signature(ch, c) for ch, c in zip(changes, causes, strict=True)]
-    plain_loads, plain_columns = bench.measure(bench.plain(), StandErrors())
-    electric: dict[str, Array] = {
-        n: plain_columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in plain_columns
-    }
-    rule = yardstick(plain_loads, rows.run, base, bench.tangents(), electric)
-    parts = [_judge(rule, bench, cause, s) for cause, s in zip(causes, signed, strict=True)]
+
+def _judged(entry: Entry, bench: Bench, h: Hidden) -> Entry:
+    """Entry with the sizes of its causes and how well the plan can see them."""
+    signed = [bench.signature(ch, c) for ch, c in zip(h.changes, h.causes, strict=True)]
+    loads_, columns = bench.measure(bench.plain(), StandErrors())
+    electric: dict[str, Array] = {n: columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in columns}
+    rule = yardstick(loads_, bench.rows.run, StandErrors(**entry.stand), bench.tangents(), electric)
+    parts = [_judge(rule, bench, cause, s) for cause, s in zip(h.causes, signed, strict=True)]
     noise, whole, alike = zip(*parts, strict=True) if parts else ((), (), ())
     together = None
     if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
         a, b = (rule.whole(rule.stack(s)) for s in signed)
         together = _across(a, b), _across(b, a)
     true = {c.id: {n: TrueValue(v, u) for n, (v, u) in ch.parameters.items()}
-            for c, ch in zip(causes, changes, strict=True)}  # fmt: skip
-    entry = Entry(
-        set=kind, causes=ids, kinds=tuple(c.kind for c in causes), strengths=strengths, parameters=true,
-        separation=whole, separation_noise=noise, alike=alike,
-        variables=tuple(_varied(c.variables, rows) for c in causes), plan=bench.plan, rig=bench.rig.name,
-        ducted=bench.rig.duct is not None, seed=seed, referenced="reference.csv" in files, stated=stated,
-        air_known=air_known, rows=int(np.count_nonzero(good)),
-        stand={k: v for k, v in vars(stand).items() if k in _QUALITY}, separation_together=together,
+            for c, ch in zip(h.causes, h.changes, strict=True)}  # fmt: skip
+    return replace(
+        entry, parameters=true, separation=whole, separation_noise=noise, alike=alike, separation_together=together,
+        variables=tuple(_varied(c.variables, bench.rows) for c in h.causes),
     )  # fmt: skip
-    return Item(files, entry, reference)
 
 
 def _shown(
@@ -294,19 +290,17 @@ def _measured_again(
     return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
 
 
-def _reference(
-    bench: Bench, causes: Sequence[Cause], world: World, stand: StandErrors, air_known: bool, rng: np.random.Generator,
-    stated: bool,
-) -> str:  # fmt: skip
-    """The same rotor at the same points on another day, without some causes; "" where it has no solution."""
-    for cause in causes:
-        world, stand = applied(world, stand, cause.without)
-        if cause.id == "ground_effect":
-            world = replace(world, ground=0.0)
-    ducted = all(c.without.ducted is not False for c in causes)
-    real, columns = bench.measure(world, stand, rng, ducted=ducted)
+def _reference(bench: Bench, h: Hidden, air_known: bool) -> str:
+    """The same rotor at the same points on another day, without what can be taken away; "" where it has no solution."""
+    world, stand, ducted = h.own_world, h.own_stand, True
+    for cause, change in sorted(zip(h.causes, h.changes, strict=True), key=lambda pair: pair[0].removable):
+        world, stand = applied(world, stand, cause.without if cause.removable else change)
+        if cause.removable:
+            world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
+            ducted = ducted and cause.without.ducted is not False
+    real, columns = bench.measure(world, stand, h.more, ducted=ducted)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
-    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
+    shown = _shown(bench, real, columns, stand, air_known, h.more, h.stated)
     return recording_text({n: v[good] for n, v in shown.items()}) if np.mean(good) >= 0.8 else ""
 
 

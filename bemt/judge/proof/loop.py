@@ -19,6 +19,7 @@ import json
 import math
 import shlex
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
@@ -500,35 +501,37 @@ def judge(entry: Entry, course: Course, runs: int) -> tuple[score.Judged, bool]:
 
 def _scored(entries: Sequence[Entry], courses: Sequence[Course], runs: int, fixed: bool) -> Loop:
     """What was found after each number of runs, and what it cost."""
-    after = []
-    for k in range(runs + 1):
-        pairs_of = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
-        judged = [j for j, _ in pairs_of]
-        visible = [(j, exact) for j, exact in pairs_of if j.entry.set in ("single", "sensor") and j.visible]
-        pairs = [(j, exact) for j, exact in pairs_of if j.entry.set == "pair" and j.visible]
-        nothing = [j for j in judged if j.entry.set in ("null", "mismatch")]
-        caused = [j for j in judged if j.entry.causes and j.entry.set != "unlisted" and j.claims]
-        spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e.causes]
-        after.append(After(
-            runs=k,
-            found=_count(exact for _, exact in visible),
-            found_or_class=_count(exact or j.right for j, exact in visible),
-            pairs_named=_count(exact for _, exact in pairs),
-            pairs=_count(exact or score.in_sets(j) for j, exact in pairs),
-            right_when_claimed=_count(j.right for j in caused),
-            nulls_accused=_count(j.claims for j in nothing),
-            unlisted_named=_count(j.claims for j in judged if j.entry.set == "unlisted"),
-            minutes=float(np.mean(spent)) if spent else math.nan,
-        ))  # fmt: skip
-    ends: dict[str, int] = {}
-    for c in courses:
-        ends[c.end] = ends.get(c.end, 0) + 1
+    ends = Counter(c.end for c in courses)
     programme = "fixed" if fixed else "recommended"
-    return Loop(SCHEMA, programme, len(courses), tuple(after), dict(sorted(ends.items())))
+    after = tuple(_after(list(zip(entries, courses, strict=True)), k) for k in range(runs + 1))
+    return Loop(SCHEMA, programme, len(courses), after, dict(sorted(ends.items())))
+
+
+def _after(of_each: Sequence[tuple[Entry, Course]], k: int) -> After:
+    """What was found after so many runs."""
+    judged = [judge(e, c, k) for e, c in of_each]
+
+    def of(*sets: str, seen: bool = False) -> list[tuple[score.Judged, bool]]:
+        return [(j, exact) for j, exact in judged if j.entry.set in sets and (j.visible or not seen)]
+
+    visible, pairs = of("single", "sensor", seen=True), of("pair", seen=True)
+    caused = [j for j, _ in judged if j.entry.causes and j.entry.set != "unlisted" and j.claims]
+    spent = [sum(c.minutes[: c.after(k)]) for e, c in of_each if e.causes]
+    return After(
+        runs=k,
+        found=_count(exact for _, exact in visible),
+        found_or_class=_count(exact or j.right for j, exact in visible),
+        pairs_named=_count(exact for _, exact in pairs),
+        pairs=_count(exact or score.in_sets(j) for j, exact in pairs),
+        right_when_claimed=_count(j.right for j in caused),
+        nulls_accused=_count(j.claims for j, _ in of("null", "mismatch")),
+        unlisted_named=_count(j.claims for j, _ in of("unlisted")),
+        minutes=float(np.mean(spent)) if spent else math.nan,
+    )  # fmt: skip
 
 
 def _count(flags: Iterable[bool]) -> tuple[int, int]:
-    values = [bool(f) for f in flags]
+    values = list(flags)
     return sum(values), len(values)
 
 

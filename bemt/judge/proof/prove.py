@@ -323,28 +323,18 @@ def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: C
 def proof(out: Path, digest: str | None = None) -> Proof:
     """Open the key and score the answers."""
     key = rows.unseal(out, digest)
-    judged, again, seconds, errors = [], [], [], {}
-    settled: list[bool] = []
     made = key.size != REAL
+    stored = {e.folder: rows.stored(out / "answers" / f"{e.folder}.json") for e in key.items}
+    judged = [score.judge(e, stored[e.folder].answer) for e in key.items]
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
     found = {(b.rig.name, b.plan): b for b in benches(SIZES[key.size], first)} if made else {}
-    for entry in key.items:
-        stored = rows.stored(out / "answers" / f"{entry.folder}.json")
-        judged.append(score.judge(entry, stored.answer))
-        if made and asks(stored.answer) and (out / ASKED / entry.folder).exists():
-            again.append(score.judge(entry, rows.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
-        if made and stored.answer:
-            settles = resolves(found[entry.rig, entry.plan], entry, stored.answer)
-            settled += [] if settles is None else [settles]
-        seconds.append(stored.seconds)
-        if not stored.answer:
-            errors[entry.folder] = stored.error
-    misses = tuple(
-        Miss(j.entry.folder, j.entry.set, j.entry.causes, j.entry.plan, j.entry.rig, j.separation, j.entry.alike,
-             j.said, j.answer.verdict or None, j.answer.effects,
-             tuple((r.effect, r.probability) for r in j.answer.ranking[:4]), errors.get(j.entry.folder, ""))
-        for j in judged if not j.right and (j.claims or j.visible or not j.answer)
-    )  # fmt: skip
+    settles = [resolves(found[j.entry.rig, j.entry.plan], j.entry, j.answer) for j in judged if made and j.answer]
+    settled = [one for one in settles if one is not None]
+    again = [score.judge(j.entry, rows.stored(out / f"answers_{ASKED}" / f"{j.entry.folder}.json").answer)
+             for j in judged if made and asks(j.answer) and (out / ASKED / j.entry.folder).exists()]  # fmt: skip
+    seconds = sorted(one.seconds for one in stored.values())
+    misses = tuple(_miss(j, stored[j.entry.folder].error) for j in judged
+                   if not j.right and (j.claims or j.visible or not j.answer))  # fmt: skip
     scored = score.score(judged, settled, again) if made else score.score_real(judged)
     return Proof(
         SCHEMA, __version__, key.size, key.seed, _commit(),
@@ -352,8 +342,15 @@ def proof(out: Path, digest: str | None = None) -> Proof:
         baselines=tuple(score.baselines(judged)) if made else (), strata=tuple(score.strata(judged)) if made else (),
         risk_coverage=tuple(score.risk_coverage(judged)), confusion=score.confusion(judged),
         answers={} if made else score.answers(judged), misses=misses,
-        seconds_median=sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
+        seconds_median=seconds[len(seconds) // 2] if seconds else math.nan,
     )  # fmt: skip
+
+
+def _miss(j: score.Judged, error: str) -> Miss:
+    e, a = j.entry, j.answer
+    ranking = tuple((r.effect, r.probability) for r in a.ranking[:4])
+    return Miss(e.folder, e.set, e.causes, e.plan, e.rig, j.separation, e.alike, j.said, a.verdict or None, a.effects,
+                ranking, "" if a else error)  # fmt: skip
 
 
 def _commit() -> str:

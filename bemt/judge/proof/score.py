@@ -269,10 +269,14 @@ def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
 
 def answers(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
     """How often each set was answered how."""
+    return _counted((j.entry.set, answered(j)) for j in judged)
+
+
+def _counted(found: Iterable[tuple[str, str]]) -> dict[str, dict[str, int]]:
     out: dict[str, dict[str, int]] = {}
-    for j in judged:
-        row = out.setdefault(j.entry.set, {})
-        row[answered(j)] = row.get(answered(j), 0) + 1
+    for there, said in found:
+        row = out.setdefault(there, {})
+        row[said] = row.get(said, 0) + 1
     return dict(sorted(out.items()))
 
 
@@ -338,12 +342,7 @@ def strata(judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10
 
 def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = None) -> dict[str, dict[str, int]]:
     """How often what was there was called what."""
-    out: dict[str, dict[str, int]] = {}
-    for j in judged:
-        there = key(j) if key else "+".join(j.entry.causes) or j.entry.set
-        row = out.setdefault(there, {})
-        row[j.said] = row.get(j.said, 0) + 1
-    return dict(sorted(out.items()))
+    return _counted((key(j) if key else "+".join(j.entry.causes) or j.entry.set, j.said) for j in judged)
 
 
 def _percent(value: float) -> str:

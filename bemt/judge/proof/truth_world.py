@@ -344,16 +344,7 @@ def loads(
     answer = how(rotor, c, pressure, world, extra, start)
     thrust, torque = answer.thrust, answer.torque
     if duct is not None:
-        ring = rotor.x * np.diff(rotor.edges)
-        through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
-        whole = rho * area * (1.0 - rotor.hub**2) * through * answer.jet
-        skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
-        shroud = whole - thrust - skin
-        if world.lip:
-            # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
-            turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
-            shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
-        thrust = (thrust + shroud) * (1.0 - 1.3 * leak)
+        thrust = (thrust + _shroud(rotor, duct, world, rho, along, per_v, answer)) * (1.0 - 1.3 * leak)
         torque = torque * (1.0 - 0.5 * leak)
     if world.nacelle_cd:
         slip = along + 2.0 * np.maximum(np.nan_to_num(answer.induced), 0.0)
@@ -366,6 +357,23 @@ def loads(
     if world.inertia and c.transient:
         torque = torque + world.inertia * np.gradient(omega, c.time)
     return TrueLoads(thrust, torque, answer.re75, answer.m_tip, answer)
+
+
+def _shroud(
+    rotor: truth.TruthRotor, duct: TruthDuct, world: World, rho: Array, along: Array, per_v: Array,
+    answer: truth.TrueAnswer,
+) -> Array:  # fmt: skip
+    """Thrust of the duct alone: that of the mass flow, less the blades' and the friction."""
+    ring = rotor.x * np.diff(rotor.edges)
+    through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
+    whole = rho * (np.pi * rotor.radius**2) * (1.0 - rotor.hub**2) * through * answer.jet
+    skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
+    shroud = whole - answer.thrust - skin
+    if world.lip:
+        # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
+        turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
+        shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
+    return np.asarray(shroud)
 
 
 def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:
