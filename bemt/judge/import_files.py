@@ -115,7 +115,8 @@ def import_(
         kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     speed = None if choice.period is None else 60.0 / choice.period
-    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
+                                column=told["column"], sign=told["sign"])  # fmt: skip
     found = load.import_files(names, format, choice, made, insist)
     if out is not None and found.runs:
         own = tuple(found.runs[-1].provenance["files"])

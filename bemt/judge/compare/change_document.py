@@ -335,24 +335,13 @@ _FAMILY_WORD = {
 def headline(doc: ComparedRuns) -> str:
     """What an engineer would say first."""
     effects, verdict = list(doc.effects), doc.verdict
-    # a cause in the drive has moved the drive, not the loads
-    drive = {FAMILY.get(k, k) for k in effects} == {"drive"}
-    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
-    loads = {r.kind: (WORD[c], r) for c, r in doc.ratios.items()}
-    shown = [loads[k] for k in kinds if k in loads][:2]
-    shares = _intervals([r for _, r in shown])
-    moved = " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
+    moved = _moved(doc)
     if verdict == "none":
         return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
     if verdict == "unknown":
         return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
     if verdict == "insufficient":
-        if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
-            return f"These recordings cannot be compared: {doc.rule}."
-        likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
-        guess = "" if doc.rule == OTHER_STAND else families(likely, doc.ranking)
-        size = f" ({moved})" if moved else ""
-        return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
+        return _open(doc, f" ({moved})" if moved else "")
     if doc.rule == REVERSED:
         return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
     if effects == ["air_density"] and doc.rule.startswith(AS_RECORDED):
@@ -364,6 +353,25 @@ def headline(doc: ComparedRuns) -> str:
     if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
         return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
     return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
+
+
+def _moved(doc: ComparedRuns) -> str:
+    """What changed by how much: a cause in the drive has moved the drive, not the loads."""
+    drive = {FAMILY.get(k, k) for k in doc.effects} == {"drive"}
+    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
+    loads = {r.kind: (WORD[c], r) for c, r in doc.ratios.items()}
+    shown = [loads[k] for k in kinds if k in loads][:2]
+    shares = _intervals([r for _, r in shown])
+    return " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
+
+
+def _open(doc: ComparedRuns, size: str) -> str:
+    """Why nothing is said, and what is likeliest."""
+    if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
+        return f"These recordings cannot be compared: {doc.rule}."
+    likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
+    guess = "" if doc.rule == OTHER_STAND else families(likely, doc.ranking)
+    return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
 
 
 def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str:
@@ -388,17 +396,7 @@ def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
 
 
 def _said(doc: ComparedRuns) -> list[str]:
-    loads = {c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque")}
-    intervals = _intervals(list(loads.values()))
-    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
-    first = next(iter(loads.values()), None)
-    out = []
-    if first is not None:
-        where = "extrapolated to one speed" if first.extrapolated else _range(first)
-        out.append(f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.")
-        grows = [WORD[c] for c, r in loads.items() if r.depends_on]
-        if grows:
-            out.append(f"The ratio of {' and '.join(grows)} changes with speed or advance ratio.")
+    out = _of_loads({c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque")})
     density, a, b = doc.density.ratio, doc.density.A, doc.density.B
     if density and abs(density - 1.0) > 0.003:
         ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
@@ -419,6 +417,18 @@ def _said(doc: ComparedRuns) -> list[str]:
         out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
         out.append(f"    {step['command']}")
     return out
+
+
+def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
+    """How far the loads of B are from those of A."""
+    if not loads:
+        return []
+    first, intervals = next(iter(loads.values())), _intervals(list(loads.values()))
+    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
+    where = "extrapolated to one speed" if first.extrapolated else _range(first)
+    grows = [WORD[c] for c, r in loads.items() if r.depends_on]
+    more = f"The ratio of {' and '.join(grows)} changes with speed or advance ratio."
+    return [f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.", *([more] if grows else [])]
 
 
 def sentence(doc: ComparedRuns) -> str:

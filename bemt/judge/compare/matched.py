@@ -341,18 +341,13 @@ def matched(a: StandRun, b: StandRun, name: str, diameter: float = math.nan) -> 
     choices = {**LOADS, **DRIVE}[name]
     if name in ("speed", "voltage") and (a.command != b.command or not a.command):
         return None
-    for channel in choices:
-        if name in LOADS and channel == "electrical_power_W" and not like_voltage(a, b):
-            continue
-        one, two = _readings(a, name, channel, diameter), _readings(b, name, channel, diameter)
-        if one is not None and two is not None:
-            break
-    else:
+    able = [c for c in choices if name not in LOADS or c != "electrical_power_W" or like_voltage(a, b)]
+    tried = ((c, _readings(a, name, c, diameter), _readings(b, name, c, diameter)) for c in able)
+    channel, one, two = next((t for t in tried if None not in t), ("", None, None))
+    if one is None or two is None:
         return None
-    notes = []
     turned = bool(one["sign"][0] != two["sign"][0])
-    if turned:
-        notes.append(f"{channel}: changed sign between A and B; sizes are compared")
+    notes = [f"{channel}: changed sign between A and B; sizes are compared"] if turned else []
     parts = [_averaged(one), _averaged(two)]
     for part, run, letter in zip(parts, (a, b), "AB", strict=True):
         if part["lost"][0] > 0.5 * len(run):

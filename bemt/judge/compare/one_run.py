@@ -233,10 +233,12 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads
 def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
     """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
     said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
-    if said and all(load.cfd * load.bemt < 0.0 for load in said):
+    if not said:
+        return math.inf, ""
+    if all(load.cfd * load.bemt < 0.0 for load in said):
         return 0.0, f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
     off = np.array([load.cfd / load.bemt for load in said])
-    if name not in _KIND or not off.size or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
+    if name not in _KIND or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
         return math.inf, ""
     wide = np.array(
         [math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02) for load in said]
@@ -282,11 +284,11 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
         return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
     if near:
         worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest
-        words = {k: (100.0 * load.difference / top[k], _LOADS[k].split(" [")[0].lower()) for k, load in worst.items()}
-        if len(every) == len(words):
-            sizes = " and ".join(f"{share:+.0f} % in {word}" for share, word in words.values())
+        of = "in" if len(every) == len(worst) else "of the largest"
+        sizes = " and ".join(f"{100.0 * load.difference / top[k]:+.0f} % {of} {_LOADS[k].split(' [')[0].lower()}"
+                             for k, load in worst.items())  # fmt: skip
+        if of == "in":
             return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
-        sizes = " and ".join(f"{share:+.0f} % of the largest {word}" for share, word in words.values())
         rest = f"the others are within twice both bands, off by up to {sizes}"
         return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{tail}"
     if lost == len(every):
@@ -310,11 +312,9 @@ def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, c
 
 def text(found: RunComparison, details: bool = False) -> str:
     """Lay it out on one screen; with `details` all points, notes and settings."""
-    told = found.conditions
-    set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
-    set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
+    set_up = _set_up(found.conditions)
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
-    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({', '.join(set_up) or bare}) and case {found.case}"]
+    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({set_up or bare}) and case {found.case}"]
     shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:
@@ -334,17 +334,28 @@ def text(found: RunComparison, details: bool = False) -> str:
     for over in dict.fromkeys(found.averaged.values()):
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
     lines += ["", "Audit of the CFD run"] if found.audit else []
-    for line in found.audit if details else found.audit[:7]:
-        unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
-        words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
-        lead = f"  {line.status:11s}"
-        lines.append(_filled(f"{line.topic}: {words}", lead, " " * len(lead)))
+    lines += map(_audited, found.audit if details else found.audit[:7])
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
     said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
     said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]
     said.append("No cause is named from one point." if len(found.points) == 1 else "No cause is named here.")
     lines += ["", *map(_filled, [*said, f"Next: {found.next}"])]
     return "\n".join(lines)
+
+
+def _set_up(told: Mapping[str, str]) -> str:
+    """How a run was computed, as far as it says."""
+    words = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
+    steady = {"yes": "steady", "no": "transient"}.get(told.get("steady", ""))
+    return ", ".join([*words, *([steady] if steady else [])])
+
+
+def _audited(line: AuditLine) -> str:
+    """What one check of a run has found."""
+    unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
+    words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
+    lead = f"  {line.status:11s}"
+    return _filled(f"{line.topic}: {words}", lead, " " * len(lead))
 
 
 def _filled(words: str, lead: str = "", indent: str = "  ") -> str:

@@ -67,6 +67,13 @@ def _words(name: str) -> list[str]:
     return split_suffix(name)[0].split("_")
 
 
+def _without(rotor: str, name: str) -> str:
+    """Name of a channel without that of its rotor."""
+    words = _words(name)
+    base = "_".join(w for w in words if w != rotor)
+    return base + name[len("_".join(words)) :] if base else name.removeprefix(f"{rotor}_")
+
+
 def rotors_of(imported: Dataset) -> list[str]:
     """Rotors that the columns of a file tell apart.
 
@@ -89,16 +96,13 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     others = set(known) - {word}
     kept: dict[str, str] = {}
     for name in imported.values:
-        own = _words(name)
-        if word in own:
-            base = "_".join(p for p in own if p != word)
-            kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
-        elif not others & set(own):
+        if word in _words(name):
+            kept[_without(word, name)] = name
+        elif not others & set(_words(name)):
             kept.setdefault(name, name)
     turning = [name for name in imported.values if others & set(_words(name)) and imported.unit(name) == "rpm"]
     turning = turning or [name for name in imported.values if others & set(name.split("_")) and name.endswith("_rpm")]
-    values = {new: imported[old] for new, old in kept.items()}
-    units = {new: imported.unit(old) for new, old in kept.items()}
+    values, units = ({new: of(old) for new, old in kept.items()} for of in (imported.__getitem__, imported.unit))
     if len(turning) == 1:  # its slipstream is recorded with it
         values[SECOND_ROTOR], units[SECOND_ROTOR] = imported[turning[0]] * RPM, "rad_s"
     return replace(imported, values=values, u={}, u_by={}, units=units, provenance={**imported.provenance, ROTOR: word})

@@ -203,12 +203,10 @@ def _record(
     scatter: Mapping[str, Scatter], shift: Mapping[str, float],
 ) -> Record | None:  # fmt: skip
     points = run.points
-    rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
-    n = rpm / 60.0
-    recorded = math.isfinite(run.density)
-    rho = np.asarray(points["density_kg_m3"], float) if "density_kg_m3" in points else np.full(len(run), np.nan)
+    usual = {"rpm": _RPM, "density_kg_m3": np.nan, "airspeed_m_s": 0.0}
+    rpm, rho, V = (np.asarray(points.values.get(k, np.full(len(run), v)), float) for k, v in usual.items())
+    n, recorded, V = rpm / 60.0, math.isfinite(run.density), np.nan_to_num(V)
     rho = np.where(np.isfinite(rho), rho, run.density if recorded else _RHO * density)
-    V = np.nan_to_num(points["airspeed_m_s"]) if "airspeed_m_s" in points else np.zeros(len(run))
     if "J" in points:
         V = np.nan_to_num(points["J"]) * n * D
     unit: dict[str, Array | float] = {
@@ -234,9 +232,9 @@ def _record(
     fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
     extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k][good]).all()}
     angle = _angle(points)
-    if angle is not None and reference:  # its curves are over V cos(angle)
+    if reference:  # its curves are over V cos(angle)
         V = V * np.cos(angle)
-    elif angle is not None and np.any(angle != 0.0):
+    elif np.any(angle != 0.0):
         extra["sideslip_rad"] = angle
     if "second_rotor_rad_s" in extra:  # what it changes is no scatter
         u = {k: np.full(len(run), np.nan) for k in u}
@@ -265,12 +263,12 @@ def _errors(
     return u, zero
 
 
-def _angle(points: Dataset) -> Array | None:
-    """Angle between wind and shaft, (P,) [rad]; None: not recorded."""
+def _angle(points: Dataset) -> Array:
+    """Angle between wind and shaft, (P,) [rad]; 0 where it is not recorded."""
     for name, unit in (("sideslip_rad", 1.0), ("sideslip_deg", math.pi / 180.0)):
         if name in points and np.isfinite(points[name]).all():
             return np.abs(points[name]) * unit
-    return None
+    return np.zeros(len(points))
 
 
 def _without_strays(record: Record, D: float) -> Record:

@@ -285,8 +285,7 @@ def _title(name: str) -> str:
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     said = d.said
-    apart = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
-    off = " and ".join(apart)
+    off = _off(d)
     if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
     file, wrong, _ = other_rotor.contradiction(d.problem)
@@ -323,6 +322,12 @@ def _of_class(said: Decision) -> str:
     if len(titles) > _A_GROUP:
         return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
     return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
+
+
+def _off(d: Diagnosis) -> str:
+    """By how much each channel differs from the case."""
+    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
+    return " and ".join(words)
 
 
 def _in_both(d: Diagnosis) -> str:

@@ -143,24 +143,31 @@ def matrix(answer: Diagnosis) -> Figure | None:
         alone += not twins
         axis.plot(np.minimum(d, top), np.full(d.size, y), "o", color=GREY, markersize=4, alpha=0.5)
         axis.plot(d[d < form.ALIKE], np.full(len(twins), y), "o", color=RED, markersize=7)
-        more = f" and {len(twins) - 2} more" if len(twins) > 2 else ""
-        words = ", ".join(twins[:2]) + more if twins else "told from all others"
-        axis.text(1.02, y, words, transform=axis.get_yaxis_transform(), va="center", color=RED if twins else GREY)
+        colour = RED if twins else GREY
+        axis.text(1.02, y, _told(twins), transform=axis.get_yaxis_transform(), va="center", color=colour)
     axis.set(xlim=(0.0, top * 1.02), xlabel="distance to every other effect [standard deviations]")
     axis.set_xticks([0.0, form.ALIKE, 6.0, 9.0, top], ["0", f"{form.ALIKE:g}", "6", "9", f"{top:g} or more"])
-    names = [alike.ids[i] for i in rows]
-    axis.set_yticks(range(len(rows)), [f"{i}, as found" if usual[i] < form.ALIKE else i for i in names])
+    as_found = {i: f"{i}, as found" for i, size in usual.items() if size < form.ALIKE}
+    axis.set_yticks(range(len(rows)), [as_found.get(alike.ids[i], alike.ids[i]) for i in rows])
     axis.set_ylim(len(rows) - 0.5, -0.5)
     axis.tick_params(axis="y", length=0)
     axis.text(1.02, -0.75, "looks like", transform=axis.get_yaxis_transform(), va="bottom", weight="bold")
-    left = "" if seen.size <= len(rows) else f"{len(rows)} of {seen.size} effects are shown"
-    told = f"In this plan {len(rows) - alone} of {len(rows)} effects look like another"
-    told = told if alone < len(rows) else "This plan tells all these effects apart"
+    told, more = "This plan tells all these effects apart", []
+    if alone < len(rows):
+        told = f"In this plan {len(rows) - alone} of {len(rows)} effects look like another"
+        more = [f"red: closer than {form.ALIKE:g} standard deviations"]
+    if seen.size > len(rows):
+        more.append(f"{len(rows)} of {seen.size} effects are shown")
     faint = f"\nLikely, but too faint in this plan to be told from nothing: {', '.join(hidden)}" if hidden else ""
-    red = f"red: closer than {form.ALIKE:g} standard deviations" if alone < len(rows) else ""
-    more = "\n" + "; ".join(filter(None, (red, left))) if red or left else ""
-    figure.suptitle(f"{told}{more}{faint}", x=0.01, ha="left", fontsize=11)
+    figure.suptitle("\n".join(filter(None, (told, "; ".join(more)))) + faint, x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def _told(twins: list[str]) -> str:
+    """Effects that one looks like, in a few words."""
+    if not twins:
+        return "told from all others"
+    return ", ".join(twins[:2]) + (f" and {len(twins) - 2} more" if len(twins) > 2 else "")
 
 
 def ranking(answer: Diagnosis) -> Figure:

@@ -28,6 +28,7 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.propeller import rotor_of
 
 if TYPE_CHECKING:
+    from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
@@ -86,11 +87,7 @@ def load(
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
-    wrong = {(f.channel, i) for f in findings if f.id == "misread" for i in f.rows}
-    for name in {name for name, _ in wrong}:
-        v = np.array(imported[name])
-        v[[i for channel, i in wrong if channel == name]] = np.nan
-        imported = replace(imported, values={**imported.values, name: v})
+    imported = _without_misread(imported, findings)
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.provenance["format"] != "table"
@@ -112,6 +109,15 @@ def load(
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
     return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd")
+
+
+def _without_misread(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
+    values = {**imported.values}
+    for f in findings:
+        if f.id == "misread":
+            values[f.channel] = np.array(values[f.channel])
+            values[f.channel][list(f.rows)] = np.nan
+    return replace(imported, values=values)
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:

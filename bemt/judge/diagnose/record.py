@@ -122,7 +122,8 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
     filled = turning.derive(case.diameter_m, air.rho)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
     loads = _loads_of(series, got, notes)
-    measured, rpm = {k: got[k].copy() for k in loads}, got["rpm"].copy()
+    measured: dict[str, Array] = {k: got[k].copy() for k in loads}
+    rpm = got["rpm"].copy()
     if "airspeed_m_s" in got:
         V = got["airspeed_m_s"].copy()
     else:

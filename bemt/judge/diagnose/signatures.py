@@ -174,7 +174,7 @@ def _merged(columns: Sequence[_Column]) -> list[_Column]:
     shared = [(columns[group[0]][0], [columns[k][0] for k in group]) for group in groups.values()]
     differing = {n for first, some in shared for n, v in first.items() if any(q.get(n) != v for q in some)}
     idle = {n for n in differing if _idle(n, columns)}
-    out = []
+    out: list[_Column] = []
     for group in groups.values():
         setting, signature, solved, _ = columns[group[0]]
         told = {n: v for n, v in setting.items() if n not in idle}

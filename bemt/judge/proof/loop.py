@@ -429,8 +429,7 @@ def loop(
     key = rows.unseal(out)
     kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
-    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in prove.benches(prove.SIZES[key.size], first)}
+    found = prove.benches_of(key)
     todo = []
     for entry in sorted(key.items, key=_rank):
         answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer

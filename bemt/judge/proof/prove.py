@@ -26,7 +26,7 @@ from bemt.base.tables import json_text, write_atomic
 from bemt.judge.proof import causes, real, rows, score
 from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED, extended
 from bemt.judge.proof.items import Bench, Item, make_item
-from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ToldAnswer
+from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, yardstick
 
 SETS = ("single", "pair", "null", "mismatch", "unlisted", "sensor", "underpowered")
@@ -84,6 +84,12 @@ def benches(size: ProofSize, seeds: np.random.SeedSequence) -> list[Bench]:
         rig = causes.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng, size.code)
         out += [Bench.draw(rig, plan, rng) for plan in plans]
     return out
+
+
+def benches_of(key: Key) -> dict[tuple[str, str], Bench]:
+    """Benches of a sealed key by rig and plan."""
+    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
+    return {(b.rig.name, b.plan): b for b in benches(SIZES[key.size], first)}
 
 
 def _pick(
@@ -146,6 +152,17 @@ def _of_bench(work: tuple[Bench, list[Drawn], Collection[str], Collection[str]])
     return [make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard) for d in drawn]
 
 
+def _pair(found: list[Bench], rng: np.random.Generator) -> tuple[Bench, tuple[str, ...]]:
+    """Two causes at once, of which one is of the air."""
+    while True:
+        bench = _pick(found, (), rng, _GRIDS)
+        assert bench is not None
+        able = [c.id for c in bench.allowed() if c.kind != "unlisted" and c.id != "unit_slip"]
+        ids = tuple(str(i) for i in rng.choice(able, 2, replace=False))
+        if any(CAUSES[i].kind == "air" for i in ids):
+            return bench, ids
+
+
 def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
     """Benches, and all items in mixed order."""
     first, second = np.random.SeedSequence(seed).spawn(2)
@@ -170,13 +187,7 @@ def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
     cycle(list(UNLISTED), "unlisted", good)
     cycle(air, "underpowered", _POOR)
     for _ in range(size.items["pair"]):
-        while True:
-            bench = _pick(found, (), rng, _GRIDS)
-            assert bench is not None
-            able = [c.id for c in bench.allowed() if c.kind != "unlisted" and c.id != "unit_slip"]
-            ids = tuple(str(i) for i in rng.choice(able, 2, replace=False))
-            if any(CAUSES[i].kind == "air" for i in ids):
-                break
+        bench, ids = _pair(found, rng)
         jobs.append(("pair", ids, tuple(_strength(i, int(rng.integers(1, 3)), rng) for i in ids), bench))
     for kind in ("null", "mismatch"):
         for _ in range(size.items[kind]):
@@ -326,16 +337,10 @@ def proof(out: Path, digest: str | None = None) -> Proof:
     made = key.size != REAL
     stored = {e.folder: rows.stored(out / "answers" / f"{e.folder}.json") for e in key.items}
     judged = [score.judge(e, stored[e.folder].answer) for e in key.items]
-    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in benches(SIZES[key.size], first)} if made else {}
-    settles = [resolves(found[j.entry.rig, j.entry.plan], j.entry, j.answer) for j in judged if made and j.answer]
-    settled = [one for one in settles if one is not None]
-    again = [score.judge(j.entry, rows.stored(out / f"answers_{ASKED}" / f"{j.entry.folder}.json").answer)
-             for j in judged if made and asks(j.answer) and (out / ASKED / j.entry.folder).exists()]  # fmt: skip
     seconds = sorted(one.seconds for one in stored.values())
     misses = tuple(_miss(j, stored[j.entry.folder].error) for j in judged
                    if not j.right and (j.claims or j.visible or not j.answer))  # fmt: skip
-    scored = score.score(judged, settled, again) if made else score.score_real(judged)
+    scored = _scored(out, key, judged) if made else score.score_real(judged)
     return Proof(
         SCHEMA, __version__, key.size, key.seed, _commit(),
         digest or (out / rows.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(scored),
@@ -344,6 +349,15 @@ def proof(out: Path, digest: str | None = None) -> Proof:
         answers={} if made else score.answers(judged), misses=misses,
         seconds_median=seconds[len(seconds) // 2] if seconds else math.nan,
     )  # fmt: skip
+
+
+def _scored(out: Path, key: Key, judged: Sequence[score.Judged]) -> list[ScoreRow]:
+    """Score of generated items, with the runs that answers recommend and the references that they ask for."""
+    found = benches_of(key)
+    settles = [resolves(found[j.entry.rig, j.entry.plan], j.entry, j.answer) for j in judged if j.answer]
+    again = [score.judge(j.entry, rows.stored(out / f"answers_{ASKED}" / f"{j.entry.folder}.json").answer)
+             for j in judged if asks(j.answer) and (out / ASKED / j.entry.folder).exists()]  # fmt: skip
+    return score.score(judged, [one for one in settles if one is not None], again)
 
 
 def _miss(j: score.Judged, error: str) -> Miss:

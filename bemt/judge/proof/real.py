@@ -181,11 +181,11 @@ def _find(path: str) -> Path | None:
 def _case_of_label(label: Mapping[str, Any]) -> str:
     """Case of a label: an APC-like blade where nothing more is known."""
     fan = "chord_law" in label
-    rotor = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
     rotor |= {k: label[k] for k in ("diameter_in", "diameter_mm") if k in label}
-    blade = {k: label[k] for k in ("pitch_in", "pitch_mm") if k in label}
+    blade: dict[str, Cell] = {k: label[k] for k in ("pitch_in", "pitch_mm") if k in label}
     blade |= {"chord_law": label.get("chord_law", "apc_like")} | ({"max_chord_over_R": 0.35} if fan else {})
-    section = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
+    section: dict[str, Cell] = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
 
     operating = {"rpm": label["rpm"], "airspeed_m_s": 0.0}
     return case_text("label", {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
@@ -278,9 +278,9 @@ def _uiuc_case(
     g = p.geometry
     assert g is not None
     s = section_rule.section_at(0.75, p.family)
-    rotor = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
     camber = section_of(class_of(p.family))[0].value if s.shape == "naca4" else s.camber
-    section = {"camber": camber, "camber_position": s.position, "thickness": s.thickness}
+    section: dict[str, Cell] = {"camber": camber, "camber_position": s.position, "thickness": s.thickness}
     keep = (g.r_R <= 1.0) & (g.r_R > 0.1)
     name = p.name.replace(".", "p")
     return (_case(name, rotor, section, rpm, air, off),
@@ -351,7 +351,7 @@ def _x22a() -> Iterator[Item]:
     shape = np.genfromtxt(root / "x22a_geometry.csv", delimiter=",", skip_header=1)
     with (root / "x22a_measured_CT_CP_vs_J.csv").open(encoding="utf-8") as stream:
         rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
-    rotor = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
     for angle in (19, 29):
         q = rows[rows[:, 0] == angle]
         columns = {"rpm": np.full(len(q), 1200.0), "J": q[:, 1], "CT": q[:, 2], "CP": q[:, 3]}
@@ -369,7 +369,7 @@ def _caradonna_tung() -> Iterator[Item]:
     with (root / "caradonna_tung_CT_vs_tipMach.csv").open(encoding="utf-8") as stream:
         rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
     r_R = np.linspace(0.18, 1.0, 10)
-    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
     for angle in np.unique(rows[:, 0]):
         q = rows[rows[:, 0] == angle]
         # thrust alone was measured: CT_rotor = T/(rho A (Omega R)^2)
@@ -393,8 +393,8 @@ def _tmotor() -> Iterator[Item]:
             given[name.strip()] = np.array([float(v) for v in values.split()])
     R = 0.3556
     blade = stations_text(given["radius"] / R, given["chord"] / R, given["pitch"])
-    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
-    section = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
+    section: dict[str, Cell] = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
     columns = {"rpm": rows[:, 0], "airspeed_m_s": np.zeros(len(rows)), "thrust_N": rows[:, 3], "torque_Nm": rows[:, 4]}
     for kind, density in (("real null", DENSITY), ("real density", WRONG_DENSITY)):
         text = _case("tmotor_28", rotor, section, 2200.0, {"density_kg_m3": density})

@@ -306,8 +306,7 @@ def loads(
     area = np.pi * rotor.radius**2
     shape = (c.rpm.size, rotor.x.size)
     twist = np.full(shape, np.radians(world.pitch_offset))
-    if world.untwist:
-        twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
+    twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
     extra: dict[str, Array] = {"twist": twist}
     span = (1.0 - rotor.hub) * rotor.radius
     leak = np.zeros(c.rpm.size)
