@@ -385,7 +385,6 @@ def prove(
     found = run(None if out is None else os.fspath(out), size, seed, jobs, say, lambda line: say(f"{line}\n"))
     taken = [following.text(following.follow(File(out or "."), cores, say))] if follow else []
     if loop:
-        made = looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None)
-        taken.append(looping.text(made))
+        taken.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
     return Told(found.document(), "\n\n".join([score.text(found), *taken]), exit_code=code)

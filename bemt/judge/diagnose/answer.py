@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.explanation import Sizes
-from bemt.judge.loss import Decision
+from bemt.judge.loss import Decision, Sizes
 from bemt.physics import effects
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from bemt.judge.compare.change_document import (
 )
 from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
-from bemt.judge.compare.selection import conditions_of, selected, with_air
+from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
 from bemt.judge.diagnose.by_laws import changed
 from bemt.rotors.propeller import Propeller, rotor_of
 
