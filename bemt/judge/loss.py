@@ -48,10 +48,6 @@ class Explanation:
             return DOUBT
         return Explanation(self.ids | other.ids, self.smooth or other.smooth)
 
-    def without(self, effect: str) -> Explanation:
-        """The others of its effects."""
-        return replace(self, ids=self.ids - {effect})
-
     def __iter__(self) -> Iterator[str]:
         """Effects in the order of the catalogue."""
         place = effects.places()

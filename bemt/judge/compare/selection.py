@@ -104,7 +104,8 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
             kept.setdefault(name, name)
     turning = [name for name in imported.values if others & set(_words(name)) and imported.unit(name) == "rpm"]
     turning = turning or [name for name in imported.values if others & set(name.split("_")) and name.endswith("_rpm")]
-    values, units = ({new: of(old) for new, old in kept.items()} for of in (imported.__getitem__, imported.unit))
+    values = {new: imported[old] for new, old in kept.items()}
+    units = {new: imported.unit(old) for new, old in kept.items()}
     if len(turning) == 1:  # its slipstream is recorded with it
         values[SECOND_ROTOR], units[SECOND_ROTOR] = imported[turning[0]] * RPM, "rad_s"
     return replace(imported, values=values, u={}, u_by={}, units=units, provenance={**imported.provenance, ROTOR: word})

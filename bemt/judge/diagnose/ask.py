@@ -183,19 +183,15 @@ def diagnosed(
     cases, records = load_all(stated, given, known, off, only, before=lambda found: folder.check(target, found),
                               rpm=speeds, airspeed_m_s=winds, ruled_out=[*ruled_out, *changed],
                               reference_case=theirs)  # fmt: skip
-    numbers = (("repeatability_pct", repeatability_pct), ("top_rpm", top_rpm))
-    stand = {k: v for k, v in numbers if v is not None}
-    told_of_stand = {k.removesuffix("_pct"): v / (100.0 if k.endswith("_pct") else 1.0) for k, v in stand.items()}
-    records = [replace(r, **told_of_stand) for r in records]  # type: ignore[arg-type]
+    repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
+    records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
-    options: dict[str, Sequence[str]] = {
+    rest = _options({
         "--case": _quoted(given, "CASE"), "--off": off, "--only": only,
-        "--reference-case": _quoted(several(reference_case), "CASE"),
-        **{f"--{k.replace('_', '-')}": [f"{v:g}"] for k, v in stand.items()},
-        "--baseline": [] if baseline == "bemt" else [baseline],
-    }  # fmt: skip
-    rest = " ".join(word for option, values in options.items() if values for word in (option, *values))
+        "--reference-case": _quoted(several(reference_case), "CASE"), "--repeatability-pct": several(repeatability_pct),
+        "--top-rpm": several(top_rpm), "--baseline": [baseline] * (baseline != "bemt"),
+    })  # fmt: skip
     asked = Given(_quoted(files, "RECORDING"), _quoted(known, "REFERENCE"), rest, tuple(ruled_out), tuple(changed))
     heard = [CHANNELS[c] for c in channels] or None
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
@@ -248,6 +244,12 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
         expected = f"a percentage above 0 and up to {REPEATABILITY_MAX:g}"
         faults.append(Fault("--repeatability-pct", "", f"{percent:g}", expected))
     refuse(faults)
+
+
+def _options(told: Mapping[str, Sequence[str | float]]) -> str:
+    """Options of a command, of those that were told."""
+    words = {option: [v if isinstance(v, str) else f"{v:g}" for v in values] for option, values in told.items()}
+    return " ".join(word for option, values in words.items() if values for word in (option, *values))
 
 
 def _quoted(given: Sequence[Any], word: str) -> tuple[str, ...]:

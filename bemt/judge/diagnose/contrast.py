@@ -18,7 +18,6 @@ from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.judge.compare.change_document import (
     DIAGNOSED,
     ComparedRuns,
-    Invocation,
     RankedCause,
     document,
     next_step,

@@ -133,7 +133,9 @@ def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> Size:
 def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, Size]]]:
     """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges."""
     problem = found.problem
-    where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
+    kinds = [effects.catalogue()[i] for i in best.ids]
+    where = [(k, p) for k, cls in enumerate(kinds) for p in cls.parameters
+             if p.name in best.settings[k] and p.name not in cls.discrete]  # fmt: skip
     # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
     C = noise.covariance(problem, found.states[0].hyper)
     C = C + form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
@@ -265,12 +267,6 @@ def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:
     values = [float(s[p.name]) for s in found.of(id_).settings if p.name in s]
     inside = [max(min(values), p.low), min(max(values), p.high)] if values else [p.low, p.high]
     return (inside[0], inside[1]) if inside[1] > inside[0] else (p.low, p.high)
-
-
-def _continuous(id_: str, setting: Setting) -> list[Any]:
-    """Parameters of a setting that may take any value in their range."""
-    cls = type(effect_of(id_, setting))
-    return [p for p in cls.parameters if p.name in setting and p.name not in cls.discrete]
 
 
 def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Array:

@@ -196,21 +196,6 @@ class Confusion:
         return [[self.ids[i] for i in sorted(g)] for g in groups if len(g) > 1]
 
 
-def distance(state: State, s: Array, span: slice, form: Form | None = None) -> float:
-    """Distance of a whitened signature from a candidate, over its settings. [1]"""
-    square = _squares(s[:, None] - state.S[:, span], form)
-    return float(np.sqrt(max(float(np.min(square)), 0.0)))
-
-
-def _squares(d: Array, form: Form | None) -> Array:
-    """Squared lengths of whitened differences (M, n), less what the form of an effect may be, (n,)."""
-    square = np.sum(d * d, axis=0)
-    if form is not None:
-        p = form.project(d)
-        square = square - np.sum(p * p, axis=0)
-    return np.asarray(square)
-
-
 def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
     """Distances between all candidates."""
     state = found.states[0]
@@ -226,7 +211,8 @@ def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confus
         forms = [LawError.of(state.white.changes(x), width).at(np.zeros(state.r.size)) for width, x in own]
         starts = [found.spans[i].start for i in ids]
         for k, s in enumerate(chosen):
-            square = _squares(s[:, None] - state.S, forms[k])
+            d = s[:, None] - state.S  # less what the form of the effect may be
+            square = np.sum(d * d, axis=0) - np.sum(forms[k].project(d) ** 2, axis=0)
             matrix[k] = np.sqrt(np.maximum(np.minimum.reduceat(square, starts), 0.0))
         np.fill_diagonal(matrix, 0.0)
     return Confusion(ids, size, matrix)

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.judge.loss import Decision
 
-__all__ = ["ALWAYS", "LEFT_OUT", "PRIOR", "kinds", "log_priors", "present", "prior_weights"]
-
 PRIOR = {"none": 0.4, "single": 0.45, "pair": 0.1, "unknown": 0.05}
 """Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
 LEFT_OUT, PRESENT = 10.0, 0.01
@@ -225,7 +223,8 @@ def change_of(
     if len(tested) != 1 or not known or {"inflow_lag", "rotor_inertia"} - set(absent):
         return None
     pair = [merged(known), tested[0]]
-    if _turned(pair):
+    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
+    if any(a * b < 0.0 for a, b in sums):  # of a load that changed its sign, ratios are those of sizes
         return None
     try:
         whole = _paths(files) if len(known) == 1 else []
@@ -233,12 +232,6 @@ def change_of(
         return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
-
-
-def _turned(pair: Sequence[Record]) -> bool:
-    """Whether a load changed its sign: ratios are those of sizes."""
-    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
-    return any(a * b < 0.0 for a, b in sums)
 
 
 def _paths(files: Sequence[str] | None) -> list[str]:

@@ -285,10 +285,6 @@ def _profile(loads: Loads, flow: Flow, laws: Laws) -> Array:
     return np.asarray(np.maximum(loads.Q - lifting, _LEAST_PROFILE * np.abs(loads.Q)))
 
 
-def _pitch_offset(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    _turned(e.offset_deg, loads, flow, laws)
-
-
 def _untwist(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Nose down by tip_deg (r/R)^2 in proportion to rho Omega^2; at 0.75 R."""
     _turned(-e.tip_deg * _AT**2 * e.share(flow), loads, flow, laws)
@@ -328,13 +324,9 @@ def _duct(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     loads.T = loads.T * (1.0 + fade * (more - 1.0)) - e.outer_drag * 0.5 * flow.rho * V**2 * flow.area
 
 
-def _nothing(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    """Its other hooks say it all."""
-
-
 BLADE_LAWS: dict[str, Callable[[Any, Loads, Flow, Laws], None]] = {
-    "pitch_offset": _pitch_offset, "untwist": _untwist, "section": _section, "duct": _duct,
-    "propeller": _nothing, "diameter": _diameter, "nacelle": _nothing,
+    "pitch_offset": lambda e, *of: _turned(e.offset_deg, *of), "untwist": _untwist, "section": _section, "duct": _duct,
+    "diameter": _diameter, **dict.fromkeys(("propeller", "nacelle"), lambda *_: None),  # their other hooks say it all
 }  # fmt: skip
 """How loads change with effects that have hooks inside of the solver, by id."""
 

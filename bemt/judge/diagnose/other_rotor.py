@@ -29,7 +29,7 @@ from bemt.physics.effects.base import Effect, RotorBuild
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case.as_built import known_from
 from bemt.rotors.conditioning import condition, tangents
-from bemt.rotors.latents import NAMES, STEP, UNITS, AsBuilt, Prior
+from bemt.rotors.latents import NAMES, UNITS, AsBuilt, Prior
 
 if TYPE_CHECKING:
     from bemt.data.recordings.findings import Finding
@@ -93,11 +93,6 @@ class CalibratedBlade:
     def used(self) -> NDArray[np.intp]:
         """Latent numbers that are not certain."""
         return np.flatnonzero(np.any(self.root != 0.0, axis=1))
-
-    @property
-    def steps(self) -> Array:
-        """Half steps of the differences that tangents are taken by, (K,)."""
-        return STEP
 
     def changed(self, k: int, step: float) -> Effect:
         """Blade with one latent number changed."""

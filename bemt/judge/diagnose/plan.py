@@ -136,13 +136,9 @@ def record_of(imported: Dataset, case: Case) -> Record:
     return replace(made, notes=(*made.notes, *imported.notes, *rows.notes))
 
 
+@posterior.one_thread()
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
     """Say what a plan can see."""
-    with posterior.one_thread():
-        return _plan(record, case, progress)
-
-
-def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) -> Plan:
     first = build([record], [case])
     flow = first.parts[0].flow
     own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0, "rpm": record.rpm}

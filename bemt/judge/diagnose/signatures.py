@@ -45,11 +45,6 @@ class Candidate:
     _other: dict[int, Array] = field(default_factory=dict, repr=False)
     _cells: dict[int, Array] = field(default_factory=dict, repr=False)
 
-    @property
-    def kind(self) -> str:
-        """Kind of the effect: air, stand or drive."""
-        return effects.catalogue()[self.id].kind
-
     def seen_as(self, signatures: Array) -> Candidate:
         """The same settings, of which other signatures (M, G) are known [units of the readings]."""
         return replace(self, signatures=signatures, _other={}, _cells={})

@@ -16,7 +16,6 @@ was. Its answers stand each for itself.
 from __future__ import annotations
 
 import json
-import math
 import shlex
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -329,7 +328,8 @@ def follow(
         last = course.answers[-1]
         if wanted is not None and number == runs:
             return replace(course, end="used up")
-        if wanted is None and last.verdict == "none" and _expected(last) < enough:
+        loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict)
+        if wanted is None and last.verdict == "none" and isinstance(loss, int | float) and loss < enough:
             return replace(course, end="none")
         taken = _recommended(item, last) if wanted is None else _fixed(item, number, wanted)
         if isinstance(taken, str):
@@ -352,12 +352,6 @@ def follow(
         if tell:
             tell(course)
     raise AssertionError("a course has an end")
-
-
-def _expected(answer: ToldAnswer) -> float:
-    """Expected loss of what was said. [one "insufficient"]"""
-    value = dict(answer.whole.get("expected_loss") or {}).get(answer.verdict)
-    return float(value) if isinstance(value, int | float) else math.inf
 
 
 def loop(

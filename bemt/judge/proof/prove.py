@@ -191,9 +191,9 @@ def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
         jobs.append(("pair", ids, tuple(_strength(i, int(rng.integers(1, 3)), rng) for i in ids), bench))
     for kind in ("null", "mismatch"):
         for _ in range(size.items[kind]):
-            bench = _pick(found, (), rng, good)
-            assert bench is not None
-            jobs.append((kind, (), (), bench))
+            plain = _pick(found, (), rng, good)
+            assert plain is not None
+            jobs.append((kind, (), (), plain))
     number = {id(bench): k for k, bench in enumerate(found)}
     drawn = []
     for at in rng.permutation(len(jobs)):
@@ -201,11 +201,6 @@ def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
         drawn.append(Drawn(number[id(bench)], ids, strengths, int(rng.integers(2**62)), kind))
     return found, drawn
 
-
-__all__ = [
-    "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
-    "teller",
-]  # fmt: skip
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -103,10 +103,11 @@ def followed() -> tuple[Followed, ...]:
 
 def pair_files(a: str, b: str) -> dict[str, str] | None:
     """Files of an item that compares two recordings; None where one of them is not found."""
-    paths = [_find(_recordings()[name]["path"]) for name in (a, b)]
-    if None in paths:
+    places = ((name, root / _recordings()[name]["path"]) for name in (a, b) for root in reversed(data_roots()))
+    found = {name: path for name, path in places if path.is_file()}
+    if len(found) < len({a, b}):
         return None
-    texts = [_text(path, name) for path, name in zip(paths, (a, b), strict=True) if path is not None]
+    texts = [_text(found[name], name) for name in (a, b)]
     return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
 
 
@@ -172,10 +173,6 @@ def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
     load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
     good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
     return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
-
-
-def _find(path: str) -> Path | None:
-    return next((root / path for root in data_roots() if (root / path).is_file()), None)
 
 
 def _case_of_label(label: Mapping[str, Any]) -> str:

@@ -240,8 +240,6 @@ class Proof(Documented):
     seconds: Mapping[str, float] | None = None  # Spent on concealing and on diagnosing
 
 
-__all__ = ["KEY", "SEAL", "seal", "sha256", "stored", "unseal"]
-
 KEY, SEAL = "key.json", "key.sha256"
 
 
