@@ -29,9 +29,6 @@ from bemt.judge.proof.items import Bench, Item, make_item
 from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, yardstick
 
-SETS = ("single", "pair", "null", "mismatch", "unlisted", "sensor", "underpowered")
-"""Kinds of items; a null is noise only, a mismatch the difference of truth and solver only."""
-
 _STRENGTHS = (0.5, 1.0, 1.7)
 _PHYSICAL = ("reynolds", "compressibility", "drag_divergence", "stall_delay", "duct", "tip_gap", "ground_effect")
 _GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
@@ -41,7 +38,8 @@ _GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
 class ProofSize:
     """Counts of a run of the proof."""
 
-    items: dict[str, int]  # Items of each set. [-]
+    # Items of each set; a null is noise only, a mismatch the difference of truth and solver only. [-]
+    items: dict[str, int]
     plans: tuple[tuple[bool, tuple[str, ...]], ...]  # Rigs: whether ducted, and plans. [-]
     code: str = "vortex"  # Code of the truth
 
