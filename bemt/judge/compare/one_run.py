@@ -225,9 +225,13 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads
     ours, band = float(bemt[name][k]), float(bemt.u[name][k])
     both = math.hypot(u if math.isfinite(u) else 0.0, band)
     parts = {origin: float(part[name][k]) for origin, part in bemt.u_by.items() if name in part}
-    E = ours - value
-    said = "agrees" if abs(E) <= both else "within 2 u" if abs(E) <= _WIDE * both else "differs"
-    return BothLoads(value, u, ours, band, parts, E, both, said if math.isfinite(E + both) else "no result")
+    return BothLoads(value, u, ours, band, parts, ours - value, both, _verdict(ours - value, both))
+
+
+def _verdict(E: float, u: float) -> str:
+    if not math.isfinite(E + u):
+        return "no result"
+    return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
 
 def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
