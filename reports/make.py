@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bemt.judge.proof import proof_text
+from bemt.judge.proof import score
 from bemt.judge.proof.rows import Proof
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,7 +74,7 @@ def main() -> None:
         for k in (1, 2):
             bemt("validate", f"{uiuc}/volume-{k}", "--match-J0", "--out", f"reports/validation/uiuc_volume_{k}")
     proof = Proof.from_document(json.loads((ROOT / "reports" / "proof" / "proof.json").read_text(encoding="utf-8")))
-    (ROOT / "reports" / "proof" / "proof.html").write_text(proof_text.html(proof), encoding="utf-8")
+    (ROOT / "reports" / "proof" / "proof.html").write_text(score.html(proof), encoding="utf-8")
     with (ROOT / "reports" / "reproduction.json").open("w", encoding="utf-8") as file:
         subprocess.run([sys.executable, "reports/studies/reproduce.py", "--json"], cwd=ROOT, stdout=file, check=True)
     bemt("report", "cases/", "--out", "reports")

@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.compare.change_document import document
-from bemt.judge.compare.contrast_text import text
+from bemt.judge.compare.change_document import document, text
 from bemt.judge.compare.drive_laws import LAWS
 from bemt.judge.compare.first_picture import picture
+from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.compare.stand_run import StandRun, stand_run
 from bemt.judge.diagnose.by_laws import changed
 from bemt.judge.diagnose.contrast import compare
 from bemt.judge.diagnose.law_rotor import CoefficientCurve

@@ -10,7 +10,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
-from bemt.judge.explanation import UNKNOWN
+from bemt.judge.loss import UNKNOWN
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 
@@ -202,5 +202,5 @@ def test_a_plan_knows_what_it_can_see() -> None:
     seen = [sum(w == "visible" for w in p.sight.values()) for p in (static, grid)]
     assert seen[1] > seen[0], "a grid over speed and advance ratio sees more than a static sweep"
     assert "airspeed_offset" in static.absent and static.sight["airspeed_offset"] == "invisible"
-    doc = plan.document(grid)
+    doc = grid.to_dict()
     assert doc["schema"] == "bemt.plan/1" and set(doc["sight"].values()) <= {"visible", "marginal", "invisible"}

@@ -13,8 +13,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from bemt.base import canvas
-from bemt.judge.diagnose import chain, confusion, figures, figures_effects, fit, record
-from bemt.judge.explanation import NONE, Explanation
+from bemt.judge.diagnose import chain, figures, figures_effects, fit, form, record
+from bemt.judge.loss import NONE, Explanation
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case
@@ -75,7 +75,7 @@ def test_what_there_is_to_show_is_written(
         warnings.simplefilter("error")
         written = figures.draw(answer, tmp_path)
     # the matrix needs two effects that the plan sees
-    seen = {"confusion"} if np.sum(answer.alike.size >= confusion.ALIKE) >= 2 else set()
+    seen = {"confusion"} if np.sum(answer.alike.size >= form.ALIKE) >= 2 else set()
     assert {p.stem for p in written if p.suffix == ".png"} == (expected - {"confusion"}) | (expected & seen)
     assert sorted(written) == sorted(tmp_path.iterdir())
     for path in written:
@@ -239,11 +239,11 @@ def test_a_leading_effect_too_faint_at_usual_strength_is_shown_as_found_or_said(
     faint = replace(named, alike=alike, found=replace(named.found, probability=odds))
     for strength in (9.0, 1.0):
         known = replace(faint.alike, size=np.array([strength if i == LEFT_OUT else 9.0 for i in ids]))
-        monkeypatch.setattr(confusion, "confusion", lambda found, at, known=known: known)
+        monkeypatch.setattr(form, "confusion", lambda found, at, known=known: known)
         drawn = figures_effects.matrix(faint)
         assert drawn is not None
         shown, said = LEFT_OUT in rows_of(drawn), LEFT_OUT in drawn.get_suptitle()
-        assert (shown, said) == ((True, False) if strength > confusion.ALIKE else (False, True))
+        assert (shown, said) == ((True, False) if strength > form.ALIKE else (False, True))
 
 
 class OneRecord(list[float]):

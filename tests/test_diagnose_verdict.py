@@ -11,17 +11,10 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge import loss
-from bemt.judge.diagnose import (
-    chain,
-    confusion,
-    fit,
-    interval_scales,
-    noise,
-    prior,
-)
+from bemt.judge.diagnose import chain, fit, form, knowledge, noise
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.record import from_series
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
+from bemt.judge.loss import NONE, UNKNOWN, Explanation, Size
 from bemt.judge.proof.intervals import Off, calibrate
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
@@ -64,11 +57,11 @@ def test_a_few_explanations_are_an_answer_and_many_are_not(answer: chain.Diagnos
 def test_a_duct_of_the_case_is_on_already(walls: object, answer: chain.Diagnosis) -> None:
     parts = [SimpleNamespace(baseline=p.baseline, model=SimpleNamespace(duct=walls)) for p in answer.problem.parts]
     problem: Any = SimpleNamespace(parts=parts)
-    assert ("duct" in prior.present(problem)) == (walls is not None)
+    assert ("duct" in knowledge.present(problem)) == (walls is not None)
 
 
 def test_the_nearest_signature_is_a_baseline_of_its_own(answer: chain.Diagnosis) -> None:
-    assert confusion.nearest(answer.found) == "compressibility"
+    assert form.nearest(answer.found) == "compressibility"
 
 
 def test_references_are_in_no_block() -> None:
@@ -125,13 +118,13 @@ def pair(**changed: Any) -> Any:
 
 def test_intervals_are_widened_by_their_factor_and_end_at_the_range() -> None:
     told = {"untwist": {"tip_deg": Size(1.0, 0.8, 1.3, "deg")}, "rpm_scale": {"factor": Size(2.0, 2.0, 2.0, "1")}}
-    s = interval_scales.scale_of("untwist", "tip_deg")
-    wide = interval_scales.widened(told)
+    s = fit.scale_of("untwist", "tip_deg")
+    wide = fit.widened(told)
     assert wide["untwist"]["tip_deg"].low == pytest.approx(1.0 - 0.2 * s)
     assert wide["untwist"]["tip_deg"].high == pytest.approx(1.0 + 0.3 * s)
     assert wide["rpm_scale"] == told["rpm_scale"]  # a ratio has odds, no half-width
     far = {"untwist": {"tip_deg": Size(4.9, 4.0, 5.0, "deg")}}
-    assert interval_scales.widened(far)["untwist"]["tip_deg"].high == 5.0
+    assert fit.widened(far)["untwist"]["tip_deg"].high == 5.0
 
 
 def test_factors_hold_as_often_as_they_say() -> None:
@@ -140,10 +133,3 @@ def test_factors_hold_as_often_as_they_say() -> None:
     found = [Off("untwist.tip_deg", float(v)) for v in scores[:200]]
     factor = calibrate(found, [])["parameters"]["untwist.tip_deg"]["scale"]
     assert np.mean(scores[200:] <= factor) == pytest.approx(0.9, abs=0.06)
-
-
-def test_the_groups_of_an_answer_are_views_of_one_weighing(answer: chain.Diagnosis) -> None:
-    assert answer.readings.values.size == answer.readings.u.size == answer.baseline.values.size
-    assert answer.prior.keys() == answer.posterior.probability.keys()
-    assert sum(answer.prior.values()) == pytest.approx(1.0) == pytest.approx(sum(answer.posterior.probability.values()))
-    assert {c.id for c in answer.explanations} == set(answer.posterior.inclusion)

@@ -342,12 +342,12 @@ def maker(project: Path) -> ModuleType:
 
 
 def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:
-    from bemt.judge.diagnose import confusion, document, form, knowledge, plan, posterior, prior
-    from bemt.judge.explanation import Explanation
+    from bemt.judge.diagnose import document, form, knowledge, plan, posterior
+    from bemt.judge.loss import Explanation
 
     text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
     assert maker.numbers(text) == text, "run python docs/make.py"
-    for module in (confusion, form, knowledge, posterior, prior):
+    for module in (form, knowledge, posterior):
         other = (str, bool, Explanation)
         steers = {k for k, v in vars(module).items() if k.isupper() and not isinstance(v, other) and k[0] != "_"}
         name = module.__name__.rpartition(".")[2]

@@ -15,24 +15,7 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
-from bemt.judge.proof import (
-    causes,
-    draw,
-    items,
-    loop,
-    proof_text,
-    prove,
-    real,
-    rigs,
-    score,
-    seal,
-    truth,
-    truth_ccblade,
-    truth_duct,
-    truth_section,
-    truth_wake,
-    truth_world,
-)
+from bemt.judge.proof import causes, follow, items, loop, prove, real, rows, score, truth, truth_section, truth_world
 from bemt.judge.proof.items import Bench, Item
 from bemt.judge.proof.rows import Entry, Estimate, Key, Ranked, Step, ToldAnswer
 from bemt.judge.proof.stand import StandErrors, covariance, full_scales, record
@@ -54,34 +37,34 @@ def settled(rpm: list[float], airspeed: list[float], **more: np.ndarray) -> trut
 
 
 @pytest.fixture(scope="module")
-def rig() -> rigs.Rig:
-    return rigs.draw_rig("open", False, np.random.default_rng(5))
+def rig() -> causes.Rig:
+    return causes.draw_rig("open", False, np.random.default_rng(5))
 
 
 @pytest.fixture(scope="module")
-def ducted() -> rigs.Rig:
-    return rigs.draw_rig("ducted", True, np.random.default_rng(6))
+def ducted() -> causes.Rig:
+    return causes.draw_rig("ducted", True, np.random.default_rng(6))
 
 
 def test_straight_wake_of_elliptic_loading_gives_uniform_downwash() -> None:
     hub, panels = 0.1, 40
-    edges, x = truth_wake.edges_and_centres(hub, panels)
+    edges, x = truth.edges_and_centres(hub, panels)
     # so long an advance that the helices are straight lines: a wing from hub to tip
-    _, swirl = truth_wake._influence(x, edges, edges, 1, 500.0, 0.0)
+    _, swirl = truth._influence(x, edges, edges, 1, 500.0, 0.0)
     middle, half = 0.5 * (1.0 + hub), 0.5 * (1.0 - hub)
     gamma = np.sqrt(1.0 - ((x - middle) / half) ** 2)
-    downwash = truth_wake._horseshoe(swirl) @ gamma
+    downwash = truth._horseshoe(swirl) @ gamma
     assert downwash[3:-3] == pytest.approx(1.0 / (2.0 * 2.0 * half), rel=0.01)
 
 
 def test_many_blades_become_the_vortex_tube() -> None:
     hub, panels, blades = 0.17, 20, 8
-    axial, swirl = truth_wake.wake_tables(hub, panels, blades, False)
+    axial, swirl = truth.wake_tables(hub, panels, blades, False)
     h = np.array([0.06])
-    _, x = truth_wake.edges_and_centres(hub, panels)
+    _, x = truth.edges_and_centres(hub, panels)
     inside = (x > 0.2) & (x < 0.92)
-    ua = truth_wake.interpolate(axial, h, np.zeros(1))[0].sum(axis=1)
-    ut = truth_wake.interpolate(swirl, h, np.zeros(1))[0].sum(axis=1)
+    ua = truth.interpolate(axial, h, np.zeros(1))[0].sum(axis=1)
+    ut = truth.interpolate(swirl, h, np.zeros(1))[0].sum(axis=1)
     assert ua[inside] == pytest.approx(blades / (4.0 * np.pi * 0.06), rel=0.02)
     assert (ut * x)[inside] == pytest.approx(blades / (4.0 * np.pi), rel=0.02)
 
@@ -89,9 +72,9 @@ def test_many_blades_become_the_vortex_tube() -> None:
 def test_rigid_helicoid_carries_the_circulation_of_goldstein() -> None:
     """Four blades, advance 0.1: Goldstein's function is Prandtl's F x^2 / (x^2 + lambda^2) there."""
     hub, panels, blades, h = 0.05, 30, 4, 0.1
-    _, x = truth_wake.edges_and_centres(hub, panels)
-    axial, swirl = truth_wake.wake_tables(hub, panels, blades, False)
-    ma, ms = (truth_wake.interpolate(t, np.array([h]), np.zeros(1))[0] for t in (axial, swirl))
+    _, x = truth.edges_and_centres(hub, panels)
+    axial, swirl = truth.wake_tables(hub, panels, blades, False)
+    ma, ms = (truth.interpolate(t, np.array([h]), np.zeros(1))[0] for t in (axial, swirl))
     phi = np.arctan2(h, x)
     # Betz: what is induced normal to the sheet is that of a rigid screw moving back, half of it at the disk
     gamma = np.linalg.solve(ma * np.cos(phi)[:, None] + ms * np.sin(phi)[:, None], 0.5 * np.cos(phi))
@@ -101,14 +84,14 @@ def test_rigid_helicoid_carries_the_circulation_of_goldstein() -> None:
     assert found[outer] == pytest.approx((f * x**2 / (x**2 + h**2))[outer], rel=0.03)
 
 
-def test_power_and_thrust_converge_with_panels(rig: rigs.Rig) -> None:
+def test_power_and_thrust_converge_with_panels(rig: causes.Rig) -> None:
     rows = settled([0.6 * rig.top_rpm] * 3, [0.0, 5.0, 10.0])
     coarse, fine = (truth_world.loads(replace(rig.rotor, panels=n), truth_world.World(), rows) for n in (14, 21))
     assert coarse.thrust == pytest.approx(fine.thrust, rel=0.01)
     assert coarse.torque == pytest.approx(fine.torque, rel=0.01)
 
 
-def test_induced_power_is_never_below_momentum_theory(rig: rigs.Rig) -> None:
+def test_induced_power_is_never_below_momentum_theory(rig: causes.Rig) -> None:
     rows = settled([0.5 * rig.top_rpm] * 4, [0.0, 3.0, 6.0, 9.0])
     got = truth_world.loads(rig.rotor, truth_world.World(), rows)
     rho, area = float(truth.air(np.array(T_ROOM), np.array(P_ROOM))[0]), np.pi * rig.rotor.radius**2
@@ -117,7 +100,7 @@ def test_induced_power_is_never_below_momentum_theory(rig: rigs.Rig) -> None:
     assert np.all(got.torque * rows.rpm * np.pi / 30.0 > ideal)
 
 
-def test_forces_scale_with_density_and_speed_when_sections_do_not_care(rig: rigs.Rig) -> None:
+def test_forces_scale_with_density_and_speed_when_sections_do_not_care(rig: causes.Rig) -> None:
     plain = truth_section.SectionPhysics(reynolds=0.0, compressibility=0.0, drag_divergence=0.0)
     world = truth_world.World(section=plain)
     rows = settled([3000.0, 6000.0], [2.0, 4.0])
@@ -178,14 +161,14 @@ def test_uiuc_propellers(shared_data: Path, name: str, camber: float) -> None:
 
 def test_duct_goes_from_none_to_the_endless_one() -> None:
     x = (0.4, 0.6, 0.8)
-    none, _ = truth_duct.disk_speeds(truth_duct.TruthDuct(0.02, 0.01, lip_radius=1e-4), 0.35, x)
-    endless, still = truth_duct.disk_speeds(truth_duct.TruthDuct(8.0, 4.0), 0.35, x)
+    none, _ = truth_world.disk_speeds(truth_world.TruthDuct(0.02, 0.01, lip_radius=1e-4), 0.35, x)
+    endless, still = truth_world.disk_speeds(truth_world.TruthDuct(8.0, 4.0), 0.35, x)
     assert none == pytest.approx(0.5, abs=0.01)  # half of the jet's excess at the disk: the open rotor
     assert endless == pytest.approx(1.0, abs=0.05)  # the whole of it: no contraction
     assert still == pytest.approx(0.0, abs=0.01)
 
 
-def test_duct_gives_more_thrust_for_less_torque_and_fades_with_speed(ducted: rigs.Rig) -> None:
+def test_duct_gives_more_thrust_for_less_torque_and_fades_with_speed(ducted: causes.Rig) -> None:
     rows = settled([0.6 * ducted.top_rpm] * 2, [0.0, 0.3 * ducted.top_rpm / 60.0 * 2.0 * ducted.rotor.radius])
     world = truth_world.World()
     with_duct = truth_world.loads(ducted.rotor, world, rows, ducted.duct)
@@ -195,7 +178,7 @@ def test_duct_gives_more_thrust_for_less_torque_and_fades_with_speed(ducted: rig
     assert per_torque[0] > per_torque[1]
 
 
-def test_wall_effect_follows_hayden(rig: rigs.Rig) -> None:
+def test_wall_effect_follows_hayden(rig: causes.Rig) -> None:
     z = np.array([1.5, 2.0, 3.0])
     rows = settled([0.5 * rig.top_rpm] * 3, [0.0] * 3, wall=z * rig.rotor.radius)
     free, near = (truth_world.loads(rig.rotor, truth_world.World(ground=g), rows) for g in (0.0, 1.0))
@@ -206,7 +189,7 @@ def test_wall_effect_follows_hayden(rig: rigs.Rig) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(causes.CAUSES))
-def test_no_strength_is_no_cause(rig: rigs.Rig, ducted: rigs.Rig, name: str) -> None:
+def test_no_strength_is_no_cause(rig: causes.Rig, ducted: causes.Rig, name: str) -> None:
     """The plainest check of every cause: nothing of it leaves the readings as they were, some of it does not."""
     cause = causes.CAUSES[name]
     on = ducted if cause.ducted else rig
@@ -233,7 +216,7 @@ def test_no_strength_is_no_cause(rig: rigs.Rig, ducted: rigs.Rig, name: str) -> 
         assert max(np.nanmax(np.abs(v)) for v in differs.values()) > 0.0
 
 
-def test_fault_of_one_cell_leaves_the_other_alone(rig: rigs.Rig) -> None:
+def test_fault_of_one_cell_leaves_the_other_alone(rig: causes.Rig) -> None:
     bench = Bench.draw(rig, "static_narrow", np.random.default_rng(1))
     loads, base = bench.measure(bench.plain(), StandErrors())
     for name, other in (("thrust_gain", "torque_Nm"), ("thrust_zero", "torque_Nm"), ("torque_gain", "thrust_N"),
@@ -265,7 +248,7 @@ def test_noise_has_the_covariance_that_the_yardstick_uses() -> None:
 # The promise of the sealing: the key is fixed before the diagnosis, which sees recording and case only; and the score
 
 
-TINY = draw.ProofSize(
+TINY = prove.ProofSize(
     {"single": 2, "pair": 0, "null": 1, "mismatch": 1, "unlisted": 0, "sensor": 2, "underpowered": 1},
     ((False, ("static_narrow",)),),
 )
@@ -274,10 +257,10 @@ TINY = draw.ProofSize(
 @pytest.fixture(scope="module")
 def patched() -> Any:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(draw.SIZES, "tiny", TINY)
+        patch.setitem(prove.SIZES, "tiny", TINY)
         # the quickest plan stands for the good ones, too
-        patch.setattr(draw, "_POOR", ("single_line",))
-        patch.setattr(draw, "_OPEN", (*draw._OPEN, "static_narrow"))
+        patch.setattr(prove, "_POOR", ("single_line",))
+        patch.setattr(prove, "_OPEN", (*prove._OPEN, "static_narrow"))
         patch.setitem(TINY.items, "underpowered", 0)
         patch.setattr(items.Bench, "signatures", lambda self: {})  # look-alikes cost time and are tested with the truth
         yield patch
@@ -290,7 +273,7 @@ def sealed(patched: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
 
 
 def entries(folder: Path) -> list[Entry]:
-    return list(Key.from_document(json.loads((folder / seal.KEY).read_text(encoding="utf-8"))).items)
+    return list(Key.from_document(json.loads((folder / rows.KEY).read_text(encoding="utf-8"))).items)
 
 
 def _shown(entry: Entry) -> set[str]:
@@ -321,16 +304,16 @@ def test_same_seed_same_key_other_seed_other_key(sealed: tuple[Path, str], patch
 
 def test_seal_holds_and_a_second_proof_is_refused(sealed: tuple[Path, str]) -> None:
     out, digest = sealed
-    assert seal.sha256((out / seal.KEY).read_text(encoding="utf-8")) == digest
-    assert seal.unseal(out, digest).schema == "bemt.key/1"
+    assert rows.sha256((out / rows.KEY).read_text(encoding="utf-8")) == digest
+    assert rows.unseal(out, digest).schema == "bemt.key/1"
     with pytest.raises(InputError, match="a folder without one"):
         prove.conceal(out, "tiny", 7)
 
 
-@pytest.mark.parametrize("file", [seal.KEY, "recording.csv", "case.toml", "stations.csv"])
+@pytest.mark.parametrize("file", [rows.KEY, "recording.csv", "case.toml", "stations.csv"])
 def test_tampering_is_noticed(sealed: tuple[Path, str], file: str) -> None:
     out, digest = sealed
-    path = out / file if file == seal.KEY else out / "items" / "0001" / file
+    path = out / file if file == rows.KEY else out / "items" / "0001" / file
     whole = path.read_text(encoding="utf-8")
     try:
         path.write_text(whole.replace("1", "2", 1), encoding="utf-8")
@@ -343,12 +326,12 @@ def test_tampering_is_noticed(sealed: tuple[Path, str], file: str) -> None:
 
 def test_a_forged_seal_does_not_help(sealed: tuple[Path, str]) -> None:
     out, digest = sealed
-    key, mark = out / seal.KEY, out / seal.SEAL
+    key, mark = out / rows.KEY, out / rows.SEAL
     whole, old = key.read_text(encoding="utf-8"), mark.read_text(encoding="utf-8")
     try:
         forged = whole.replace('"null"', '"pair"')
         key.write_text(forged, encoding="utf-8")
-        mark.write_text(seal.sha256(forged), encoding="utf-8")
+        mark.write_text(rows.sha256(forged), encoding="utf-8")
         with pytest.raises(InputError, match="key was changed"):
             prove.proof(out, digest)
     finally:
@@ -379,8 +362,8 @@ def test_the_key_is_sealed_before_any_diagnosis(patched: Any, tmp_path: Path, mo
     order: list[bool] = []
 
     def spy(folder: Path) -> tuple[ToldAnswer, str]:
-        text = (out / seal.KEY).read_text(encoding="utf-8")
-        order.append((out / seal.SEAL).read_text(encoding="utf-8").strip() == seal.sha256(text))
+        text = (out / rows.KEY).read_text(encoding="utf-8")
+        order.append((out / rows.SEAL).read_text(encoding="utf-8").strip() == rows.sha256(text))
         return ToldAnswer(), "spy"
 
     monkeypatch.setattr(prove, "diagnose_folder", spy)
@@ -392,11 +375,11 @@ def test_the_key_is_sealed_before_any_diagnosis(patched: Any, tmp_path: Path, mo
     assert (out / "proof.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     assert "Misses" in (out / "proof.txt").read_text(encoding="utf-8")
     # an interrupted run goes on with the key it has, and asks again only what has no answer
-    sealed_key = (out / seal.KEY).read_bytes()
+    sealed_key = (out / rows.KEY).read_bytes()
     (out / "answers" / "0002.json").unlink()
     order.clear()
     prove.prove(str(out), "tiny", None, 1)
-    assert (out / seal.KEY).read_bytes() == sealed_key
+    assert (out / rows.KEY).read_bytes() == sealed_key
     assert order == [True]
 
 
@@ -425,7 +408,7 @@ def test_a_reference_is_given_when_it_was_asked_for_and_not_before(
 
 def test_the_reference_lacks_the_cause_and_nothing_else(patched: Any) -> None:
     """A thrust cell 10 % off: the same rotor reads a tenth less in the reference, torque and points are the same."""
-    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    bench = prove.benches(TINY, np.random.SeedSequence(3))[0]
     item = items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
     off = item.entry.parameters["thrust_gain"]["gain"].value
     here, there = (
@@ -523,12 +506,12 @@ def test_risk_listens_to_the_surest_first() -> None:
     unsure = score.judge(entry("null"), replace(answer("named", "nacelle"), probability=0.6))
     curve = score.risk_coverage([unsure, sure], (0.5, 1.0))
     assert [point.risk for point in curve] == [0.0, 0.5]
-    assert proof_text._percent(curve[1].risk) == "50.0 %"
+    assert score._percent(curve[1].risk) == "50.0 %"
 
 
 def test_a_recommended_run_is_tried_on_the_truth() -> None:
     """Elastic twist or Mach number in a static sweep: thinner air settles it, one more point of the same does not."""
-    rig = rigs.draw_rig("open", False, np.random.default_rng(5))
+    rig = causes.draw_rig("open", False, np.random.default_rng(5))
     bench = items.Bench.draw(rig, "static_sweep", np.random.default_rng(1))
     there = entry("single", "untwist", strengths=[0.5], seed=4, stand={"noise": 0.006})
     top = rig.top_rpm
@@ -556,7 +539,7 @@ def test_no_answer_is_no_virtue() -> None:
 @pytest.fixture(scope="module")
 def weighed(patched: Any) -> tuple[items.Bench, Item]:
     """Item whose thrust cell is 10 % off, without a reference of its own."""
-    bench = draw.benches(TINY, np.random.SeedSequence(3))[0]
+    bench = prove.benches(TINY, np.random.SeedSequence(3))[0]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(items, "_REFERENCED", 0.0)
         return bench, items.make_item(bench, ("thrust_gain",), (2.0,), 5, "sensor")
@@ -565,7 +548,7 @@ def weighed(patched: Any) -> tuple[items.Bench, Item]:
 def _followed(
     weighed: tuple[items.Bench, Item], monkeypatch: pytest.MonkeyPatch, out: Path, answers: list[ToldAnswer],
     runs: int = 3,
-) -> tuple[loop.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
+) -> tuple[follow.Course, list[list[str]], list[dict[str, str]]]:  # fmt: skip
     """Course of the item whose answers are given, with the commands and the files that were seen."""
     bench, made = weighed
     for home, more in (("items", {}), (prove.ASKED, {"reference.csv": made.reference})):
@@ -623,7 +606,7 @@ def test_mending_takes_the_cause_away_and_a_wrong_name_nothing(
         before, after = (files["recording.csv"] for files in seen)
         assert before != after
         ratio[name] = _median(before, "thrust_N") / _median(after, "thrust_N")
-        found[name] = loop.judge(there, course, 3)
+        found[name] = follow.judge(there, course, 3)
     assert abs(ratio["thrust_gain"] - 1.0) > 0.05
     assert ratio["torque_gain"] == pytest.approx(1.0, abs=0.02)
     assert found["thrust_gain"][1] and found["thrust_gain"][0].right
@@ -639,18 +622,18 @@ def test_a_pair_is_found_one_after_the_other_and_a_model_is_no_run(
     course, asked, _ = _followed(weighed, monkeypatch, tmp_path, said, runs=1)
     assert course.steps == ["model", "reference"] and course.end == "used up"
     assert asked[0][asked[0].index("--case") + 1] != "case.toml"
-    assert [loop.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
+    assert [follow.judge(there, course, k)[1] for k in (0, 1)] == [False, True]
 
 
 def test_what_is_claimed_after_the_last_cause_is_wrong_and_forgets_nothing() -> None:
     there = entry("sensor", "thrust_gain")
     said = [answer("sensor", "thrust_gain"), answer("class", "duct", "nacelle")]
-    course = loop.Course("0000", said, ["mend"], [15.0], [["thrust_gain"]], "used up")
-    judged, exact = loop.judge(there, course, 1)
+    course = follow.Course("0000", said, ["mend"], [15.0], [["thrust_gain"]], "used up")
+    judged, exact = follow.judge(there, course, 1)
     assert exact and judged.claims and not judged.right
     wrong = replace(course, answers=[*said[:1], answer("named", "duct")])
-    assert loop.judge(there, wrong, 1)[1] is False
-    nothing = loop.judge(entry("null"), replace(course, answers=[said[0], answer("none")]), 1)[0]
+    assert follow.judge(there, wrong, 1)[1] is False
+    nothing = follow.judge(entry("null"), replace(course, answers=[said[0], answer("none")]), 1)[0]
     assert nothing.claims and not nothing.right
 
 
@@ -740,7 +723,7 @@ def test_a_change_over_speed_is_not_noise() -> None:
 @pytest.fixture(scope="module")
 def bench() -> Bench:
     rng = np.random.default_rng(4)
-    return Bench.draw(rigs.draw_rig("open_0", False, rng, "ccblade"), "grid_shuffled", rng)
+    return Bench.draw(causes.draw_rig("open_0", False, rng, "ccblade"), "grid_shuffled", rng)
 
 
 def test_two_truths_agree_where_both_hold(bench: Bench) -> None:
@@ -758,8 +741,8 @@ def test_two_truths_agree_where_both_hold(bench: Bench) -> None:
 
 def test_causes_are_those_it_can_express(bench: Bench) -> None:
     allowed = {c.id for c in bench.allowed()}
-    assert allowed <= truth_ccblade.EXPRESSIBLE and {"reynolds", "pitch_offset", "thrust_gain"} <= allowed
-    plans = {plan for _, plans in draw.SIZES["ccblade"].plans for plan in plans}
+    assert allowed <= truth_world.EXPRESSIBLE and {"reynolds", "pitch_offset", "thrust_gain"} <= allowed
+    plans = {plan for _, plans in prove.SIZES["ccblade"].plans for plan in plans}
     assert plans <= {"grid_shuffled", "grid_ordered", "two_air"}  # most of their points are in flight
 
 
@@ -779,6 +762,6 @@ def test_without_the_extra_it_says_so(bench: Bench, monkeypatch: pytest.MonkeyPa
 @pytest.mark.slow
 def test_the_items_of_a_seed_do_not_depend_on_the_number_of_processes() -> None:
     plans = ((False, ("static_sweep",)), (False, ("static_sweep", "wall")))
-    size = draw.ProofSize({**TINY.items, "underpowered": 0}, plans)
-    one, two = (list(draw.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
+    size = prove.ProofSize({**TINY.items, "underpowered": 0}, plans)
+    one, two = (list(prove.draw_items(size, 5, set(catalogue()), (), jobs=jobs)) for jobs in (1, 2))
     assert [(i.files, i.reference) for i in one] == [(i.files, i.reference) for i in two]

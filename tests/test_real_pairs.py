@@ -12,7 +12,7 @@ from bemt.judge.compare.drive_laws import LAWS
 from bemt.judge.diagnose.contrast import compare
 from bemt.judge.proof import follow, prove, score
 from bemt.judge.proof.items import Item
-from bemt.judge.proof.pairs import draw_pairs, followed, pairs
+from bemt.judge.proof.real import draw_pairs, followed, pairs
 from bemt.physics.effects import catalogue
 from bemt.rotors.case import load_case
 

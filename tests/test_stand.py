@@ -23,7 +23,7 @@ import pytest
 import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
-from bemt.judge.proof import draw, items, loop, seal
+from bemt.judge.proof import items, loop, prove, rows
 from bemt.tools.stand import drivers, hand, sealed, session
 from bemt.tools.stand.drivers import rcbenchmark, serial
 from bemt.tools.stand.guard import Guard, Limits
@@ -268,7 +268,7 @@ def test_a_sitting_tells_its_story_in_one_folder(project: Path, tmp_path: Path) 
     log = (folder / "log.txt").read_text()
     assert log.index("sealed: ") < log.index("run: ") < log.index("said: ") < log.index("unsealed: ")
     digest = log.partition("SHA-256 ")[2][:64]
-    assert seal.sha256((folder / "sealed" / seal.KEY).read_text()) == digest, "sealed before the first run"
+    assert rows.sha256((folder / "sealed" / rows.KEY).read_text()) == digest, "sealed before the first run"
 
 
 def test_a_real_stand_asks_before_each_run_and_for_the_weather_once(
@@ -305,9 +305,9 @@ def test_what_is_measured_through_the_wire_is_the_hidden_stand(tmp_path: Path, m
     """A rotor of the proof, through the wire, reads what its item says, to the noise of the cells."""
     # how well causes could be told apart is not asked here
     monkeypatch.setattr(items, "_judge", lambda *_: (0.0, 0.0, ()))
-    bench = draw.benches(draw.SIZES["stand"], np.random.SeedSequence(5).spawn(2)[0])[0]
+    bench = prove.benches(prove.SIZES["stand"], np.random.SeedSequence(5).spawn(2)[0])[0]
     made = items.make_item(bench, ("torque_gain",), (2.0,), 5, "sensor")
-    seal.seal(tmp_path, seal.Key("bemt.key/1", "0", "5", "stand", (replace(made.entry, folder="0000"),)))
+    rows.seal(tmp_path, rows.Key("bemt.key/1", "0", "5", "stand", (replace(made.entry, folder="0000"),)))
     with hand.wired(tmp_path, replace(made.entry, folder="0000")) as found:
         text = found.again((), 0)
         assert found.there("torque_gain") and not found.there("duct")

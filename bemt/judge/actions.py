@@ -365,30 +365,26 @@ def prove(
     from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
     from bemt.base.plugins import load, missing, offered
     from bemt.judge.proof import follow as following
-    from bemt.judge.proof import intervals, proof_text
+    from bemt.judge.proof import intervals, score
     from bemt.judge.proof import loop as looping
     from bemt.judge.proof.prove import prove as run
 
-    got = f"size {size}" + ("" if out else " without out")
-    if follow and not (out and size == "real"):
-        raise InputError(Fault("--follow", "", got, "size real and out"))
-    if loop and (not out or size == "real"):
-        raise InputError(Fault("--loop", "", got, "generated items and out"))
-    if seed is not None and seed < 0:
-        raise InputError(Fault("--seed", "", f"{seed}", "a whole number of 0 or more"))
-    if wired and not (loop and size == "stand"):
-        raise InputError(Fault("--wired", "", got, "size stand and a loop"))
-    hands = load(offered("HANDS")["wired"]) if wired and "wired" in offered("HANDS") else None
-    if wired and hands is None:
-        raise InputError(Fault("--wired", "", "no simulated stand", "the stand tool", missing("stand")))
+    got, hands = f"size {size}" + ("" if out else " without out"), offered("HANDS").get("wired") if wired else None
+    for wrong, option, told, expected, *hint in (
+        (follow and not (out and size == "real"), "--follow", got, "size real and out"),
+        (loop and not (out and size != "real"), "--loop", got, "generated items and out"),
+        ((seed or 0) < 0, "--seed", f"{seed}", "a whole number of 0 or more"),
+        (wired and not (loop and size == "stand"), "--wired", got, "size stand and a loop"),
+        (wired and not hands, "--wired", "no simulated stand", "the stand tool", missing("stand")),
+    ):
+        if wrong:
+            raise InputError(Fault(option, "", told, expected, *hint))
     if calibrate_intervals:
         return Told({"schema": "bemt.intervals/1"}, intervals.rewrite([File(p) for p in calibrate_intervals], out))
     say, cores = progress or (lambda line: None), jobs or os.cpu_count() or 1
     found = run(None if out is None else os.fspath(out), size, seed, jobs, say, lambda line: say(f"{line}\n"))
-    taken = []
-    if follow and out is not None:
-        taken.append(following.text(following.follow(File(out), cores, say)))
-    if loop and out is not None:
-        taken.append(looping.text(looping.loop(File(out), loop, cores, fixed, say, hands)))
+    taken = [following.text(following.follow(File(out or "."), cores, say))] if follow else []
+    if loop:
+        taken.append(looping.loop(File(out or "."), loop, cores, fixed, say, load(hands) if hands else None).text)
     code = EXIT_OK if all(row.met is not False for row in found.score) else EXIT_UNCONVERGED
-    return Told(found.document(), "\n\n".join([proof_text.text(found), *taken]), exit_code=code)
+    return Told(found.document(), "\n\n".join([score.text(found), *taken]), exit_code=code)

@@ -101,7 +101,7 @@ def import_(
     names, wrote, kept = paths_text("files", files, 1), "", ""
     choice = asked(rpm, period_s, revolutions)
     load.check_format(format)
-    told: dict[str, Any] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
+    told: dict[str, list[str]] = {"unit": words(unit), "column": words(column), "sign": words(sign)}
     run: dict[str, Any] = {"sector": sector, "zones": list(zones), "axis": axis, "airspeed_m_s": airspeed_m_s,
            "density_kg_m3": density_kg_m3, "reference": words(reference), "setup": words(setup)}  # fmt: skip
     lines, insist = [], any(told.values()) or any(run.values()) or out is not None
@@ -115,7 +115,8 @@ def import_(
         kept = written
         names, told, out, insist = [written], dict.fromkeys(told, []), None, False
     speed = None if choice.period is None else 60.0 / choice.period
-    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, **told)
+    made = cfd_options.run_from(names, rpm=speed, revolutions=revolutions, **run, unit=told["unit"],
+                                column=told["column"], sign=told["sign"])  # fmt: skip
     found = load.import_files(names, format, choice, made, insist)
     if out is not None and found.runs:
         own = tuple(found.runs[-1].provenance["files"])
@@ -157,7 +158,7 @@ def _table(files: Sequence[str], run: Mapping[str, object]) -> str | None:
 
 def _beside(
     files: Sequence[Any], case: object, picture: object, rpm: float | None, airspeed_m_s: float | None, stated: bool
-) -> tuple[str, dict[str, Any]]:
+) -> tuple[str, Mapping[str, object]]:
     """How the files lie in the prediction band of the case: a sentence and a document; drawn where that is asked."""
     from bemt.base.tables import write_atomic
     from bemt.judge.diagnose.figures import first_picture

@@ -1,19 +1,88 @@
-"""What is said is the answer of least expected loss: one posterior, one table of costs, no rule beside.
+"""What may have been left out, and what is said of it: the answer of least expected loss.
 
-A cause is a set of effects. The answer is "none", a name (one or two causes), a class (one of these), "unknown" (none
-of the library) or "insufficient". A loss is counted in units of one "insufficient" where there is a cause.  Decisions
-of least expected loss: Berger 1985, Statistical Decision Theory and Bayesian Analysis, ch. 1 and 4 (not checked).
+One posterior, one table of costs, no rule beside. A cause is a set of effects. The answer is "none", a name (one or two
+causes), a class (one of these), "unknown" (none of the library) or "insufficient". A loss is counted in units of one
+"insufficient" where there is a cause.  Decisions of least expected loss: Berger 1985, Statistical Decision Theory and
+Bayesian Analysis, ch. 1 and 4 (not checked).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
 
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.base.document import Documented
 from bemt.physics import effects
 
-__all__ = ["CLAIMS", "COSTS", "Costs", "Decision", "decide", "joined", "parts"]
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects; false where it has none. Documents write it as ``str`` does: "none", "unknown", "a", "a+b".
+
+    Examples
+    --------
+    >>> str(Explanation.of("thrust_zero", "reynolds")), str(NONE), str(UNKNOWN)
+    ('reynolds+thrust_zero', 'none', 'unknown')
+    """
+
+    ids: frozenset[str] = frozenset()  # Effects at work
+    smooth: bool = False  # Whether something smooth is at work that no effect of the catalogue is
+    doubt: bool = False  # Whether the files are not what they say: another rotor, stand or unit than stated
+
+    @classmethod
+    @cache
+    def of(cls, *ids: str) -> Explanation:
+        """Explanation by effects."""
+        return cls(frozenset(ids))
+
+    @property
+    def pair(self) -> bool:
+        """Whether two effects or more are at work."""
+        return len(self.ids) > 1
+
+    def __or__(self, other: Explanation) -> Explanation:
+        """Both at work; where the files are in doubt nothing else is known."""
+        if self.doubt or other.doubt:
+            return DOUBT
+        return Explanation(self.ids | other.ids, self.smooth or other.smooth)
+
+    def __iter__(self) -> Iterator[str]:
+        """Effects in the order of the catalogue."""
+        place = effects.places()
+        return iter(sorted(self.ids, key=lambda i: (place.get(i, len(place)), i)))
+
+    def __len__(self) -> int:
+        """How many effects."""
+        return len(self.ids)
+
+    def __contains__(self, effect: object) -> bool:
+        """Whether an effect is one of them."""
+        return effect in self.ids
+
+    def __str__(self) -> str:
+        """As documents write it."""
+        words = [*self, *(["unknown"] if self.smooth else [])]
+        return "doubt" if self.doubt else "+".join(words) or "none"
+
+
+NONE, UNKNOWN, DOUBT = Explanation(), Explanation(smooth=True), Explanation(doubt=True)
+
+
+class Size(Documented):
+    """Value of a parameter of an explanation, and the ends of its 90 % interval; None or words if it is no number."""
+
+    value: Any
+    low: Any
+    high: Any
+    unit: str
+    odds: tuple[tuple[Any, float], ...] | None = None  # Of the values that a discrete one may have [1]
+
+
+Sizes = Mapping[str, Mapping[str, Size]]
+"""By effect and parameter."""
+
 
 CLAIMS = ("named", "sensor", "class")
 """Verdicts that give a cause."""
@@ -90,12 +159,36 @@ def decide(
     >>> decide({NONE: 0.9, gain: 0.1}).verdict, decide({NONE: 0.5, gain: 0.5}).verdict
     ('none', 'insufficient')
     """
-    c = costs
     none, unknown, doubt = (P.get(k, 0.0) for k in (NONE, UNKNOWN, DOUBT))
     listed = dict(sorted(((k, p) for k, p in P.items() if k.ids and p > _NOTHING), key=lambda kv: -kv[1]))
-    counted = {**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}
-    moved = sum(p for k, p in listed.items() if k.ids & still)
-    cause, calm = sum(listed.values()) - moved, none + moved
+    verdict, said, least = _least({**listed, NONE: none, UNKNOWN: unknown, DOUBT: doubt}, costs, still)
+    decision = Decision(verdict, said, next(iter(listed), NONE), 0.0, "", loss=least)
+    if verdict == "named":
+        what, known = Explanation.of(*said), effects.catalogue()
+        stand = all(i in known and known[i].kind == "stand" for i in said)
+        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
+        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
+                       why=why, sets=tuple((i,) for i in said))  # fmt: skip
+    if verdict == "class":
+        return _of_class(decision, {k: p for k, p in listed.items() if k.ids <= set(said)})
+    if verdict == "none":
+        return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")
+    if verdict == "unknown":
+        return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
+    if doubt >= 0.5:
+        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
+    most = max(none, unknown, *listed.values(), 0.0)
+    return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
+
+
+def _least(
+    counted: Mapping[Explanation, float], c: Costs, still: frozenset[str]
+) -> tuple[str, tuple[str, ...], dict[str, float]]:
+    """Answer of least expected loss, and the least of each kind of answer."""
+    none, unknown, doubt = (counted[k] for k in (NONE, UNKNOWN, DOUBT))
+    listed = [k for k in counted if k.ids]
+    moved = sum(counted[k] for k in listed if k.ids & still)
+    cause, calm = sum(counted[k] for k in listed) - moved, none + moved
     answers: dict[tuple[str, tuple[str, ...]], float] = {
         ("none", ()): c.missed * (cause + unknown) + c.wrong * doubt,
         ("unknown", ()): c.phantom * calm + c.missed * cause + c.wrong * doubt,
@@ -111,35 +204,21 @@ def decide(
                 break
             if len(members) > 1 and not still.issuperset(members):
                 answers["class", members] = expected(frozenset(members), False, counted, c, still)
-    verdict, said = min(answers, key=lambda k: answers[k])
     least: dict[str, float] = {}
     for (kind, _), v in answers.items():
         least[kind] = min(v, least.get(kind, v))
-    first = next(iter(listed), NONE)
-    decision = Decision(verdict, said, first, 0.0, "", loss=least)
-    if verdict == "named":
-        what = Explanation.of(*said)
-        stand = all(i in effects.catalogue() and effects.catalogue()[i].kind == "stand" for i in said)
-        why = "nearly all of the probability is on " + ("it" if len(said) == 1 else "both")
-        return replace(decision, verdict="sensor" if stand else verdict, leading=what, probability=P.get(what, 0.0),
-                       why=why, sets=tuple((i,) for i in said))  # fmt: skip
-    if verdict == "class":
-        inside = {k: p for k, p in listed.items() if k.ids <= set(said)}
-        surest, sets = _sets(said, inside)
-        alone = inside.get(Explanation.of(surest), 0.0)
-        beside = len(sets) > 1 and alone > _ALONE * sum(inside.values())
-        why = "these readings do not tell them apart"
-        if len(sets) > 1:
-            why = f"{surest} is present; whether another is, too, is left open" if beside else "two causes are present"
-        return replace(decision, probability=sum(inside.values()), why=why, sets=sets, beside=beside)
-    if verdict == "none":
-        return replace(decision, leading=NONE, probability=none, why="nothing explains the readings as well as noise")
-    if verdict == "unknown":
-        return replace(decision, probability=unknown, why="something smooth that is not in the library fits best")
-    if doubt >= 0.5:
-        return replace(decision, probability=doubt, why="the files contradict themselves or each other")
-    most = max(none, unknown, *listed.values(), 0.0)
-    return replace(decision, probability=1.0 - most, why=_open(none, unknown, listed))
+    return *min(answers, key=lambda k: answers[k]), least
+
+
+def _of_class(decision: Decision, inside: Mapping[Explanation, float]) -> Decision:
+    """Answer that is a class, with the probability of what lies in it."""
+    surest, sets = _sets(decision.effects, inside)
+    total, alone = sum(inside.values()), inside.get(Explanation.of(surest), 0.0)
+    beside = len(sets) > 1 and alone > _ALONE * total
+    why = "these readings do not tell them apart"
+    if len(sets) > 1:
+        why = f"{surest} is present; whether another is, too, is left open" if beside else "two causes are present"
+    return replace(decision, probability=total, why=why, sets=sets, beside=beside)
 
 
 def _sets(

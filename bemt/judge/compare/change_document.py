@@ -1,85 +1,33 @@
-"""The document ``bemt.comparison/1`` of two recordings without a case, and the step that would settle it."""
+"""Two recordings without a case: ``bemt.comparison/1``, the step that would settle it, what an engineer would say."""
 
 from __future__ import annotations
 
 import math
-import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from bemt import __version__
 from bemt.base.document import Documented
-from bemt.base.tables import or_null
+from bemt.base.tables import number_text, or_null, text_table
 from bemt.judge.compare.drive_laws import FAMILY, Judgement, law
 from bemt.judge.compare.matched import LOADS
-from bemt.judge.compare.recordings import AS_RECORDED, IN_WIND, RunChange
+from bemt.judge.compare.recordings import (
+    AS_RECORDED,
+    ERROR_IN,
+    IN_WIND,
+    NOTHING_SHARED,
+    OTHER_STAND,
+    REVERSED,
+    RunChange,
+)
+from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.explanation import Size
+from bemt.judge.loss import Size
 from bemt.physics.effects import catalogue
-
-PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
-"""What stands in a command for a reading that the user has to fill in."""
-
-
-@dataclass(frozen=True)
-class Invocation:
-    """Files and options of a comparison, as a command line has them."""
-
-    a: str = "A"  # First recording
-    b: str = "B"  # Second recording
-    # Conditions on their rows
-    rows_a: tuple[str, ...] = ()
-    rows_b: tuple[str, ...] = ()
-    air_a: str | None = None  # Air of A
-    air_b: str | None = None  # Air of B
-    label: str | None = None  # Label that gives the diameter
-    case: str | None = None  # Case of the rotor
-
-    @property
-    def chosen(self) -> bool:
-        """Whether rows or air were given, which no other command takes."""
-        return bool(self.rows_a or self.rows_b or self.air_a or self.air_b)
-
-    def command(self, **other: Any) -> str:
-        """Command that asks this, some of it replaced.
-
-        >>> Invocation("a.csv", "b.csv", rows_b=("rotor=right",), label="10x5").command(case="CASE")
-        'bemt compare a.csv b.csv --rows-b rotor=right --label 10x5 --case CASE'
-        """
-        given = replace(self, **other)
-        words = [given.a, given.b]
-        for option, rows in (("--rows-a", given.rows_a), ("--rows-b", given.rows_b)):
-            words += [word for row in rows for word in (option, row)]
-        options = {"--air-a": given.air_a, "--air-b": given.air_b, "--label": given.label, "--case": given.case}
-        words += [word for option, text in options.items() if text is not None for word in (option, text)]
-        return " ".join(["bemt compare", *(shlex.quote(word) for word in words)])
-
-    def with_rows(self, letter: str, column: str) -> str:
-        """Command that also chooses a range of one column of A or B; LOW and HIGH are the user's to fill in."""
-        name = f"rows_{letter}"
-        return self.command(**{name: (*getattr(self, name), f"{column}=LOW:HIGH")})
-
-    def with_days(self) -> str:
-        """Command with the air of both days; what was not given is the user's to fill in.
-
-        >>> Invocation("a.csv", "b.csv", air_a="45kt", air_b="1.2kg/m3").with_days()
-        'bemt compare a.csv b.csv --air-a TEMPERATURE,PRESSURE,45kt --air-b 1.2kg/m3'
-        """
-        return self.command(air_a=_with_places(self.air_a), air_b=_with_places(self.air_b))
-
-
-def _with_places(air: str | None) -> str:
-    """Air with a place for the temperature and the pressure that are not in it."""
-    parts = [part.strip() for part in (air or "").split(",") if part.strip()]
-    if any(part.endswith("kg/m3") for part in parts):
-        return ",".join(parts)
-    warm = [part for part in parts if part.endswith(("C", "K"))] or [PLACE["temperature"]]
-    pressure = [part for part in parts if part.endswith("Pa")] or [PLACE["pressure"]]
-    return ",".join([*warm, *pressure, *(part for part in parts if part not in (*warm, *pressure))])
-
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"
 DAYS = (
@@ -217,7 +165,7 @@ class ComparedRuns(Documented):
     diagnosis: Mapping[str, Any] | None = None
     told: tuple[str, ...] | None = None  # Lines of the diagnosis
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values; verdict and ranking in the words of the diagnosis where there is one."""
         said = {k: self.diagnosis[k] for k in DIAGNOSED} if self.diagnosis else {}
         return {"schema": SCHEMA, "version": __version__, **super().document(), **said}
@@ -242,3 +190,215 @@ def document(change: RunChange) -> ComparedRuns:
 
 def _ranking(said: Judgement) -> tuple[RankedCause, ...]:
     return tuple(RankedCause(k, p, said.parameters.get(k, {})) for k, p in list(said.probability.items())[:12])
+
+
+WORD = {
+    "thrust_N": "thrust", "torque_Nm": "torque", "power_W": "shaft power", "CT": "CT", "CP": "CP", "CQ": "CQ",
+    "electrical_power_W": "electrical power", "rpm": "speed at equal command",
+    "voltage_V": "voltage at equal command",
+}  # fmt: skip
+# Runs at nearly one speed say nothing of a change over it: error per doubling from which it is not shown [1].
+_NO_SLOPE = 1.0
+_ROWS, _NOTES = 8, 4
+# Families of causes, less one, from which a headline says the change first.
+_MANY = 2
+# Probability from which a cause is said as a guess.
+_GUESS = 0.1
+
+
+def _shares(*values: float) -> list[str]:
+    """Changes in one notation: percent, or factors where one of them is far from 1.
+
+    >>> _shares(2.09, 1.66, 2.63), _shares(1.0, 0.9)
+    (['x2.09', 'x1.66', 'x2.63'], ['+0.0%', '-10.0%'])
+    """
+    near = all(0.4 < x < 2.5 for x in values)
+    return [f"{x - 1.0:+.1%}" if near else f"x{number_text(x, 3)}" for x in values]
+
+
+def _intervals(channels: Sequence[Ratio]) -> list[list[str]]:
+    """Change of each channel as measured and the ends of its 95 % interval, all in one notation."""
+    said = _shares(*(k * r.density_ratio for r in channels for k in (r.ratio, r.low95, r.high95)))
+    return [said[i : i + 3] for i in range(0, len(said), 3)]
+
+
+def _title(name: str) -> str:
+    return f"{name} ({_plain(name)})" if law(name) or name in catalogue() else name
+
+
+def _range(r: Ratio) -> str:
+    low, high = r.range
+    if r.over_command:
+        return ""
+    if high - low < 1e-9:
+        return "advance ratio {:.2f} to {:.2f}".format(*r.advance_range)
+    return f"{math.exp(low):.0f} to {math.exp(high):.0f} rev/min"
+
+
+def text(doc: ComparedRuns, details: bool = False) -> str:
+    """Lines of a comparison."""
+    lines = textwrap.wrap(headline(doc), 110)
+    lines += [f"verdict: {doc.verdict}" + (f" {', '.join(doc.effects)}" if doc.effects else "")]
+    errors = [n for n in doc.notes if n.startswith(ERROR_IN)]
+    lines += [textwrap.fill(n, 110, initial_indent="  ", subsequent_indent="    ") for n in errors]
+    lines += _said(doc)
+    rows = []
+    for channel, r in doc.ratios.items():
+        raw = r.ratio * r.density_ratio
+        slope = "-"
+        if r.slope is not None and r.slope_error is not None and not r.over_command and r.slope_error < _NO_SLOPE:
+            slope = f"{r.slope:+.1%} +- {r.slope_error:.1%}"
+        more = [slope, f"{r.scatter:.1%}", "{}, {}".format(*r.points)]
+        rows.append([WORD.get(channel, channel), f"{raw:.4f}", *_ends(r, r.density_ratio), *more])
+        if abs(r.density_ratio - 1.0) > 1e-6:
+            coefficient = "CT" if channel == "thrust_N" else "CP"
+            rows.append([f"  {coefficient} (corrected for density)", f"{r.ratio:.4f}", *_ends(r), "", "", ""])
+    header = ["B over A", "ratio", "68 %", "95 %", "change per doubling of n", "scatter", "points"]
+    lines += ["", text_table(header, rows, left=(0,), indent="  ")]
+    if details:
+        lines += _tables(doc)
+    lines += [f"  assumed: {a}" for a in doc.assumed]
+    notes = [n for n in doc.notes if n not in errors]
+    notes = notes if details else [n for n in notes if not n.startswith(("A: ", "B: "))][:_NOTES]
+    lines += [f"  note: {n}" for n in notes]
+    return "\n".join(lines)
+
+
+_FAMILY_WORD = {
+    "blade": "another blade, pitch or diameter", "surroundings": "the surroundings of the rotor",
+    "airspeed": "the airspeed", "load cell": "a load cell", "drive": "the drive", "air_density": "the density",
+    "rpm_scale": "the speed reading", "unit_slip": "a unit",
+}  # fmt: skip
+
+
+def headline(doc: ComparedRuns) -> str:
+    """What an engineer would say first."""
+    effects, verdict = list(doc.effects), doc.verdict
+    moved = _moved(doc)
+    if verdict == "none":
+        return f"No change beyond the difference between two set-ups ({moved or 'drive only'})."
+    if verdict == "unknown":
+        return "Something changed" + (f" ({moved})" if moved else "") + ", and no listed cause explains it."
+    if verdict == "insufficient":
+        return _open(doc, f" ({moved})" if moved else "")
+    if doc.rule == REVERSED:
+        return f"{REVERSED[0].upper()}{REVERSED[1:]} ({moved}): the cell is reversed, or the rotor turns the other way."
+    if effects == ["air_density"] and doc.rule.startswith(AS_RECORDED):
+        return f"Nothing but the air changed, as recorded ({moved}); the coefficients agree."
+    if len(effects) == 1:
+        lead = "The stand, not the rotor" if verdict == "sensor" else "What changed"
+        return f"{lead}: {_plain(effects[0])} ({moved or 'drive alone'})."
+    several = families(effects, doc.ranking)
+    if several.count(", or ") >= _MANY:  # what was measured first, where little is known of the cause
+        return f"{moved[0].upper()}{moved[1:]}: {several}." if moved else f"The drive: {several}."
+    return f"{several[0].upper()}{several[1:]} ({moved or 'drive alone'})."
+
+
+def _moved(doc: ComparedRuns) -> str:
+    """What changed by how much: a cause in the drive has moved the drive, not the loads."""
+    drive = {FAMILY.get(k, k) for k in doc.effects} == {"drive"}
+    kinds = ("speed", "voltage", "electrical") if drive else ("thrust", "torque")
+    loads = {r.kind: (WORD[c], r) for c, r in doc.ratios.items()}
+    shown = [loads[k] for k in kinds if k in loads][:2]
+    shares = _intervals([r for _, r in shown])
+    return " and ".join(f"{word} {share[0]}" for (word, _), share in zip(shown, shares, strict=True))
+
+
+def _open(doc: ComparedRuns, size: str) -> str:
+    """Why nothing is said, and what is likeliest."""
+    if doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
+        return f"These recordings cannot be compared: {doc.rule}."
+    likely = [r.effect for r in doc.ranking if r.probability >= _GUESS]
+    guess = "" if doc.rule == OTHER_STAND else families(likely, doc.ranking)
+    return f"These recordings cannot say what changed{size}" + (f"; likeliest {guess}." if guess else ".")
+
+
+def families(effects: Sequence[str], ranking: Sequence[RankedCause] = ()) -> str:
+    """What an engineer would look at, the likeliest first; "" where nothing is listed."""
+    likely = {r.effect: r.probability for r in ranking}
+    titles: dict[str, list[str]] = {}
+    for k in effects:
+        if k not in ("none", "unknown"):
+            titles.setdefault(FAMILY.get(k, k), []).append(k)
+    families = sorted(titles, key=lambda f: -sum(likely.get(k, 0.0) for k in titles[f]))
+    return ", or ".join(_FAMILY_WORD.get(f, f) if len(titles[f]) > 1 else _plain(titles[f][0]) for f in families)
+
+
+def _plain(name: str) -> str:
+    """Title of a cause: of its scaling law, or of an effect that has none."""
+    row = law(name) or catalogue().get(name)
+    return row.title if row else _FAMILY_WORD.get(name, name)
+
+
+def _ends(r: Ratio, factor: float = 1.0) -> list[str]:
+    return [f"{a * factor:.4f} to {b * factor:.4f}" for a, b in ((r.low68, r.high68), (r.low95, r.high95))]
+
+
+def _said(doc: ComparedRuns) -> list[str]:
+    out = _of_loads({c: r for c, r in doc.ratios.items() if r.kind in ("thrust", "torque")})
+    density, a, b = doc.density.ratio, doc.density.A, doc.density.B
+    if density and abs(density - 1.0) > 0.003:
+        ends = f"Recorded density: {a:.4g} to {b:.4g} kg/m3" if a and b else "Density from the recorded temperatures"
+        out.append(f"{ends} ({density - 1:+.1%}).")
+    step = doc.next_measurement
+    told = (doc.told or ()) if doc.diagnosis else (sentence(doc),)
+    said_below = ("Next: ", "bemt ", "if ")
+    out += [t for t in told if not (step.get("text") and t.lstrip().startswith(said_below))]
+    drive = doc.subsystems.get("drive")
+    if drive and drive.effects and drive.effects != doc.effects:
+        out.append(f"Drive: {drive.verdict}: {', '.join(_title(k) for k in drive.effects)}.")
+    elif drive and doc.verdict != "none" and drive.verdict == "none":
+        out.append("Drive: no change beyond scatter.")
+    if step.get("text"):
+        out.append(f"Next: {step['text']}.")
+    out = [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in out]
+    if step.get("command"):
+        out += [f"    {t.strip()}" for t in told if t.lstrip().startswith("if ")]
+        out.append(f"    {step['command']}")
+    return out
+
+
+def _of_loads(loads: Mapping[str, Ratio]) -> list[str]:
+    """How far the loads of B are from those of A."""
+    if not loads:
+        return []
+    first, intervals = next(iter(loads.values())), _intervals(list(loads.values()))
+    words = [f"{WORD[c]} {at} ({low} to {high})" for c, (at, low, high) in zip(loads, intervals, strict=True)]
+    where = "extrapolated to one speed" if first.extrapolated else _range(first)
+    grows = [WORD[c] for c, r in loads.items() if r.depends_on]
+    more = f"The ratio of {' and '.join(grows)} changes with speed or advance ratio."
+    return [f"B against A at equal speed, {where}: {', '.join(words)}; 95 % in brackets.", *([more] if grows else [])]
+
+
+def sentence(doc: ComparedRuns) -> str:
+    """Verdict and reason."""
+    names = ", ".join(_title(k) for k in doc.effects)
+    p = doc.probability
+    sure = f" (probability {p:.2f})" if p else ""
+    if doc.verdict == "none":
+        return f"{doc.rule[0].upper()}{doc.rule[1:]}."
+    if doc.verdict in ("named", "sensor"):
+        lead = "The stand" if doc.verdict == "sensor" else "What changed"
+        return f"{lead}: {names}{sure}: {doc.rule}."
+    if doc.verdict == "class":
+        if len(doc.sets) > 1:  # more than one cause
+            return f"{doc.rule}{sure}: {names}."
+        return f"One of these; the data cannot tell them apart{sure}: {names}."
+    if doc.verdict == "unknown":
+        return f"Unknown: {doc.rule}."
+    first = [r.effect for r in doc.ranking if r.effect not in ("none", "unknown")][:4]
+    if doc.rule == OTHER_STAND or doc.rule.endswith((IN_WIND, NOTHING_SHARED)):
+        return f"No cause can be given: {doc.rule}."
+    return f"There is a change, but {doc.rule}" + (f". Likeliest: {', '.join(first)}" if first else "") + "."
+
+
+def _tables(doc: ComparedRuns) -> list[str]:
+    out = []
+    parts = {"": doc.ranking} if doc.diagnosis else {name: one.ranking for name, one in doc.subsystems.items()}
+    for name, ranking in parts.items():
+        sizes = [", ".join(f"{k} {v.value:.4g}" for k, v in r.parameters.items() if isinstance(v.value, (int, float)))
+                 for r in ranking[:_ROWS]]  # fmt: skip
+        rows = [[r.effect, f"{r.probability:.3f}", size] for r, size in zip(ranking, sizes, strict=False)]
+        if rows:
+            out += ["", text_table([name or "explanation", "probability", "size"], rows, left=(0, 2), indent="  ")]
+    return out

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,7 @@ import numpy as np
 from bemt.base import canvas
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.judge.compare.change_document import ComparedRuns
-from bemt.judge.compare.contrast_text import WORD, headline
+from bemt.judge.compare.change_document import WORD, ComparedRuns, headline
 from bemt.judge.compare.matched import POWER_OF_SPEED
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import Case
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from bemt.judge.compare.matched import MatchedChannel
     from bemt.judge.compare.recordings import RunChange
 
-_LABEL = {
+LABEL = {
     "thrust_N": "thrust [N]", "torque_Nm": "torque [N m]", "CT": "$C_T$ = T/($\\rho n^2 D^4$) [1]",
     "CP": "$C_P$ = P/($\\rho n^3 D^5$) [1]", "rpm": "speed of rotation [rev/min]", "J": "advance ratio J = V/(n D) [1]",
 }  # fmt: skip
@@ -82,7 +81,7 @@ class PredictionView:
         tail = f"; in the median they are {middle} from the model" if middle else ""
         return f"{counts} readings lie inside the 95 % band of {self.case}{tail}."
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """Give the sentence and the counts as plain values."""
         told = {c: dict(zip(("inside", "readings", "median_change"), self.inside(c), strict=True))
                 for c in self.channels}  # fmt: skip
@@ -98,7 +97,7 @@ class PredictionView:
             figure.set_figwidth(4.4)
             for axis, channel in zip(axes[:, 0], self.channels, strict=True):
                 self._panel(axis, channel)
-            axes[-1, 0].set_xlabel(_LABEL[self.over])
+            axes[-1, 0].set_xlabel(LABEL[self.over])
             axes[-1, 0].locator_params(axis="x", nbins=6)
             handles, labels = axes[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside lower center", ncols=2)
@@ -118,7 +117,7 @@ class PredictionView:
             axis.errorbar(part[self.over], part[channel], u if np.any(u > 0.0) else None, fmt=mark, color=colour,
                           markersize=4, elinewidth=0.8, markerfacecolor="none" if k else colour, zorder=3,
                           label=part.name[:28])  # fmt: skip
-        axis.set_ylabel(_LABEL[channel])
+        axis.set_ylabel(LABEL[channel])
         axis.margins(x=0.04)
         if self.over == "rpm":
             axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
@@ -129,8 +128,7 @@ def against_band(case: Case, recordings: Sequence[Dataset]) -> PredictionView:
 
     Each has ``rpm``, ``airspeed_m_s``, ``density_kg_m3`` and ``thrust_N`` or ``torque_Nm``; their u is drawn as bars.
     """
-    parts = [_usable(d) for d in recordings]
-    parts = [d for d in parts if len(d)]
+    parts = list(filter(len, map(_usable, recordings)))
     if not parts:
         raise InputError(Fault(case.name, "recording", "no point with a speed and a load", "one or more"))
     D = case.diameter_m

@@ -30,6 +30,7 @@ from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset
 from bemt.rotors.as_measured import FACTOR
 from bemt.rotors.case import Case
+from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import propagate
 from bemt.rotors.conditioning import STAND
 from bemt.rotors.propeller import rotor_of
@@ -99,7 +100,7 @@ class RunComparison(Documented):
     sentence: str
     next: str
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values."""
         return {"schema": SCHEMA, "version": __version__, **super().document()}
 
@@ -152,7 +153,7 @@ def compare_run(
     ):
         if channel not in points and not (channel == "airspeed_m_s" and "J" in points):
             notes.append(f"{channel.split('_')[0]}: not stated; {value:.6g} {words} of the case")
-            points = _with(points, channel, float(value))
+            points = replace(points, values={**points.values, channel: np.full(len(points), float(value))})
     full = points.derive(made.diameter_m)
     keep = np.any([np.isfinite(full[k]) for k in ("thrust_N", "torque_Nm") if k in full], axis=0)
     rows = np.flatnonzero(keep & np.isfinite(full["rpm"]))
@@ -173,7 +174,8 @@ def compare_run(
     lines: list[AuditLine] = []
     if computed:
         at = int(rows[0])
-        lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, _pitch(made), made.ducted,
+        pitch = float(prepare_case(made, oblique=True).pitch_m)
+        lines = [*audit_of(imported if len(imported) == len(full) else full, made.diameter_m, pitch, made.ducted,
                            float(made.air().a_sound), at)]  # fmt: skip
         if not is_run(imported):
             flies = full["airspeed_m_s"][rows] > 0.5
@@ -203,17 +205,6 @@ def _angle(points: Dataset, rows: NDArray[np.intp], case: Case, name: str) -> ND
     return np.full(rows.size, case.angle_deg)
 
 
-def _with(d: Dataset, channel: str, value: float) -> Dataset:
-    values = {**d.values, channel: np.full(len(d), value)}
-    return Dataset(d.kind, d.name, values, d.u, d.flags, d.provenance, d.labels, notes=d.notes, units=d.units)
-
-
-def _pitch(case: Case) -> float:
-    from bemt.rotors.case.prepare import prepare_case
-
-    return float(prepare_case(case, oblique=True).pitch_m)
-
-
 def _point(cfd: Dataset, bemt: Dataset, i: int, k: int) -> PointOfRun:
     """Loads at one point."""
     loads = {
@@ -238,7 +229,7 @@ def _load(value: float, u: float, bemt: Dataset, name: str, k: int) -> BothLoads
 
 
 def _verdict(E: float, u: float) -> str:
-    if not (math.isfinite(E) and math.isfinite(u)):
+    if not math.isfinite(E + u):
         return "no result"
     return "agrees" if abs(E) <= u else "within 2 u" if abs(E) <= _WIDE * u else "differs"
 
@@ -246,13 +237,16 @@ def _verdict(E: float, u: float) -> str:
 def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float, str]:
     """What a difference looks like that is no physics, and how little it fits; "" when nothing is near."""
     said = [load for load in loads if load.cfd and load.bemt and math.isfinite(load.u_both)]
-    if said and all(load.cfd * load.bemt < 0.0 for load in said):
+    if not said:
+        return math.inf, ""
+    if all(load.cfd * load.bemt < 0.0 for load in said):
         return 0.0, f" The signs are opposite: look at the sign of the {name.split('_')[0]}."
     off = np.array([load.cfd / load.bemt for load in said])
-    if name not in _KIND or not off.size or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
+    if name not in _KIND or np.any(off <= 0.0) or 1.0 / _FAR < float(np.median(off)) < _FAR:
         return math.inf, ""
-    wide = np.array([math.hypot(load.u_cfd / load.cfd if math.isfinite(load.u_cfd) else 0.0,
-                                load.u_bemt / load.bemt, 0.02) for load in said])  # fmt: skip
+    wide = np.array(
+        [math.hypot(np.nan_to_num(load.u_cfd, posinf=0.0) / load.cfd, load.u_bemt / load.bemt, 0.02) for load in said]
+    )
     # no rotor of the case is off by FACTOR: then even a unit that is stated may be wrong
     may = (e for e in unit_errors.errors(_KIND[name]) if unit_open or max(e.factor, e.repair) > FACTOR)
     near = [(e.rarity + float(np.mean(far**2)), e) for e in may
@@ -263,13 +257,6 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
     size = max(error.factor, error.repair)
     return score, (f" {name.split('_')[0].capitalize()} is off by about a factor of {size:.4g}, as of {error.actual} "
                    f"taken for {error.stated}: check the unit.")  # fmt: skip
-
-
-def _size(load: BothLoads, largest: float) -> str:
-    """A difference as a share: of the value, near zero of the largest one."""
-    if abs(load.cfd) >= _NEAR_ZERO * largest:
-        return load.percent
-    return f"{100.0 * load.difference / largest:+.0f} % of the largest"
 
 
 def open_units(imported: Dataset) -> frozenset[str]:
@@ -295,15 +282,17 @@ def _sentence(points: Sequence[PointOfRun], who: str, units_open: Collection[str
         said = [slip for slip in slips if slip[1]]  # a unit explains all that differs, or nothing
         tail += min(said, key=lambda slip: (math.isfinite(slip[0]), slip[0]))[1] if said else ""
         share = f" in {len(off)} of {len(every)} values" if len(every) > 1 else ""
-        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {_size(load, top[k])}"
+        near_zero = abs(load.cfd) < _NEAR_ZERO * top[k]  # there the value is no measure of the difference
+        share_of = f"{100.0 * load.difference / top[k]:+.0f} % of the largest" if near_zero else load.percent
+        size = f"{_LOADS[k].split(' [')[0]} of BEMT is {share_of}"
         return f"{who} and BEMT differ{share}: {size}, {load.times:.1f} times both bands together.{tail}"
     if near:
         worst = dict(sorted(near, key=lambda item: abs(item[1].difference)))  # of each load the farthest
-        words = {k: (100.0 * load.difference / top[k], _LOADS[k].split(" [")[0].lower()) for k, load in worst.items()}
-        if len(every) == len(words):
-            sizes = " and ".join(f"{share:+.0f} % in {word}" for share, word in words.values())
+        of = "in" if len(every) == len(worst) else "of the largest"
+        sizes = " and ".join(f"{100.0 * load.difference / top[k]:+.0f} % {of} {_LOADS[k].split(' [')[0].lower()}"
+                             for k, load in worst.items())  # fmt: skip
+        if of == "in":
             return f"BEMT is off by {sizes}; both bands are too wide to call that a difference.{tail}"
-        sizes = " and ".join(f"{share:+.0f} % of the largest {word}" for share, word in words.values())
         rest = f"the others are within twice both bands, off by up to {sizes}"
         return f"{who} and BEMT agree in {agree} of {len(every)} values; {rest}.{tail}"
     if lost == len(every):
@@ -327,18 +316,16 @@ def _next(points: Sequence[PointOfRun], audit: Sequence[AuditLine], name: str, c
 
 def text(found: RunComparison, details: bool = False) -> str:
     """Lay it out on one screen; with `details` all points, notes and settings."""
-    told = found.conditions
-    set_up = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
-    set_up += [{"yes": "steady", "no": "transient"}[told["steady"]]] if told.get("steady") in ("yes", "no") else []
+    set_up = _set_up(found.conditions)
     who, bare = ("CFD", "set-up not stated") if found.kind == "cfd" else ("recorded", "a recording")
-    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({', '.join(set_up) or bare}) and case {found.case}"]
+    lines = [_filled(found.sentence), "", f"{Path(found.run).name} ({set_up or bare}) and case {found.case}"]
     shown = found.points if details else found.points[:_ROWS]
     rows = []
     for p in shown:
         head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
         for name, load in p.loads.items():
             rows.append([
-                *head, _LOADS[name], _pm(load.cfd, load.u_cfd), _pm(load.bemt, load.u_bemt),
+                *head, _LOADS[name], plus_minus(load.cfd, load.u_cfd), plus_minus(load.bemt, load.u_bemt),
                 f"{number_text(load.difference, 3)} ({load.percent})", number_text(load.times, 2), load.verdict,
             ])  # fmt: skip
             head = ["", ""]
@@ -351,11 +338,7 @@ def text(found: RunComparison, details: bool = False) -> str:
     for over in dict.fromkeys(found.averaged.values()):
         lines.append(f"  averaged: {', '.join(k for k, v in found.averaged.items() if v == over)}: {over}")
     lines += ["", "Audit of the CFD run"] if found.audit else []
-    for line in found.audit if details else found.audit[:7]:
-        unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
-        words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
-        lead = f"  {line.status:11s}"
-        lines.append(_filled(f"{line.topic}: {words}", lead, " " * len(lead)))
+    lines += map(_audited, found.audit if details else found.audit[:7])
     flags = list(dict.fromkeys(f for p in found.points for f in p.flags))
     said = [f"! {n}" for n in (found.notes if details else found.notes[:4])]
     said += [f"! BEMT: {f}" for f in (flags if details else flags[:2])]
@@ -364,11 +347,27 @@ def text(found: RunComparison, details: bool = False) -> str:
     return "\n".join(lines)
 
 
+def _set_up(told: Mapping[str, str]) -> str:
+    """How a run was computed, as far as it says."""
+    words = [f"{told[k]}{' ' + word if word else ''}" for k, word in _NAMES.items() if k in told]
+    steady = {"yes": "steady", "no": "transient"}.get(told.get("steady", ""))
+    return ", ".join([*words, *([steady] if steady else [])])
+
+
+def _audited(line: AuditLine) -> str:
+    """What one check of a run has found."""
+    unsaid = line.finding.endswith("not stated") and line.consequence == "unknown"
+    words = "not stated" if unsaid else ": ".join(filter(None, (line.finding, line.consequence)))
+    lead = f"  {line.status:11s}"
+    return _filled(f"{line.topic}: {words}", lead, " " * len(lead))
+
+
 def _filled(words: str, lead: str = "", indent: str = "  ") -> str:
     return textwrap.fill(
         words, 120, initial_indent=lead, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
     )
 
 
-def _pm(value: float, u: float) -> str:
-    return number_text(value, 4) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else " ± ?")
+def plus_minus(value: float, u: float) -> str:
+    """Number with its standard uncertainty."""
+    return f"{number_text(value, 4)} ± {number_text(u if math.isfinite(u) else math.nan, 2, none='?')}"

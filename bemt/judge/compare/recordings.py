@@ -16,10 +16,8 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
-from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, advance, density_change
-from bemt.judge.compare.stand_run import StandRun
-from bemt.judge.explanation import NONE, Size
-from bemt.judge.loss import SECOND, Decision, decide, joined, parts
+from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, StandRun, advance, density_change
+from bemt.judge.loss import NONE, SECOND, Decision, Size, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""
@@ -160,6 +158,11 @@ class RunChange:
         return f"thrust of {letter} is negative below {rpm:.0f} rev/min, {IN_WIND}"
 
     @property
+    def no_pair(self) -> str:
+        """Why the runs cannot be compared; "" where they can."""
+        return self.wind or (NOTHING_SHARED if self.apart else OTHER_STAND if self.far_off else "")
+
+    @property
     def by_density(self) -> str:
         """Why the densities, where both recordings tell them and they differ, are a cause of their own."""
         size = max((abs(c.log_density) for c in self.loads_by_name.values()), default=0.0)
@@ -234,30 +237,28 @@ def _told(run: StandRun) -> str:
 
 
 def _assumed(a: StandRun, b: StandRun, diameter: float, loads: Mapping[str, MatchedChannel]) -> list[str]:
-    out = []
-    unknown = [n for n, r in (("A", a), ("B", b)) if not math.isfinite(r.density)]
-    if unknown and density_change(a, b)[1]:
-        out.append("air pressure is not recorded in both: taken as equal within 1 %")
-    elif unknown and any(c.channel in ("thrust_N", "torque_Nm", "power_W") for c in loads.values()):
-        how = " ".join(f"--air-{n.lower()} 22C,1013hPa" for n in unknown)
-        out.append(f"air density is not recorded in {' and '.join(unknown)}: taken as equal; {how} states it")
-    still = [n for n, r in (("A", a), ("B", b)) if not {"airspeed_m_s", "J"} & r.points.values.keys()]
-    if still:
-        how = " ".join(f"--air-{n.lower()} 18m/s" for n in still)
-        out.append(
-            f"airspeed is not recorded in {' and '.join(still)}: taken as still air; {how} states a wind"
-            " (with the air: 22C,1013hPa,18m/s)"
-        )
-    if "torque" not in loads and "thrust" in loads:
-        out.append("torque is not recorded in both: thrust alone cannot tell gain, air and blade apart")
-    if "torque" in loads and loads["torque"].channel == "electrical_power_W":
-        out.append(
-            "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"
-        )
-    told = all("J" in r.points for r in (a, b))
-    if not told and not math.isfinite(diameter) and any(c.advance_moves() for c in loads.values()):
-        out.append("no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J")
-    return out
+    """What neither recording says, and how to say it."""
+    runs, names = (("A", a), ("B", b)), [c.channel for c in loads.values()]
+    unknown = [n for n, r in runs if not math.isfinite(r.density)]
+    by_thermometer = bool(unknown) and bool(density_change(a, b)[1])
+    still = [n for n, r in runs if not {"airspeed_m_s", "J"} & r.points.values.keys()]
+    no_diameter = math.isnan(diameter) and not all("J" in r.points for _, r in runs)
+    air, wind = (" ".join(f"--air-{n.lower()} {told}" for n in some)
+                 for some, told in ((unknown, "22C,1013hPa"), (still, "18m/s")))  # fmt: skip
+    said = (
+        (by_thermometer, "air pressure is not recorded in both: taken as equal within 1 %"),
+        (unknown and not by_thermometer and {"thrust_N", "torque_Nm", "power_W"} & set(names),
+         f"air density is not recorded in {' and '.join(unknown)}: taken as equal; {air} states it"),
+        (still, f"airspeed is not recorded in {' and '.join(still)}: taken as still air; {wind} states a wind"
+                " (with the air: 22C,1013hPa,18m/s)"),
+        ("torque" not in loads and "thrust" in loads,
+         "torque is not recorded in both: thrust alone cannot tell gain, air and blade apart"),
+        ("electrical_power_W" in names,
+         "torque is not recorded: electrical power replaces it, assuming the same motor and controller in both"),
+        (no_diameter and any(c.advance_moves() for c in loads.values()),
+         "no diameter: compared at equal advance per turn, V/n; --label 10x5 gives J"),
+    )  # fmt: skip
+    return [words for open_, words in said if open_]
 
 
 def _notes(a: StandRun, b: StandRun, channels: Mapping[str, MatchedChannel], strays: Mapping[str, int]) -> list[str]:

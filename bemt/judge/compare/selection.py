@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +69,13 @@ def _words(name: str) -> list[str]:
     return split_suffix(name)[0].split("_")
 
 
+def _without(rotor: str, name: str) -> str:
+    """Name of a channel without that of its rotor."""
+    words = _words(name)
+    base = "_".join(w for w in words if w != rotor)
+    return base + name[len("_".join(words)) :] if base else name.removeprefix(f"{rotor}_")
+
+
 def rotors_of(imported: Dataset) -> list[str]:
     """Rotors that the columns of a file tell apart.
 
@@ -89,11 +98,9 @@ def _of_rotor(imported: Dataset, word: str, where: str) -> Dataset:
     others = set(known) - {word}
     kept: dict[str, str] = {}
     for name in imported.values:
-        own = _words(name)
-        if word in own:
-            base = "_".join(p for p in own if p != word)
-            kept[base + name[len("_".join(own)) :] if base else name.removeprefix(f"{word}_")] = name
-        elif not others & set(own):
+        if word in _words(name):
+            kept[_without(word, name)] = name
+        elif not others & set(_words(name)):
             kept.setdefault(name, name)
     turning = [name for name in imported.values if others & set(_words(name)) and imported.unit(name) == "rpm"]
     turning = turning or [name for name in imported.values if others & set(name.split("_")) and name.endswith("_rpm")]
@@ -221,35 +228,40 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
     told = named(imported).values
     if "rpm" in told:
         return
-    headings, faults = imported.provenance.get("headings", {}), []
+    headings = imported.provenance.get("headings", {})
+    heading = {name: headings.get(name) or name for name in (*imported.values, *imported.texts)}
+    faults = []
     for name, v in imported.values.items():
-        heading, unit = headings.get(name) or name, imported.unit(name)
-        apart = name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v))
-        if not apart and not unit and may_be_shaft_speed(heading):
-            faults.append(_no_unit(path, heading, "a speed without a unit"))
-        elif not apart and (unit == "rpm" or (unit == "rad_s" and may_be_shaft_speed(heading))):
-            line = f'[columns] rpm = {{ column = "{heading}", unit = "{unit}" }}'
+        unit, may = imported.unit(name), may_be_shaft_speed(heading[name])
+        if name.startswith("u_") or "err" in name.split("_") or not np.any(np.nan_to_num(v)):
+            continue
+        if not unit and may:
+            faults.append(_no_unit(path, heading[name], "a speed without a unit"))
+        elif unit == "rpm" or (unit == "rad_s" and may):
+            line = f'[columns] rpm = {{ column = "{heading[name]}", unit = "{unit}" }}'
             hint = f"If it is the speed of this rotor, head it rpm, or write in recording.toml: {line}"
             hint += "; electrical_rpm with pole_pairs if it counts electrical revolutions"
             got, expected = f"a speed under a name of its own ({name})", "one column that is the speed of the rotor"
-            faults.append(Fault(path, f"column {heading}", got, expected, hint))
+            faults.append(Fault(path, f"column {heading[name]}", got, expected, hint))
     for name, cells in imported.texts.items():
-        heading = headings.get(name) or name
-        if may_be_shaft_speed(heading) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
-            faults.append(_no_unit(path, heading, f"a speed as text, such as {cells[0].strip()[:20]!r}"))
+        if may_be_shaft_speed(heading[name]) and sum(cell.strip()[:1].isdigit() for cell in cells) > len(cells) / 2:
+            faults.append(_no_unit(path, heading[name], f"a speed as text, such as {cells[0].strip()[:20]!r}"))
     if faults and not set(LOAD_CHANNELS) & told.keys():  # said with the speed, not after it
-        for name, units in _UNITS_OF.items():
-            if name in imported.values and not imported.unit(name):
-                heading = headings.get(name) or name
-                hint = "Head it " + " or ".join(f"{heading} ({unit})" for unit in units)
-                got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
-                faults.append(Fault(path, f"column {heading}", got, expected, hint))
+        faults += _loads_in_doubt(imported, heading, path)
     if faults and (step := in_one_step(imported)):
         faults[-1] = replace(faults[-1], hint=f"{faults[-1].hint}{step}")
     beside = Path(path).with_name("recording.toml")
     if faults and any("names this file" in note for note in imported.notes):
         faults = [replace(f, hint=f"{beside.as_posix()} names this file: give that instead") for f in faults]
     refuse(faults)
+
+
+def _loads_in_doubt(imported: Dataset, heading: Mapping[str, str], path: str) -> Iterator[Fault]:
+    for name, units in _UNITS_OF.items():
+        if name in imported.values and not imported.unit(name):
+            hint = "Head it " + " or ".join(f"{heading[name]} ({unit})" for unit in units)
+            got, expected = f"a {name} without a unit", "a unit in the heading, or in a recording.toml"
+            yield Fault(path, f"column {heading[name]}", got, expected, hint)
 
 
 def wind_of(imported: Dataset) -> float | None:
@@ -274,3 +286,64 @@ def _no_unit(path: str, heading: str, got: str) -> Fault:
     hint += "`diagnose --rpm N` states one speed for all rows"
     expected = "numbers with a unit in the heading, or a recording.toml that names column and unit"
     return Fault(path, f"column {heading}", got, expected, hint)
+
+
+PLACE = {"temperature": "TEMPERATURE", "pressure": "PRESSURE"}
+"""What stands in a command for a reading that the user has to fill in."""
+
+
+@dataclass(frozen=True)
+class Invocation:
+    """Files and options of a comparison, as a command line has them."""
+
+    a: str = "A"  # First recording
+    b: str = "B"  # Second recording
+    # Conditions on their rows
+    rows_a: tuple[str, ...] = ()
+    rows_b: tuple[str, ...] = ()
+    air_a: str | None = None  # Air of A
+    air_b: str | None = None  # Air of B
+    label: str | None = None  # Label that gives the diameter
+    case: str | None = None  # Case of the rotor
+
+    @property
+    def chosen(self) -> bool:
+        """Whether rows or air were given, which no other command takes."""
+        return bool(self.rows_a or self.rows_b or self.air_a or self.air_b)
+
+    def command(self, **other: Any) -> str:
+        """Command that asks this, some of it replaced.
+
+        >>> Invocation("a.csv", "b.csv", rows_b=("rotor=right",), label="10x5").command(case="CASE")
+        'bemt compare a.csv b.csv --rows-b rotor=right --label 10x5 --case CASE'
+        """
+        given = replace(self, **other)
+        words = [given.a, given.b]
+        for option, rows in (("--rows-a", given.rows_a), ("--rows-b", given.rows_b)):
+            words += [word for row in rows for word in (option, row)]
+        options = {"--air-a": given.air_a, "--air-b": given.air_b, "--label": given.label, "--case": given.case}
+        words += [word for option, text in options.items() if text is not None for word in (option, text)]
+        return " ".join(["bemt compare", *(shlex.quote(word) for word in words)])
+
+    def with_rows(self, letter: str, column: str) -> str:
+        """Command that also chooses a range of one column of A or B; LOW and HIGH are the user's to fill in."""
+        name = f"rows_{letter}"
+        return self.command(**{name: (*getattr(self, name), f"{column}=LOW:HIGH")})
+
+    def with_days(self) -> str:
+        """Command with the air of both days; what was not given is the user's to fill in.
+
+        >>> Invocation("a.csv", "b.csv", air_a="45kt", air_b="1.2kg/m3").with_days()
+        'bemt compare a.csv b.csv --air-a TEMPERATURE,PRESSURE,45kt --air-b 1.2kg/m3'
+        """
+        return self.command(air_a=_with_places(self.air_a), air_b=_with_places(self.air_b))
+
+
+def _with_places(air: str | None) -> str:
+    """Air with a place for the temperature and the pressure that are not in it."""
+    parts = [part.strip() for part in (air or "").split(",") if part.strip()]
+    if any(part.endswith("kg/m3") for part in parts):
+        return ",".join(parts)
+    warm = [part for part in parts if part.endswith(("C", "K"))] or [PLACE["temperature"]]
+    pressure = [part for part in parts if part.endswith("Pa")] or [PLACE["pressure"]]
+    return ",".join([*warm, *pressure, *(part for part in parts if part not in (*warm, *pressure))])

@@ -22,8 +22,7 @@ from bemt.base.arrays import Array
 from bemt.base.document import Documented
 from bemt.base.gaussian.kernels import alike, smooth
 from bemt.base.gaussian.whitening import leave_one_out, log_density, whitener
-from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, in_common, matched, taken
-from bemt.judge.compare.stand_run import StandRun
+from bemt.judge.compare.matched import LOADS, MARGIN, MatchedChannel, StandRun, in_common, matched, taken
 
 BEND = 0.7
 """Slow bend of what a run differs by from others, over its level [1]."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ from bemt.data.recordings.cfd_setup import (
     grid_that_differs,
 )
 from bemt.data.recordings.channels import named
-from bemt.judge.compare.one_run import cfd_points
+from bemt.judge.compare.one_run import cfd_points, plus_minus
 from bemt.judge.compare.selection import selected
 from bemt.physics.dataset import Dataset
 
@@ -81,7 +80,7 @@ class TwoRuns(Documented):
     ratios: Mapping[str, GridRatio] | None = None
     notes: tuple[str, ...] | None = None
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Plain values."""
         own = super().document()
         step = {"next_measurement": {"text": own.pop("next"), "command": ""}}
@@ -101,8 +100,7 @@ class TwoRuns(Documented):
             head = [speed_text(p.rpm), number_text(p.airspeed_m_s, 4)]
             for name, load in p.loads.items():
                 size = abs(load.difference) / load.u_both if load.u_both else math.nan
-                both = [f"{number_text(v, 4)} ± {number_text(u, 2, none='?')}"
-                        for v, u in ((load.A, load.u_A), (load.B, load.u_B))]  # fmt: skip
+                both = plus_minus(load.A, load.u_A), plus_minus(load.B, load.u_B)
                 rows.append([*head, _LOADS[name], *both, f"{number_text(load.difference, 3)} ({load.percent})",
                              number_text(size, 2)])  # fmt: skip
                 head = ["", ""]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class AlongBlade:
             rows.append(f"  Nothing to explain: the recording's own uncertainty is {limits}.")
         return "\n".join(rows)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> Mapping[str, object]:
         """As JSON takes it."""
         return {"bands": self.bands.tolist(), "thrust_ratio": self.thrust.tolist(),
                 "torque_ratio": self.torque.tolist(), "left": self.left, "named": list(self.named),

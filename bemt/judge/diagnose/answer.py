@@ -1,71 +1,152 @@
-"""The answer of the judge: one object with named groups, of which text, JSON, figures and report are views."""
+"""The answer of the judge, of which text, JSON, figures and report are views, and where its mismatch sits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose import prior
+from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
-from bemt.judge.loss import Decision
+from bemt.judge.loss import Decision, Sizes
 from bemt.physics import effects
 
 if TYPE_CHECKING:
     from bemt.judge.compare.recordings import RunChange
-    from bemt.judge.diagnose import confusion, posterior
     from bemt.judge.diagnose import fit as fitting
-    from bemt.judge.diagnose import locate as location
+    from bemt.judge.diagnose import form, posterior
     from bemt.judge.diagnose import suggest as suggestion
+    from bemt.judge.diagnose.fit import Fit
+    from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
-    from bemt.judge.diagnose.signatures import Candidate
+
+_BINS = 12
+# Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
+_TIE = 0.04
+# The one along which the preferred effect acts by its nature may explain less by this: groups are not as fine for all.
+_TIE_NATURAL = 0.1
+_ORDER = ("J", "M_tip", "Re", "rpm", "wall_distance_m", "tip_gap_m", "sideslip_rad", "time_s", "temperature_K",
+          "density_kg_m3", "voltage_V", "current_A", "pwm_s", "run")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Location:
+    """An interval of one variable in one channel."""
+
+    # Reading and covariate
+    channel: str
+    variable: str
+    # Interval of the covariate, in its unit
+    low: float
+    high: float
+    size: float  # Mean mismatch in the interval, share of the largest value of the channel at the speeds there [1]
+    z: float  # Sum of the standardised mismatch over the root of the number of readings [1]
+    ties: tuple[str, ...]  # Other variables that explain it as well in this plan
+    shared: float = field(default=0.0, compare=False)  # Standard uncertainty that all readings share, as stated [1]
+    mismatch: Array = field(
+        repr=False, compare=False, default_factory=lambda: np.empty(0)
+    )  # (M,) Of every reading, in its unit; what `size` is the mean of
+
+    def document(self) -> Mapping[str, object]:
+        """Plain values for JSON."""
+        return {k: (list(v) if isinstance(v, tuple) else v) for k, v in vars(self).items() if k != "mismatch"}
+
+
+def mismatch(found: Evidence, best: Fit) -> Array:
+    """Recording minus baseline, free of what nuisances take in the light of an explanation, (M,)."""
+    return np.asarray(found.problem.residual - fitting.smooth(found, best))
+
+
+def locate(found: Evidence, best: Fit) -> Location:
+    """Find channel, variable and interval of the mismatch."""
+    natural = tuple(v for i in best.ids for v in effects.catalogue()[i].along)
+    return _largest(found, mismatch(found, best), natural)
+
+
+def bare(found: Evidence) -> Location:
+    """Find channel, variable and interval in which the recording itself is farthest from the case."""
+    seen = _largest(found, found.problem.y - found.problem.f0, ())
+    return replace(seen, shared=max(p.record.gain.get(seen.channel, 0.0) for p in found.problem.parts))
+
+
+def _largest(found: Evidence, d: Array, natural: tuple[str, ...]) -> Location:
+    """Largest scan statistic of a mismatch, (M,) in the unit of each reading."""
+    problem = found.problem
+    e = d / (problem.u * found.states[0].hyper.scale)
+    free = problem.free
+    channel = max(np.unique(problem.channel), key=lambda c: float(np.sum(e[(problem.channel == c) & free] ** 2)))
+    here = (problem.channel == channel) & free
+    scores = {}
+    for name in _ORDER:
+        if name not in problem.covariates:
+            continue
+        x = problem.covariates[name][problem.point][here]
+        if np.ptp(x) > 1e-6 * max(float(np.max(np.abs(x))), 1e-12):
+            scores[name] = _explained(x, e[here])
+    if not scores:
+        name = "rpm"
+        ties: tuple[str, ...] = ()
+    else:
+        top = max(scores.values())
+        tied = [n for n, s in scores.items() if s >= top - _TIE]
+        name = next((n for n in natural if scores.get(n, -np.inf) >= top - _TIE_NATURAL), tied[0])
+        ties = tuple(n for n in tied if n != name)
+    x = problem.covariates[name][problem.point][here]
+    low, high, z = _scan(x, e[here])
+    inside = (x >= low) & (x <= high)
+    size = float(np.mean((d / problem.largest)[here][inside]))
+    return Location(CHANNELS[int(channel)], name, low, high, size, z, ties, 0.0, d)
+
+
+def _groups(x: Array) -> NDArray[np.intp]:
+    """Group of each value: distinct values where there are few, quantiles otherwise."""
+    order = np.argsort(x, kind="stable")
+    step = np.diff(x[order]) > 0.01 * float(np.ptp(x))
+    group = np.empty(x.size, dtype=np.intp)
+    group[order] = np.cumsum(np.r_[0, step])
+    if group.max() + 1 > _BINS:
+        rank = np.empty(x.size, dtype=np.intp)
+        rank[order] = np.arange(x.size)
+        group = rank * _BINS // x.size
+    return group
+
+
+def _explained(x: Array, e: Array) -> float:
+    """Share of the squares of e that its means over groups of x explain, less what chance would give."""
+    group = _groups(x)
+    count = np.bincount(group).astype(float)
+    mean = np.bincount(group, e) / np.maximum(count, 1.0)
+    total = float(e @ e)
+    explained = float(np.sum(count * mean**2))
+    k = int(np.sum(count > 0))
+    return (explained - k) / max(total, 1e-12)
+
+
+def _scan(x: Array, e: Array) -> tuple[float, float, float]:
+    """Interval of the groups of x with the largest sum of e over the root of its size."""
+    group = _groups(x)
+    labels = np.unique(group)
+    best = (float(x.min()), float(x.max()), 0.0)
+    for i in range(labels.size):
+        for j in range(i, labels.size):
+            inside = (group >= labels[i]) & (group <= labels[j])
+            z = float(np.sum(e[inside]) / np.sqrt(inside.sum()))
+            if abs(z) > abs(best[2]):
+                best = (float(x[inside].min()), float(x[inside].max()), z)
+    return best
+
 
 # Computed loads below this share of the largest have no ratio; departures above it are said where the median is small.
 _NEAR_ZERO, _FAR = 0.1, 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
-    """Readings of all recordings, stacked: (M,) values, with (P,) variables of the points that they belong to."""
-
-    channels: tuple[str, ...]
-    values: Array  # (M,) [units of the channel]
-    u: Array  # (M,) standard uncertainty [units of the channel]
-    channel: NDArray[np.intp]  # (M,) place in CHANNELS
-    point: NDArray[np.intp]  # (M,) place in the variables
-    tested: NDArray[np.bool_]  # (M,) False: of a reference
-    variables: dict[str, Array]  # (P,) each
-    notes: tuple[str, ...]
-    findings: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Baseline:
-    """Model of the case without any cause."""
-
-    effects: tuple[effects.Effect, ...]
-    values: Array  # (M,) [units of the channel]
-    level: dict[str, float]  # Median of each load over what the case gives, less 1 [1]
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """What the readings say of the explanations."""
-
-    probability: dict[Explanation, float]  # Adds up to 1 [1]
-    log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
-    inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
-    parameters: Sizes  # Of the leading explanation
-    p_value: float  # Of as large a misfit without a cause [1]
-
-
-@dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong, in named groups; text, JSON, figures and report are views of it."""
+    """What is wrong; text, JSON, figures and report are views of it."""
 
     found: posterior.Evidence  # Outcome of the weighing, with the problem in it
     decision: Decision  # Verdict of the evidence in the case
@@ -73,7 +154,7 @@ class Diagnosis:
     best: fitting.Fit  # Leading explanation at its best setting
     parameters: Sizes  # Of the leading explanation
     p_value: float  # Of the gate [1]
-    where: location.Location  # Of the mismatch; of the largest scatter when the verdict is none
+    where: Location  # Of the mismatch; of the largest scatter when the verdict is none
     # Channel to RMSE in its unit: before, after, noise, gp_only, holdout_before, holdout_after; mean and largest
     # magnitude of the readings
     scores: dict[str, dict[str, float]]
@@ -82,7 +163,7 @@ class Diagnosis:
     after: Array
     held: Array
     next: suggestion.Suggestion  # What would decide
-    alike: confusion.Confusion  # Distances of effects in this plan
+    alike: form.Confusion  # Distances of effects in this plan
     absent: dict[str, str]  # Effects that could not be tried, and why
     # Of the motor's speed over pulse width, a problem of its own; None where it was not recorded
     drive: Diagnosis | None = None
@@ -90,41 +171,13 @@ class Diagnosis:
     change: RunChange | None = None  # Change from the references, where there is one recording beside them
 
     @property
-    def readings(self) -> Readings:
-        """What was measured."""
-        p = self.problem
-        channels = tuple(CHANNELS[c] for c in np.unique(p.channel))
-        return Readings(channels, p.y, p.u, p.channel, p.point, p.free, p.covariates, p.notes, p.findings)
-
-    @property
-    def baseline(self) -> Baseline:
-        """What the case gives there."""
-        return Baseline(self.problem.baseline, self.problem.f0, self.problem.level)
-
-    @property
-    def prior(self) -> dict[Explanation, float]:
-        """Probability of every explanation before a reading was looked at [1]."""
-        weights = prior.prior_weights(self.problem, list(self.found.spans))
-        return {k: float(np.exp(v)) for k, v in prior.log_priors(weights, of=prior.kinds(self.problem)).items()}
-
-    @property
-    def explanations(self) -> tuple[Candidate, ...]:
-        """Effects that were tried, with what each changes in the readings."""
-        return self.found.candidates
-
-    @property
-    def posterior(self) -> Posterior:
-        """What the readings say of them."""
-        odds = {e: self.found.log_bayes(e) for e in (*map(Explanation.of, self.found.spans), UNKNOWN)}
-        return Posterior(self.found.probability, odds, self.found.inclusion, self.parameters, self.p_value)
-
-    @property
-    def systems(self) -> dict[str, dict[str, Any]]:
+    def systems(self) -> dict[str, Mapping[str, object]]:
         """Verdict and effects of air, stand and drive, each for itself."""
         said = self.said
         listed = said.verdict in ("named", "class", "sensor")
-        kinds = {i: _kind(i) for i in said.effects}
-        out: dict[str, dict[str, Any]] = {}
+        known = effects.catalogue()
+        kinds = {i: known[i].kind if i in known else "drive" for i in said.effects}  # a law of the drive is no effect
+        out: dict[str, Mapping[str, object]] = {}
         for system in ("air", "stand", "drive"):
             mine = [i for i, kind in kinds.items() if kind == system]
             word = ("none" if not mine else said.verdict) if listed else said.verdict
@@ -163,11 +216,6 @@ class Diagnosis:
         return out
 
     @property
-    def marked(self) -> location.Location | None:
+    def marked(self) -> Location | None:
         """Location of the mismatch; None without one."""
         return None if self.decision.verdict == "none" else self.where
-
-
-def _kind(name: str) -> str:
-    """Sub-system of an effect, or of a cause in the drive that is none."""
-    return effects.catalogue()[name].kind if name in effects.catalogue() else "drive"

@@ -183,14 +183,16 @@ def diagnosed(
     cases, records = load_all(stated, given, known, off, only, before=lambda found: folder.check(target, found),
                               rpm=speeds, airspeed_m_s=winds, ruled_out=[*ruled_out, *changed],
                               reference_case=theirs)  # fmt: skip
-    if repeatability_pct is not None:
-        records = [replace(r, repeatability=repeatability_pct / 100.0) for r in records]
-    if top_rpm is not None:
-        records = [replace(r, top_rpm=top_rpm) for r in records]
+    repeats = np.nan if repeatability_pct is None else repeatability_pct / 100.0
+    records = [replace(r, repeatability=repeats, top_rpm=np.inf if top_rpm is None else top_rpm) for r in records]
     chosen = cases * len(stated) if len(cases) == 1 else cases
     each = cases if theirs is None else [*chosen, *[theirs] * len(known)]
-    asked = _asked(files, given, known, only=only, ruled_out=ruled_out, changed=changed, off=off, baseline=baseline,
-                   reference_case=reference_case, repeatability_pct=repeatability_pct, top_rpm=top_rpm)  # fmt: skip
+    rest = _options({
+        "--case": _quoted(given, "CASE"), "--off": off, "--only": only,
+        "--reference-case": _quoted(several(reference_case), "CASE"), "--repeatability-pct": several(repeatability_pct),
+        "--top-rpm": several(top_rpm), "--baseline": [baseline] * (baseline != "bemt"),
+    })  # fmt: skip
+    asked = Given(_quoted(files, "RECORDING"), _quoted(known, "REFERENCE"), rest, tuple(ruled_out), tuple(changed))
     heard = [CHANNELS[c] for c in channels] or None
     blade = {} if along is None else along_blade(cases[0], Path(path_text("along", along)))
     beside = {"along_blade": {run: c.document() for run, c in blade.items()}} if blade else {}
@@ -199,18 +201,25 @@ def diagnosed(
     except InputError as error:
         if len(records) > 1 or any(f.where != "readings" for f in error.faults) or not isinstance(files[0], str):
             raise
-        # one point, or grids of one condition, cannot be diagnosed: it is shown beside the model
-        seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
-        found = one_run.compare_run(seen, cases[0], progress, given[0] if given and isinstance(given[0], str) else "")
-        told = found.document() | {"verdict": "insufficient", "effects": []} | beside
-        words = f"Too few readings for a diagnosis ({error.faults[0].got}).\n{one_run.text(found)}"
-        return OnePoint(told, "\n\n".join([words, *(c.text() for c in blade.values())]))
+        called = given[0] if isinstance(given[0], str) else ""
+        found = _one_point(stated, cases[0], called, error.faults[0].got, progress)
+        return OnePoint({**found.document, **beside}, "\n\n".join([found.text, *(c.text() for c in blade.values())]))
     names = [one if isinstance(one, str) else "recording" for one in files]
     told = document(answer) | {"recordings": names, "cases": [c.name for c in cases]} | beside
     if target is not None:
         folder.write(target, answer, told, cases, figures=figures)
     inside = "" if answer.said.verdict in CLAIMS else _inside(records, chosen)
     return Answer(answer, rotor_of(given[0] if len(given) == 1 and cases else cases[0]), told, blade, inside)
+
+
+def _one_point(
+    stated: Sequence[Any], case: Case, called: str, got: str, progress: Callable[[str], None] | None
+) -> OnePoint:  # fmt: skip
+    """One point, or grids of one condition, cannot be diagnosed: it is shown beside the model."""
+    seen = stated[0] if len(stated) == 1 else together([import_file(f) for f in stated])
+    found = one_run.compare_run(seen, case, progress, called)
+    words = f"Too few readings for a diagnosis ({got}).\n{one_run.text(found)}"
+    return OnePoint({**found.document(), "verdict": "insufficient", "effects": []}, words)
 
 
 def _inside(records: Sequence[Record], cases: Sequence[Case]) -> str:
@@ -237,26 +246,12 @@ def _both_there(cases: list[Any], files: list[Any], known: list[Any], theirs: An
     refuse(faults)
 
 
-def _asked(
-    files: list[Any], cases: list[Any], known: list[Any], *, only: Sequence[str], ruled_out: Sequence[str],
-    changed: Sequence[str], off: Sequence[str], baseline: str, reference_case: Any, repeatability_pct: float | None,
-    top_rpm: float | None,
-) -> Given:  # fmt: skip
-    """What was asked, for the command of the next step; objects of the library have a word in place of their file."""
+def _options(told: Mapping[str, Sequence[str | float]]) -> str:
+    """Options of a command, of those that were told."""
+    words = {option: [v if isinstance(v, str) else f"{v:g}" for v in values] for option, values in told.items()}
+    return " ".join(word for option, values in words.items() if values for word in (option, *values))
 
-    def quoted(given: list[Any], word: str) -> tuple[str, ...]:
-        return tuple(shlex.quote(one) if isinstance(one, str) else word for one in given)
 
-    words = ["--case", *quoted(cases, "CASE")]
-    for option, values in (("--off", off), ("--only", only)):
-        words += [option, *values] if values else []
-    if reference_case is not None:
-        words += ["--reference-case", *quoted(several(reference_case), "CASE")]
-    if repeatability_pct is not None:
-        words += ["--repeatability-pct", f"{repeatability_pct:g}"]
-    if top_rpm is not None:
-        words += ["--top-rpm", f"{top_rpm:g}"]
-    if baseline != "bemt":
-        words += ["--baseline", baseline]
-    return Given(quoted(files, "RECORDING"), quoted(known, "REFERENCE"), " ".join(words), tuple(ruled_out),
-                 tuple(changed))  # fmt: skip
+def _quoted(given: Sequence[Any], word: str) -> tuple[str, ...]:
+    """Files as a command has them; objects of the library have a word in their place."""
+    return tuple(shlex.quote(one) if isinstance(one, str) else word for one in given)

@@ -19,16 +19,16 @@ from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
 from bemt.judge.diagnose.record import Record, thinned
-from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.loss import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem.model import acts_on_rotor
 from bemt.rotors.model import air_of_points
 
 if TYPE_CHECKING:
+    from bemt.judge.compare.matched import StandRun
     from bemt.judge.compare.recordings import RunChange
     from bemt.judge.compare.smooth_change import Scatter
-    from bemt.judge.compare.stand_run import StandRun
     from bemt.judge.diagnose.problem import Part
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.physics.dataset import Dataset
@@ -83,7 +83,7 @@ def judged(pair: RunChange, only: Collection[str] | None = None, gone: Collectio
     said = pair.with_density(said)
     if pair.turned and said.effects == ("unit_slip",):
         said = replace(said, why=recordings.REVERSED)
-    elif said.verdict == "insufficient" and (why := _not_comparable(pair)):
+    elif said.verdict == "insufficient" and (why := pair.no_pair):
         said = replace(said, why=why)
     return Judgement.of(said, P, parameters)
 
@@ -105,11 +105,6 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
     slips = set() if pair.wind else {"rpm_scale", "unit_slip"}
     kept = {k: p for k, p in P.items() if k.ids & slips or (pair.wind and k == NONE)}
     return {**kept, DOUBT: 1.0 - sum(kept.values())}
-
-
-def _not_comparable(pair: RunChange) -> str:
-    """Why two recordings are no pair."""
-    return pair.wind or (recordings.NOTHING_SHARED if pair.apart else recordings.OTHER_STAND if pair.far_off else "")
 
 
 def weighed(
@@ -161,15 +156,7 @@ def records_of(
 
     ``scatter`` of single readings as both recordings show it, by thrust and torque.
     """
-    channels = {}
-    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
-        for c in LOADS[name]:
-            if c == "electrical_power_W" and not like_voltage(a, b):
-                continue
-            if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b)):
-                channels[quantity] = c
-                break
-    channels = {k: c for k, c in channels.items() if c in ("CT", "CP", "CQ") or all("rpm" in r.points for r in (a, b))}
+    channels = _channels_of(a, b)
     if not channels:
         return None
     log_ratio, unsure = density_change(a, b)
@@ -189,6 +176,17 @@ def records_of(
     return thinned(known, MOST), thinned(_in_reach(test, known), MOST)
 
 
+def _channels_of(a: StandRun, b: StandRun) -> dict[str, str]:
+    """Channels that thrust and torque are read from in both; loads need a speed, coefficients none."""
+    out = {}
+    for name, quantity in (("thrust", "thrust_N"), ("torque", "torque_Nm")):
+        known = [c for c in LOADS[name] if all(c in r.points and np.isfinite(r.points[c]).sum() >= 2 for r in (a, b))]
+        c = next((c for c in known if c != "electrical_power_W" or like_voltage(a, b)), "")
+        if c in ("CT", "CP", "CQ") or (c and all("rpm" in r.points for r in (a, b))):
+            out[quantity] = c
+    return out
+
+
 def _in_reach(test: Record, known: Record) -> Record:
     """Points of the test where the reference was, with a margin; all where they share no range."""
     keep = np.ones(len(test), dtype=bool)
@@ -205,33 +203,21 @@ def _record(
     scatter: Mapping[str, Scatter], shift: Mapping[str, float],
 ) -> Record | None:  # fmt: skip
     points = run.points
-    rpm = np.asarray(points["rpm"], float) if "rpm" in points else np.full(len(run), _RPM)
-    n = rpm / 60.0
-    recorded = math.isfinite(run.density)
-    rho = np.asarray(points["density_kg_m3"], float) if "density_kg_m3" in points else np.full(len(run), np.nan)
+    usual = {"rpm": _RPM, "density_kg_m3": np.nan, "airspeed_m_s": 0.0}
+    rpm, rho, V = (np.asarray(points.values.get(k, np.full(len(run), v)), float) for k, v in usual.items())
+    n, recorded, V = rpm / 60.0, math.isfinite(run.density), np.nan_to_num(V)
     rho = np.where(np.isfinite(rho), rho, run.density if recorded else _RHO * density)
-    V = np.nan_to_num(points["airspeed_m_s"]) if "airspeed_m_s" in points else np.zeros(len(run))
     if "J" in points:
         V = np.nan_to_num(points["J"]) * n * D
-    unit: dict[str, Any] = {
+    unit: dict[str, Array | float] = {
         "thrust_N": 1.0, "torque_Nm": 1.0, "power_W": 1.0 / (2.0 * np.pi * n),
         "electrical_power_W": 1.0 / (2.0 * np.pi * n), "CT": rho * n**2 * D**4,
         "CP": rho * n**2 * D**5 / (2.0 * np.pi), "CQ": rho * n**2 * D**5,
     }  # fmt: skip
-    measured: dict[str, Array] = {}
-    u: dict[str, Array] = {}
-    zero: dict[str, float] = {}
-    for k, c in channels.items():
-        measured[k] = np.asarray(points[c] * unit[c], dtype=float)
-        if k == "torque_Nm":  # its sign is the sense of rotation
-            measured[k] *= np.sign(np.nansum(measured[k])) or 1.0
-        full, s = float(np.nanmax(np.abs(measured[k]))), scatter["thrust" if k == "thrust_N" else "torque"]
-        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit[c])
-        u[k] = np.sqrt(stated**2 + (s.share * measured[k]) ** 2 + (s.floor * full) ** 2)
-        if shift[c]:
-            zero[k] = shift[c] * full
-        if c == "electrical_power_W":  # a motor takes power without any load
-            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * measured[k]), max(zero.get(k, 0.0), BY_POWER * full)
+    measured = {k: np.asarray(points[c] * unit[c], dtype=float) for k, c in channels.items()}
+    if "torque_Nm" in measured:  # its sign is the sense of rotation
+        measured["torque_Nm"] *= np.sign(np.nansum(measured["torque_Nm"])) or 1.0
+    u, zero = _errors({c: (k, measured[k], unit[c]) for k, c in channels.items()}, points, scatter, shift)
     good = np.isfinite(rpm) & (rpm > 0.0) & np.isfinite(rho)
     good &= np.any([np.isfinite(v) for v in measured.values()], axis=0)
     good &= rpm > _STARTED * float(np.max(rpm, where=good, initial=0.0))
@@ -246,9 +232,9 @@ def _record(
     fields = {"rho": rho, **{k: np.full(len(run), float(getattr(air, k))) for k in ("mu", "a_sound", "temperature_K")}}
     extra = {k: np.asarray(points[k], float) for k in _COVARIATES if k in points and np.isfinite(points[k][good]).all()}
     angle = _angle(points)
-    if angle is not None and reference:  # its curves are over V cos(angle)
+    if reference:  # its curves are over V cos(angle)
         V = V * np.cos(angle)
-    elif angle is not None and np.any(angle != 0.0):
+    elif np.any(angle != 0.0):
         extra["sideslip_rad"] = angle
     if "second_rotor_rad_s" in extra:  # what it changes is no scatter
         u = {k: np.full(len(run), np.nan) for k in u}
@@ -260,12 +246,29 @@ def _record(
     return record.take(np.flatnonzero(good))
 
 
-def _angle(points: Dataset) -> Array | None:
-    """Angle between wind and shaft, (P,) [rad]; None: not recorded."""
+def _errors(
+    readings: Mapping[str, tuple[str, Array, Array | float]], points: Dataset, scatter: Mapping[str, Scatter],
+    shift: Mapping[str, float],
+) -> tuple[dict[str, Array], dict[str, float]]:  # fmt: skip
+    """Standard uncertainties of loads, and of their zeros; ``readings`` by channel with their unit."""
+    u, zero = {}, {}
+    for c, (k, y, unit) in readings.items():
+        full, s = float(np.nanmax(np.abs(y))), scatter["thrust" if k == "thrust_N" else "torque"]
+        stated = np.nan_to_num(np.asarray(points.u[c], float)) * np.abs(unit)
+        u[k] = np.sqrt(stated**2 + (s.share * y) ** 2 + (s.floor * full) ** 2)
+        if shift[c]:
+            zero[k] = shift[c] * full
+        if c == "electrical_power_W":  # a motor takes power without any load
+            u[k], zero[k] = np.hypot(u[k], _EFFICIENCY * y), max(zero.get(k, 0.0), BY_POWER * full)
+    return u, zero
+
+
+def _angle(points: Dataset) -> Array:
+    """Angle between wind and shaft, (P,) [rad]; 0 where it is not recorded."""
     for name, unit in (("sideslip_rad", 1.0), ("sideslip_deg", math.pi / 180.0)):
         if name in points and np.isfinite(points[name]).all():
             return np.abs(points[name]) * unit
-    return None
+    return np.zeros(len(points))
 
 
 def _without_strays(record: Record, D: float) -> Record:

@@ -13,26 +13,16 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import shares
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge import loss
-from bemt.judge.diagnose import (
-    by_laws,
-    confusion,
-    interval_scales,
-    knowledge,
-    noise,
-    other_rotor,
-    posterior,
-    signatures,
-)
+from bemt.judge.diagnose import by_laws, form, knowledge, noise, other_rotor, posterior, signatures
 from bemt.judge.diagnose import fit as fitting
-from bemt.judge.diagnose import locate as location
 from bemt.judge.diagnose import suggest as suggestion
-from bemt.judge.diagnose.answer import Diagnosis
+from bemt.judge.diagnose.answer import Diagnosis, locate
 from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.fit import fit, form_covariance
+from bemt.judge.diagnose.knowledge import ALWAYS
 from bemt.judge.diagnose.nuisance import following
-from bemt.judge.diagnose.prior import ALWAYS
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.loss import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -42,7 +32,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
     from bemt.judge.diagnose.signatures import Candidate
-    from bemt.judge.explanation import Explanation
+    from bemt.judge.loss import Explanation
     from bemt.rotors.case import Case
 
 __all__ = ["MOTOR", "Diagnosis", "diagnose"]
@@ -124,7 +114,7 @@ def _diagnose(
     decision = knowledge.reason(problem, decision)
     shown = decision.leading if all(i in found.spans for i in decision.leading) else _solved(found)
     best, parameters = fitting.refined(found, fitting.fit(found, shown))
-    parameters = interval_scales.widened(parameters)
+    parameters = fitting.widened(parameters)
     say("held-out blocks")
     words, held, gp_only = held_out(found, shown if decision.verdict != "unknown" else NONE)
     if decision.verdict == "unknown":  # what is not in the library is predicted as what it is: something smooth
@@ -132,12 +122,12 @@ def _diagnose(
     smooth = fitting.smooth(found, best)
     after = problem.centre + best.signature + smooth
     # without a verdict the likeliest explanation still says best which part of the mismatch is not calibration
-    where = location.locate(found, best if best.ids or not found.spans else fitting.fit(found, _solved(found)))
+    where = locate(found, best if best.ids or not found.spans else fitting.fit(found, _solved(found)))
     say("next measurement")
     step = _next(found, decision, best, given)
     return Diagnosis(
         found, decision, decision, best, parameters, found.p_value, where, _scores(found, after, held, gp_only), words,
-        after, held, step, confusion.confusion(found), absent, None, None, change,
+        after, held, step, form.confusion(found), absent, None, None, change,
     )  # fmt: skip
 
 

@@ -15,10 +15,17 @@ from typing import TYPE_CHECKING, Any
 from bemt.base.action import Told, as_html
 from bemt.base.document import rows_of
 from bemt.base.errors import Fault, InputError, gathered, refuse
-from bemt.judge.compare.change_document import DIAGNOSED, ComparedRuns, Invocation, RankedCause, document, next_step
+from bemt.judge.compare.change_document import (
+    DIAGNOSED,
+    ComparedRuns,
+    RankedCause,
+    document,
+    next_step,
+    text,
+)
+from bemt.judge.compare.matched import stand_run
 from bemt.judge.compare.recordings import ERROR_IN, RunChange
-from bemt.judge.compare.selection import conditions_of, selected, with_air
-from bemt.judge.compare.stand_run import stand_run
+from bemt.judge.compare.selection import Invocation, conditions_of, selected, with_air
 from bemt.judge.diagnose.by_laws import changed
 from bemt.rotors.propeller import Propeller, rotor_of
 
@@ -71,15 +78,11 @@ class Contrast:
     @property
     def text(self) -> str:
         """The answer on one screen."""
-        from bemt.judge.compare.contrast_text import text
-
         return text(self.said)
 
     @property
     def details(self) -> str:
         """The answer with its ranking, sub-systems and all notes."""
-        from bemt.judge.compare.contrast_text import text
-
         return text(self.said, details=True)
 
     def to_dict(self) -> dict[str, Any]:
@@ -171,8 +174,12 @@ def compare(
     said = document(found)
     if case is not None and not found.wind:
         said = _diagnosed(said, asked, read, case, found, progress)
-    step = next_step(found, asked) if said.diagnosis is None else _after(said.diagnosis)
-    step = step | {"command": ""} if step["command"] == asked.command() else step
+    if said.diagnosis is None:
+        step: Mapping[str, Any] = next_step(found, asked)
+    else:
+        step = said.diagnosis["next_measurement"]
+        step = {**step, "command": [*step["commands"], ""][0]}
+    step = {**step, "command": ""} if step["command"] == asked.command() else step
     return Contrast(found, replace(
         said, recordings=tuple(names), rows={"A": tuple(rows_a), "B": tuple(rows_b)},
         notes=(*_errors(findings), *said.notes), next_measurement=step,
@@ -316,13 +323,6 @@ def _given(asked: Invocation) -> Given:
             return (asked.with_days(),)
 
     return _Pair((shlex.quote(asked.b),), (shlex.quote(asked.a),), f"--case {shlex.quote(asked.case or 'CASE')}")
-
-
-def _after(diagnosis: Mapping[str, Any]) -> dict[str, Any]:
-    """Run that the diagnosis recommends, and the command that takes it in."""
-    told = dict(diagnosis.get("next_measurement") or {})
-    commands = told.get("commands") or [""]
-    return {**told, "command": commands[0]}
 
 
 def label_diameter(label: str | None) -> float | None:

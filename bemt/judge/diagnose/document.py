@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import or_null, text_table
-from bemt.judge.compare.contrast_text import families
+from bemt.judge.compare.change_document import families
 from bemt.judge.compare.drive_laws import law
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import other_rotor
-from bemt.judge.diagnose.confusion import nearest
-from bemt.judge.diagnose.locate import bare
+from bemt.judge.diagnose.answer import bare
+from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
+from bemt.judge.loss import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 
 if TYPE_CHECKING:
-    from bemt.judge.diagnose.answer import Diagnosis
-    from bemt.judge.diagnose.locate import Location
+    from bemt.judge.diagnose.answer import Diagnosis, Location
+    from bemt.judge.loss import Decision
     from bemt.physics.effects import Parameter
 
 SCHEMA = "bemt.diagnosis/1"
@@ -237,7 +236,9 @@ def explanation(d: Diagnosis) -> list[str]:
             lines.append("Signature: " + "; ".join(signs) + ".")
     elif decision.verdict == "class":
         lead = "One of these" if len(decision.sets) < 2 else f"{decision.why[0].upper()}{decision.why[1:]}"
-        lines.append(f"{lead} ({decision.probability:.2f}): {_members(decision.effects)}.")
+        large = len(decision.effects) > _A_GROUP
+        members = ", ".join(i if large else f"{i} ({_title(i)})" for i in decision.effects)
+        lines.append(f"{lead} ({decision.probability:.2f}): {members}.")
     elif decision.verdict == "unknown":
         kernel = d.found.states[0].best_rival
         lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
@@ -255,17 +256,13 @@ def _next(d: Diagnosis) -> list[str]:
     step = d.next
     if not step.text:
         return []
-    gain = ""
-    if step.separates:
-        both = f"{step.after:.1f} instead of {step.before:.1f}"
-        gain = f" (tells {' from '.join(step.separates)} at {both} standard deviations)"
     cost = ""
     if step.minutes and step.gain:
         cost = f" About {step.minutes:.0f} minutes; expected to settle {step.gain:.0%} of what is open."
     case = "if nothing is wrong with it" if step.kind == "mend" else "without such a reference"
     other = [] if step.otherwise is None or step.kind == "run" else [f"  {case}: {step.otherwise.text}"]
     unless = [f"  if {step.checks} is ruled out:"] if step.checks and step.commands else []
-    return [f"Next: {step.text}{gain}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
+    return [f"Next: {step.text}{step.tells}.{cost}", *unless, *(f"  {c}" for c in step.commands), *other]
 
 
 def _not_tried(d: Diagnosis) -> list[str]:
@@ -288,7 +285,6 @@ def _title(name: str) -> str:
 def headline(d: Diagnosis) -> str:
     """What an engineer would say first."""
     said = d.said
-    titles = [_title(i) for i in said.effects]
     off = _off(d)
     if said.verdict == "insufficient" and other_rotor.foreign(d.problem):
         return f"These are not the loads of this case ({off}): check diameter, blades, units and speed first."
@@ -302,23 +298,36 @@ def headline(d: Diagnosis) -> str:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
         return "Recording and model agree within noise, calibration and the uncertainty of the model."
-    end = f"{_moved(d)}{_in_both(d)}."
+    moved = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
+    end = f"{f' ({moved} against the reference)' if moved else ''}{_in_both(d)}."
     if said.verdict in ("named", "sensor"):
         where = "" if said.verdict == "named" else " in the stand, not the air"
         return f"Cause found{where}: {' and '.join(_with_size(d, i) for i in said.effects)}{end}"
     if said.verdict == "class":
-        if said.beside:
-            return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}{end}"
-        if len(said.sets) > 1:
-            return f"Two causes: {' and '.join(_one_of(s) for s in said.sets)}{end}"
-        if len(titles) > _A_GROUP:
-            return f"{len(titles)} causes look alike in these readings: {families(said.effects)}{end}"
-        return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them{end}"
-    if said.verdict == "unknown":
-        what = _from_reference(d) or f"Recording and model differ ({off})"
-        return f"{what[0].upper()}{what[1:]}, and no effect in the library explains it."
+        return f"{_of_class(said)}{end}"
     what = _from_reference(d) or f"Recording and model differ ({off})"
-    return f"{what[0].upper()}{what[1:]}, but these readings do not show why{_guess(d)}."
+    why = "and no effect in the library explains it"
+    why = why if said.verdict == "unknown" else f"but these readings do not show why{_guess(d)}"
+    return f"{what[0].upper()}{what[1:]}, {why}."
+
+
+def _of_class(said: Decision) -> str:
+    """What is said of a class."""
+    titles = [_title(i) for i in said.effects]
+    if said.beside:
+        return f"Cause found: {titles[0]}. Possibly also: {' or '.join(titles[1:])}"
+    if len(said.sets) > 1:
+        each = [" / ".join(map(_title, s)) for s in said.sets]
+        return f"Two causes: {' and '.join(f'one of ({w})' if ' / ' in w else w for w in each)}"
+    if len(titles) > _A_GROUP:
+        return f"{len(titles)} causes look alike in these readings: {families(said.effects)}"
+    return f"The cause is {' or '.join(titles)}; these readings cannot distinguish them"
+
+
+def _off(d: Diagnosis) -> str:
+    """By how much each channel differs from the case."""
+    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
+    return " and ".join(words)
 
 
 def _in_both(d: Diagnosis) -> str:
@@ -350,28 +359,6 @@ def _from_reference(d: Diagnosis) -> str:
     return f"the recording differs from the reference ({words} at equal speed)" if words else ""
 
 
-def _moved(d: Diagnosis) -> str:
-    """The same behind a cause."""
-    words = ", ".join(f"{name} {_share(v)}" for name, v in _ratios(d))
-    return f" ({words} against the reference)" if words else ""
-
-
-def _members(ids: Sequence[str]) -> str:
-    """Members of a class; of a large one only their names."""
-    return ", ".join(i if len(ids) > _A_GROUP else f"{i} ({_title(i)})" for i in ids)
-
-
-def _one_of(ids: Sequence[str]) -> str:
-    titles = [_title(i) for i in ids]
-    return titles[0] if len(titles) == 1 else f"one of ({' / '.join(titles)})"
-
-
-def _off(d: Diagnosis) -> str:
-    """By how much each channel differs from the case."""
-    words = (f"{_CHANNEL[c].lower()} {'up to ' if wide else ''}{_share(v)}" for c, (v, wide) in d.off.items())
-    return " and ".join(words)
-
-
 def _share(v: float) -> str:
     """Change of a load, less 1: in percent, as a factor where it is large.
 
@@ -383,7 +370,6 @@ def _share(v: float) -> str:
 
 def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     """The answer in twelve lines after a ``lead``; with ``details`` all sentences, and the tables behind them."""
-    found = d.found
     first, *rest = explanation(d)
     first = f"{lead} {first}".strip()
     # it explains little and takes lines
@@ -403,13 +389,22 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
             out += wrapped if told else []
         return "\n".join(out)
     out += [line for wrapped in shown.values() for line in wrapped]
+    out += _tables(d)
+    out += [f"  note: {note}" for note in d.problem.notes]
+    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
+    return "\n".join(out)
+
+
+def _tables(d: Diagnosis) -> list[str]:
+    """The numbers behind the sentences."""
+    found = d.found
     size = dict(zip(d.alike.ids, d.alike.size, strict=True))
     rows = []
     for name, p in sorted(found.probability.items(), key=lambda kv: -kv[1])[:_SHOWN]:
         seen = f"{size[str(name)]:.1f}" if str(name) in size else "-"
         odds = "-" if name not in found.states[0].log_z else f"{found.log_bayes(name):.1f}"
         rows.append([str(name), f"{p:.3f}", odds, seen])
-    out += [
+    out = [
         "",
         text_table(
             ["explanation", "probability", "ln odds over none", "typical size [sd]"], rows, left=(0,), indent="  "
@@ -423,6 +418,4 @@ def text(d: Diagnosis, details: bool = False, lead: str = "") -> str:
     beside = "the stated or observed noise" if d.problem.u_known else "that of a typical stand (none is stated)"
     out.append(f"\n  p = {d.p_value:.3g}; noise x{h.scale:g} {beside}, correlation {h.ar:g}, "
                f"solver error {h.model:.0%}; {d.problem.y.size} readings")  # fmt: skip
-    out += [f"  note: {note}" for note in d.problem.notes]
-    out += [textwrap.fill(line, 110, initial_indent="  ", subsequent_indent="    ") for line in last]
-    return "\n".join(out)
+    return out

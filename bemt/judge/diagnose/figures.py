@@ -15,8 +15,8 @@ from bemt.base.arrays import Array
 from bemt.base.canvas import BLACK, BLUE, DPI, GREEN, GREY, ORANGE, PURPLE, RED, SKY, STYLE, blank, png
 from bemt.base.page import FIRST
 from bemt.base.tables import write_atomic
-from bemt.judge.compare.first_picture import PredictionView, against_band
-from bemt.judge.diagnose import figures_effects, figures_posterior
+from bemt.judge.compare.first_picture import LABEL, PredictionView, against_band
+from bemt.judge.diagnose import figures_effects
 from bemt.judge.diagnose.document import headline
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.dataset import Dataset
@@ -37,10 +37,7 @@ LARGEST = 120_000
 """Largest file that is written [B]; a larger one loses colours."""
 
 _CHANNEL = {"thrust_N": "thrust", "torque_Nm": "torque", "rpm": "speed of rotation"}
-_COEFFICIENT = {
-    "thrust_N": "$C_T$ = T/($\\rho n^2 D^4$) [1]", "torque_Nm": "$C_P$ = P/($\\rho n^3 D^5$) [1]",
-    "rpm": "rpm [rev/min]",
-}  # fmt: skip
+_COEFFICIENT = {"thrust_N": LABEL["CT"], "torque_Nm": LABEL["CP"], "rpm": "rpm [rev/min]"}
 _AXIS = {
     "J": "advance ratio J [1]", "M_tip": "tip Mach number [1]", "Re": "Reynolds number at 0.75 R [1]",
     "rpm": "speed of rotation [rev/min]", "time_s": "time [s]", "temperature_K": "temperature [K]",
@@ -62,13 +59,14 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
     import matplotlib
 
     makers: dict[str, Callable[[Diagnosis], Figure | None]] = {
-        "residual": residual, "before_after": _before_after, "posterior": figures_posterior.posterior,
+        "residual": residual, "before_after": _before_after, "posterior": figures_effects.posterior,
         "radius": figures_effects.radius, "confusion": figures_effects.matrix, "ranking": figures_effects.ranking,
     }  # fmt: skip
     written = []
     for old in out.glob(f"{FIRST}*.png"):
         old.unlink()
-    for view in _views(answer, cases):
+    records = [part.record for part in answer.problem.parts if not part.record.reference]
+    for view in first_picture(records, cases) if len(cases) in (1, len(records)) else ():
         stem = FIRST if len({c.path.resolve() for c in cases}) == 1 else f"{FIRST}_{view.case}"
         written.append(out / f"{stem}.png")
         write_atomic(written[-1], slim(view.png()))
@@ -81,12 +79,6 @@ def draw(answer: Diagnosis, out: Path, cases: Sequence[Case] = ()) -> list[Path]
                 written.append(out / f"{name}.png")
                 write_atomic(written[-1], slim(png(figure, DPI, optimize=True)))
     return written
-
-
-def _views(answer: Diagnosis, cases: Sequence[Case]) -> list[PredictionView]:
-    """Recordings that are judged, beside their cases."""
-    records = [part.record for part in answer.problem.parts if not part.record.reference]
-    return first_picture(records, cases) if len(cases) in (1, len(records)) else []
 
 
 def slim(whole: bytes) -> bytes:
@@ -142,10 +134,6 @@ def _lines(x: Array) -> Index:
     return line
 
 
-def _percent(d: Array) -> str:
-    return f"{100.0 * float(d):+.1f} %"
-
-
 # Residual
 
 
@@ -190,7 +178,7 @@ def _located(answer: Diagnosis, c: int, name: str) -> tuple[float, float] | None
 def _heading(answer: Diagnosis, c: int, region: bool) -> str:
     text, where = _CHANNEL[CHANNELS[c]], answer.marked
     if region and where is not None:
-        text += f": mean {_percent(np.asarray(where.size))} of the largest, in the marked region"
+        text += f": mean {100.0 * where.size:+.1f} % of the largest, in the marked region"
     return text
 
 
@@ -270,8 +258,7 @@ def _groups(answer: Diagnosis, name: str) -> list[_Line]:
     problem = answer.problem
     X, P = problem.covariates, problem.covariates["rpm"].size
     part = np.concatenate([np.full(len(p.record), i) for i, p in enumerate(problem.parts)])
-    held = next((n for n in ("rpm", "J") if n != name and _varies(X[n])), "") if name != "rpm" else (
-        "J" if _varies(X["J"]) else "")  # fmt: skip
+    held = next((n for n in ("rpm", "J") if n != name and _varies(X[n])), "")
     found = []
     for i, p in enumerate(problem.parts):
         if name not in (*_CONDITIONS, *p.record.extra):
@@ -283,12 +270,12 @@ def _groups(answer: Diagnosis, name: str) -> list[_Line]:
             line[mine] = _lines(X[held][mine])
         own = [mine & (line == k) for k in np.unique(line[mine])]
         sweeps = _sweeps(X, mine, own) if name == "J" else []
-        drawn = np.any(sweeps, axis=0) if sweeps else np.zeros(P, dtype=bool)
+        drawn = np.any([np.zeros(P, dtype=bool), *sweeps], axis=0)
         own = [here for here in own if _count(X[name][here]) >= _LONG or not drawn[here].all()]
         for over, what, lines in ((name, held, own), ("rpm", "J", sweeps)):
             for here in lines:
-                words = ", ".join(t for t in (tag, _label(what, X[what][here]) if what else "") if t)
-                found.append(_Line(words, here, i, over))
+                words = [tag, _label(what, X[what][here]) if what else ""]
+                found.append(_Line(", ".join(filter(None, words)), here, i, over))
     return found
 
 

@@ -1,9 +1,18 @@
-"""The best setting of an explanation, its intervals, and what smooth rest it leaves."""
+"""The best setting of an explanation, its intervals, and what smooth rest it leaves.
+
+Intervals are widened so that as many hold the truth as they say (split conformal calibration). A half-width times the
+factor of its parameter (of its kind of fault, where few were seen) held 90 % of the truths in the development sets that
+``bemt lab prove --calibrate-intervals DIR`` drew (Vovk, Gammerman and Shafer 2005, Algorithmic Learning in a Random
+World, ch. 4; Lei et al. 2018, J. Am. Stat. Assoc. 113:1094). The file says which seeds and version.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +21,9 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.form import form_modes
-from bemt.judge.diagnose.signatures import effect_of
-from bemt.judge.explanation import Explanation, Size
+from bemt.judge.diagnose.signatures import Setting, effect_of
+from bemt.judge.loss import Explanation, Size, Sizes
+from bemt.physics import effects
 from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
@@ -36,7 +46,7 @@ class Fit:
     """An explanation at its best setting."""
 
     ids: tuple[str, ...]  # Effects; of nothing none
-    settings: tuple[dict[str, Any], ...]  # Parameters of each
+    settings: tuple[Setting, ...]  # Parameters of each
     columns: tuple[int, ...]  # Columns of ``State.S``
     signature: Array  # (M,) Change of the readings, solved together (not added up) [units of the readings]
 
@@ -47,12 +57,9 @@ def fit(found: Evidence, what: Explanation) -> Fit:
     ids = tuple(what)
     if not ids:
         return Fit((), (), (), np.zeros_like(problem.y))
-    if len(ids) == 1:
-        span = found.spans[ids[0]]
-        own = state.gains(ids[0], span, state.r[:, None])[:, 0] + found.log_w[span]
-        columns: tuple[int, ...] = (span.start + int(np.argmax(own)),)
-    else:
-        columns = state.best_of(what, found.spans, found.log_w)
+    total = state.scores(what, found.spans, found.log_w)
+    at = np.unravel_index(int(np.argmax(total)), total.shape)
+    columns = tuple(found.spans[i].start + int(k) for i, k in zip(ids, at, strict=True))
     settings = tuple(found.of(i).settings[c - found.spans[i].start] for i, c in zip(ids, columns, strict=True))
     signature = problem.signature(tuple(effect_of(i, s) for i, s in zip(ids, settings, strict=True)))
     if not np.isfinite(signature).all():
@@ -74,11 +81,7 @@ def weights(found: Evidence, what: Explanation) -> dict[str, Array]:
     share = np.exp(share - share.max())
     out = {i: np.zeros(found.of(i).weight.size) for i in ids}
     for s, w in zip(states, share / share.sum(), strict=True):
-        if len(ids) == 1:
-            span = found.spans[ids[0]]
-            total = s.gains(ids[0], span, s.r[:, None])[:, 0] + found.log_w[span]
-        else:
-            total = s.both(what, found.spans, found.log_w)
+        total = s.scores(what, found.spans, found.log_w)
         p = np.exp(total - total.max())
         p /= p.sum()
         for k, i in enumerate(ids):
@@ -130,7 +133,9 @@ def _discrete(values: Sequence[Any], p: Array, unit: str, share: float) -> Size:
 def refined(found: Evidence, best: Fit, share: float = 0.9) -> tuple[Fit, dict[str, dict[str, Size]]]:
     """Parameters between the grid's settings: Gauss-Newton on the solved model, Laplace within the physical ranges."""
     problem = found.problem
-    where = [(k, p) for k, i in enumerate(best.ids) for p in _continuous(i, best.settings[k])]
+    kinds = [effects.catalogue()[i] for i in best.ids]
+    where = [(k, p) for k, cls in enumerate(kinds) for p in cls.parameters
+             if p.name in best.settings[k] and p.name not in cls.discrete]  # fmt: skip
     # what the form does to the scale of a law looks like its parameter: no fit shows it, so its prior size holds
     C = noise.covariance(problem, found.states[0].hyper)
     C = C + form_covariance(found, best, _FORM_SIZE) + _scale(found, best)
@@ -250,7 +255,7 @@ def _quantile(q: float, a: Array, b: Array) -> Array:
     return np.asarray(np.clip(np.where(right, -x, x), a, b))
 
 
-def _told(grid: Size | None, value: Any, unit: str) -> Size:
+def _told(grid: Size | None, value: object, unit: str) -> Size:
     """What a fit says of a parameter that it took from the grid."""
     if grid is None or not isinstance(value, (int, float)):
         return Size(value, value, value, unit, None if grid is None else grid.odds)
@@ -262,12 +267,6 @@ def _ends(found: Evidence, id_: str, p: Parameter) -> tuple[float, float]:
     values = [float(s[p.name]) for s in found.of(id_).settings if p.name in s]
     inside = [max(min(values), p.low), min(max(values), p.high)] if values else [p.low, p.high]
     return (inside[0], inside[1]) if inside[1] > inside[0] else (p.low, p.high)
-
-
-def _continuous(id_: str, setting: dict[str, Any]) -> list[Any]:
-    """Parameters of a setting that may take any value in their range."""
-    cls = type(effect_of(id_, setting))
-    return [p for p in cls.parameters if p.name in setting and p.name not in cls.discrete]
 
 
 def form_covariance(found: Evidence, best: Fit, size: float | None = None) -> Array:
@@ -304,3 +303,32 @@ def smooth(found: Evidence, best: Fit) -> Array:
     C = noise.covariance(problem, hyper) + form_covariance(found, best)
     systematic = C - hyper.scale**2 * noise.noise(problem, hyper.ar)
     return np.asarray(systematic @ whitener(C, problem.u).solve(problem.residual - best.signature))
+
+
+FILE = "interval_scales.json"
+
+
+def scale_of(effect: str, parameter: str) -> float:
+    """Factor on the half-widths of a parameter [1]."""
+    own = _scales()["parameters"].get(f"{effect}.{parameter}")
+    return float((own or _scales()["kinds"].get(effects.catalogue()[effect].kind, {"scale": 1.0}))["scale"])
+
+
+@cache
+def _scales() -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    return json.loads(resources.files("bemt.judge.diagnose").joinpath(FILE).read_text(encoding="utf-8"))  # type: ignore[no-any-return]
+
+
+def widened(told: Sizes) -> dict[str, dict[str, Size]]:
+    """Parameters of effects with calibrated intervals, within their physical ranges."""
+    return {i: {k: _widened(i, k, v) for k, v in numbers.items()} for i, numbers in told.items()}
+
+
+def _widened(effect: str, name: str, v: Size) -> Size:
+    cls = effects.catalogue()[effect]
+    p = next((p for p in cls.parameters if p.name == name), None)
+    if p is None or name in cls.discrete or not isinstance(v.value, float):
+        return v
+    s = scale_of(effect, name)
+    low, high = v.value - s * (v.value - v.low), v.value + s * (v.high - v.value)
+    return replace(v, low=max(low, min(p.low, v.value)), high=min(high, max(p.high, v.value)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from bemt.rotors.case import Case
 
 
-def write(folder: str, answer: Any, document: dict[str, Any], cases: Sequence[Case], figures: bool = True) -> None:
+def write(
+    folder: str, answer: Any, document: Mapping[str, object], cases: Sequence[Case], figures: bool = True
+) -> None:
     """Write everything; improved cases of an earlier answer go."""
     out = Path(folder)
     out.mkdir(parents=True, exist_ok=True)
@@ -119,22 +121,20 @@ def improved_case(answer: Diagnosis, case: Case, source: str) -> str:
         text["model"] = tomlkit.table()
     model: Any = text["model"]
     model["effects_on"], model["effects_off"] = on, off
-    text["name"] = _next_name(case.name)
+    text["name"] = name_after(case.name, "improved")
     elsewhere(text, case)
     head = f"# {case.name} {_HEAD}{', '.join(effects.to_text(e) for e in found)}"
     return f"{head}\n{tomlkit.dumps(text).rstrip()}\n"
 
 
-def _next_name(name: str) -> str:
-    """Name of the improved case: its own, or a sweep of both could not tell them apart.
+def name_after(name: str, mark: str) -> str:
+    """Name of a case that was made of another: its own, or a sweep of both could not tell them apart.
 
-    >>> _next_name("prop_10x5"), _next_name("prop_10x5_improved"), _next_name("prop_10x5_improved_2")
-    ('prop_10x5_improved', 'prop_10x5_improved_2', 'prop_10x5_improved_3')
+    >>> [name_after(n, "improved") for n in ("prop_10x5", "prop_10x5_improved", "prop_10x5_improved_2")]
+    ['prop_10x5_improved', 'prop_10x5_improved_2', 'prop_10x5_improved_3']
     """
-    base, mark, count = name.partition("_improved")
-    if not mark or not re.fullmatch(r"(_[1-9]\d*)?", count):
-        return f"{name}_improved"
-    return f"{base}_improved_{int(count[1:] or 1) + 1}"
+    match = re.fullmatch(rf"(.*_{mark})(?:_([1-9]\d*))?", name)
+    return f"{match[1]}_{int(match[2] or 1) + 1}" if match else f"{name}_{mark}"
 
 
 def beside(case: Case) -> list[Path]:

@@ -1,4 +1,11 @@
-"""Error of the law of an effect: published laws of one effect differ, and so may the truth."""
+"""Error of the law of an effect, and which effects look alike in a test plan.
+
+Published laws of one effect differ, and so may the truth. With the covariance C of noise, nuisances and solver error,
+the distance of an effect from another is the length of what is left of its whitened signature after the best setting of
+the other one (and, free in sign and size, the same with the principal angle of their signatures: d^2 sin^2(phi),
+Eriksson, Frisk and Krysander 2013, Automatica 49:1591, in the Gaussian case).  Below :data:`ALIKE` standard deviations
+two effects are one class: no algorithm can tell them apart with these points.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +19,16 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum
 from bemt.judge.diagnose import noise
-from bemt.judge.explanation import Explanation
+from bemt.judge.loss import Explanation
 from bemt.physics import effects
 from bemt.physics.effects.base import FORM
 
 if TYPE_CHECKING:
     from bemt.base.gaussian.whitening import Conditional
     from bemt.judge.diagnose.noise import Hyper
+    from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.signatures import Candidate
-
 
 _TORQUE = 0.5
 
@@ -137,22 +144,18 @@ class State:
     best: dict[str, int] = field(default_factory=dict)  # Best setting of each candidate
     best_rival: str = ""  # Unknown smooth effect of largest evidence
 
-    def both(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
-        """Log likelihood over that of "none" of all settings of two effects, priors included, forms left out, (A, B).
+    def scores(self, what: Explanation, spans: Mapping[str, slice], log_w: Array) -> Array:
+        """Log likelihood over that of "none" of every setting of an effect, priors included, (A,), or of two, (A, B).
 
-        Signatures are added.
+        Signatures of two are added, and their forms left out.
         """
-        A, B = (spans[i] for i in pair)
+        if not what.pair:
+            (name,) = what
+            return self.gains(name, spans[name], self.r[:, None])[:, 0] + log_w[spans[name]]
+        A, B = (spans[i] for i in what)
         a, b = (self.S[:, x].T @ self.r - self.half[x] + log_w[x] for x in (A, B))
         total = a[:, None] + b[None, :] - self.S[:, A].T @ self.S[:, B]
         return np.asarray(total)
-
-    def best_of(self, pair: Explanation, spans: Mapping[str, slice], log_w: Array) -> tuple[int, int]:
-        """Columns of the best setting of two effects."""
-        total = self.both(pair, spans, log_w)
-        i, j = np.unravel_index(int(np.argmax(total)), total.shape)
-        A, B = (spans[k] for k in pair)
-        return A.start + int(i), B.start + int(j)
 
     def gains(self, name: str, span: slice, R: Array) -> Array:
         """Log likelihood over that of "none" of every setting of a candidate for whitened residuals. [1]"""
@@ -165,3 +168,64 @@ class State:
                 0.5 * np.sum(pS * pS, axis=0)[:, None] - pS.T @ pR + 0.5 * np.sum(pR * pR, axis=0) - form.half_log_det
             )
         return np.asarray(out)
+
+
+ALIKE = 3.0
+"""Distance below which two effects are one class [1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Confusion:
+    """Distances between effects in a plan."""
+
+    ids: tuple[str, ...]  # Effects
+    size: Array  # (N,) Length of each effect's whitened signature at the setting that was used [1]
+    distance: Array  # (N, N) Row effect from the nearest setting of the column effect [1]
+
+    def classes(self) -> list[list[str]]:
+        """Effects that are seen but not told apart: connected groups of two or more."""
+        seen = [i for i in range(len(self.ids)) if self.size[i] >= ALIKE]
+        groups: list[set[int]] = []
+        for i in seen:
+            near = {j for j in seen if j != i and min(self.distance[i, j], self.distance[j, i]) < ALIKE} | {i}
+            touching = [g for g in groups if g & near]
+            for g in touching:
+                near |= g
+                groups.remove(g)
+            groups.append(near)
+        return [[self.ids[i] for i in sorted(g)] for g in groups if len(g) > 1]
+
+
+def confusion(found: Evidence, settings: dict[str, int] | None = None) -> Confusion:
+    """Distances between all candidates."""
+    state = found.states[0]
+    ids = tuple(c.id for c in found.candidates)
+    chosen = [state.S[:, found.spans[c.id].start + (settings or {}).get(c.id, c.middle)] for c in found.candidates]
+    size = np.array([float(np.sqrt(s @ s)) for s in chosen])
+    settings = settings or {}
+    modes = form_modes(found.problem, found.candidates)
+    at = [settings.get(c.id, c.middle) for c in found.candidates]
+    matrix = np.zeros((len(ids), len(ids)))
+    if ids:
+        own = [columns(found.problem, c, g, modes[c.id]) for c, g in zip(found.candidates, at, strict=True)]
+        forms = [LawError.of(state.white.changes(x), width).at(np.zeros(state.r.size)) for width, x in own]
+        starts = [found.spans[i].start for i in ids]
+        for k, s in enumerate(chosen):
+            d = s[:, None] - state.S  # less what the form of the effect may be
+            square = np.sum(d * d, axis=0) - np.sum(forms[k].project(d) ** 2, axis=0)
+            matrix[k] = np.sqrt(np.maximum(np.minimum.reduceat(square, starts), 0.0))
+        np.fill_diagonal(matrix, 0.0)
+    return Confusion(ids, size, matrix)
+
+
+def nearest(found: Evidence) -> str:
+    """Effect whose signature is most nearly parallel to the mismatch: what a look at the curves would say."""
+    problem = found.problem
+    r = (problem.y - problem.f0) / problem.u
+
+    def cosine(signatures: Array) -> float:
+        s = signatures / problem.u[:, None]
+        length = np.sqrt(np.sum(s * s, axis=0))
+        return float(np.max(s.T @ r / np.where(length > 0, length, np.inf)))
+
+    return max(((cosine(c.signatures), c.id) for c in found.candidates), default=(0.0, ""))[1]

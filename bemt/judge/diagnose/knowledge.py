@@ -1,8 +1,9 @@
-"""What else is known, each as one factor of the posterior: laws of ratios, exact relations, files that are not right.
+"""What is known beside the readings: how likely each explanation is before, and factors of the posterior.
 
-The signatures of the solver and those of scaling laws are two banks for the same hypotheses. Where no signature of the
-solver fits, its law of the cause may be off for this blade; how loads changed from a reference at equal speed is
-measured and needs no blade, so there the laws tell what is unknown to the solver.
+The factors are laws of ratios, exact relations, files that are not right. The signatures of the solver and those of
+scaling laws are two banks for the same hypotheses. Where no signature of the solver fits, its law of the cause may be
+off for this blade; how loads changed from a reference at equal speed is measured and needs no blade, so there the laws
+tell what is unknown to the solver.
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ import numpy as np
 
 from bemt.base.errors import InputError
 from bemt.data.recordings.load import import_file
+from bemt.judge.compare import drive_laws
+from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
-from bemt.judge.compare.stand_run import StandRun, stand_run
-from bemt.judge.diagnose import other_rotor
+from bemt.judge.diagnose import other_rotor, record
 from bemt.judge.diagnose.record import merged
-from bemt.judge.explanation import DOUBT, UNKNOWN, Explanation
+from bemt.judge.loss import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
+from bemt.physics.effects.air_density import AirDensity
+from bemt.physics.effects.duct import DuctEffect
 
 if TYPE_CHECKING:
     from bemt.judge.compare.drive_laws import Judgement
@@ -33,6 +37,88 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.record import Record
     from bemt.judge.diagnose.signatures import Candidate
     from bemt.judge.loss import Decision
+
+PRIOR = {"none": 0.4, "single": 0.45, "pair": 0.1, "unknown": 0.05}
+"""Prior probability of the kinds of explanation; shared within a kind by the weights of the effects. [1]"""
+LEFT_OUT, PRESENT = 10.0, 0.01
+"""Weight of an effect of every real rotor that the baseline leaves out, and of one that the baseline has, with other
+parameters, beside 1 for all others, where no reference shows the rotor [1]."""
+BOTH, ELSE = 0.01, 0.2
+"""Beside a reference: weight of what blade and air do in every run and the baseline has, in which two runs do not
+differ, and of other physics that it has [1]."""
+ALWAYS = 9.0
+"""Odds that physics of every rotor is at work, in every run, where the case leaves it out: nobody takes it away [1]."""
+# Recorded conditions that differ by less are the same, share.
+_SAME = 0.1
+EVIDENT = 0.2
+"""Weight of what anybody at the stand would see: a second rotor is seldom overlooked [1]."""
+RECORDED = 0.3
+"""Weight of a wrong density where thermometer and barometer stand in every file: declared [1]."""
+CHANGED = 50.0
+"""Weight of what the user says he changed: said, weighed, checked [1]."""
+
+
+def prior_weights(problem: Problem, ids: Sequence[str]) -> dict[str, float]:
+    """Weight of each effect: physics that every rotor has is likelier to be missing than a fault is to be there. [1]"""
+    usual = {e.id for e in effects.standard()} | {i for p in problem.parts for i in p.left_out}
+    shown = any(p.record.reference for p in problem.parts)
+    on, everywhere = present(problem), {e.id for e in effects.standard() if not e.along}
+
+    def weight(i: str) -> float:
+        cls = effects.catalogue()[i]
+        if i in problem.told:
+            return CHANGED
+        if recorded_change(problem, i):
+            return LEFT_OUT
+        if i in on and not cls.evident:
+            return PRESENT if not shown else BOTH if i in everywhere else ELSE
+        if i == AirDensity.id and all(p.record.air_recorded for p in problem.parts):
+            return RECORDED
+        # between two recordings the change is often one that was made and is known
+        rest = EVIDENT if cls.evident and not shown else 1.0
+        return LEFT_OUT if i in usual and (not shown or i in problem.shared) else rest
+
+    return {i: weight(i) for i in ids}
+
+
+def recorded_change(problem: Problem, name: str) -> bool:
+    """Whether recording and reference tell themselves that what an effect follows differs between them."""
+    if problem.free.all():
+        return False
+    test, known = ([p.record.extra for p in problem.parts if p.record.reference is which] for which in (False, True))
+    for v in (v for v in effects.catalogue()[name].along if v != "time_s"):
+        now = [float(np.median(x[v])) for x in test if v in x]
+        before = [float(np.median(x[v])) for x in known if v in x]
+        if now and (not before or abs(now[0] - before[0]) > _SAME * max(abs(now[0]), abs(before[0]))):
+            return True
+    return False
+
+
+def present(problem: Problem) -> set[str]:
+    """Effects that the baseline of every recording has; the case's own duct is one."""
+    ducts = [{DuctEffect.id} if p.model.duct is not None else set() for p in problem.parts]
+    return set.intersection(*({e.id for e in p.baseline} | d for p, d in zip(problem.parts, ducts, strict=True)))
+
+
+def kinds(problem: Problem) -> Mapping[str, float]:
+    """Prior of the kinds of explanation: a drive shows in the speed alone."""
+    return drive_laws.PRIOR if np.all(problem.channel == record.CHANNELS.index("rpm")) else PRIOR
+
+
+def log_priors(
+    weights: dict[str, float], pairs: bool = True, of: Mapping[str, float] = PRIOR
+) -> dict[Explanation, float]:  # fmt: skip
+    """Logarithm of the prior probability of every explanation; `of`: of their kinds."""
+    total = sum(weights.values()) or 1.0
+    out = {NONE: of["none"], UNKNOWN: of["unknown"]}
+    out |= {Explanation.of(i): of["single"] * w / total for i, w in weights.items()}
+    if pairs:
+        names = list(weights)
+        both = {Explanation.of(a, b): weights[a] * weights[b] for k, a in enumerate(names) for b in names[k + 1 :]}
+        total = sum(both.values()) or 1.0
+        out |= {k: of["pair"] * w / total for k, w in both.items()}
+    return {k: float(np.log(v)) for k, v in out.items()}
+
 
 EXACT = 1e4
 """Odds that a relation of one file which must hold, and holds after one listed repair to 0.1 %, was broken by that: as
@@ -57,7 +143,10 @@ def possible(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Candida
 
 def combined(found: Evidence, change: RunChange | None = None) -> dict[Explanation, float]:
     """Posterior with all factors; ``change`` from the reference, where ratios are a measure of it."""
-    P = _exact(found.problem, found.probability)
+    # relations that must hold: power is torque times speed, two counters of one shaft agree
+    broken = {name for name, _ in other_rotor.exact_faults(found.problem)}
+    odds = {k: p * (EXACT if k.ids & broken else 1.0) for k, p in found.probability.items()}
+    P = {k: p / sum(odds.values()) for k, p in odds.items()}
     if change is not None and change.loads.ranked:
         P = both(P, change.loads.ranked)
     return _doubted(found.problem, another_rotor(P, UNKNOWN))
@@ -99,12 +188,6 @@ def another_rotor(P: Mapping[Explanation, float], rotor: Explanation) -> dict[Ex
     return {k: p - lost.get(k, 0.0) + (sum(lost.values()) if k == rotor else 0.0) for k, p in P.items()}
 
 
-def _exact(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    """Broken relations of the recording: power is torque times speed, two counters of one shaft agree."""
-    broken = {name for name, _ in other_rotor.exact_faults(problem)}
-    return _normal({k: p * (EXACT if k.ids & broken else 1.0) for k, p in P.items()})
-
-
 def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanation, float]:
     """Share of the fault of file or case: of what no listed cause explains where a file cannot be right, of nearly all
     where repeats differ as on no stand, and of all but slips of units and speed where another rotor is recorded.
@@ -124,11 +207,6 @@ def _doubted(problem: Problem, P: Mapping[Explanation, float]) -> dict[Explanati
     return {**{k: p - lost.get(k, 0.0) for k, p in P.items()}, DOUBT: sum(lost.values())}
 
 
-def _normal(P: Mapping[Explanation, float]) -> dict[Explanation, float]:
-    total = sum(P.values())
-    return {k: p / total for k, p in P.items()}
-
-
 def change_of(
     records: Sequence[Record],
     diameter_m: float,
@@ -141,10 +219,12 @@ def change_of(
     ``absent``: effects that cannot show; ``judge`` of the loads; ``files``: reference and test as a command names them.
     """
     known, tested = [[r for r in records if r.reference is which] for which in (True, False)]
-    if len(tested) != 1 or not known or _transient(absent):
+    # where the speed changes within a second the rows are no steady points
+    if len(tested) != 1 or not known or {"inflow_lag", "rotor_inertia"} - set(absent):
         return None
     pair = [merged(known), tested[0]]
-    if _turned(pair):
+    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
+    if any(a * b < 0.0 for a, b in sums):  # of a load that changed its sign, ratios are those of sizes
         return None
     try:
         whole = _paths(files) if len(known) == 1 else []
@@ -152,17 +232,6 @@ def change_of(
         return changed(runs[0], runs[1], diameter_m, judge)
     except InputError:
         return None
-
-
-def _transient(absent: Collection[str]) -> bool:
-    """Whether the speed changes within a second in what was recorded: these rows are no steady points."""
-    return bool({"inflow_lag", "rotor_inertia"} - set(absent))
-
-
-def _turned(pair: Sequence[Record]) -> bool:
-    """Whether a load changed its sign: ratios are those of sizes."""
-    sums = [[float(np.nansum(r.measured[k])) for r in pair] for k in _LOADS if all(k in r.measured for r in pair)]
-    return any(a * b < 0.0 for a, b in sums)
 
 
 def _paths(files: Sequence[str] | None) -> list[str]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.problem import Part
+from bemt.judge.diagnose.problem import BY_LAWS, Part
 from bemt.judge.diagnose.record import Record
 from bemt.physics.effects.base import Effect, Flow, Loads
 
@@ -285,10 +285,6 @@ def _profile(loads: Loads, flow: Flow, laws: Laws) -> Array:
     return np.asarray(np.maximum(loads.Q - lifting, _LEAST_PROFILE * np.abs(loads.Q)))
 
 
-def _pitch_offset(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    _turned(e.offset_deg, loads, flow, laws)
-
-
 def _untwist(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     """Nose down by tip_deg (r/R)^2 in proportion to rho Omega^2; at 0.75 R."""
     _turned(-e.tip_deg * _AT**2 * e.share(flow), loads, flow, laws)
@@ -328,13 +324,9 @@ def _duct(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
     loads.T = loads.T * (1.0 + fade * (more - 1.0)) - e.outer_drag * 0.5 * flow.rho * V**2 * flow.area
 
 
-def _nothing(e: Any, loads: Loads, flow: Flow, laws: Laws) -> None:
-    """Its other hooks say it all."""
-
-
 BLADE_LAWS: dict[str, Callable[[Any, Loads, Flow, Laws], None]] = {
-    "pitch_offset": _pitch_offset, "untwist": _untwist, "section": _section, "duct": _duct,
-    "propeller": _nothing, "diameter": _diameter, "nacelle": _nothing,
+    "pitch_offset": lambda e, *of: _turned(e.offset_deg, *of), "untwist": _untwist, "section": _section, "duct": _duct,
+    "diameter": _diameter, **dict.fromkeys(("propeller", "nacelle"), lambda *_: None),  # their other hooks say it all
 }  # fmt: skip
 """How loads change with effects that have hooks inside of the solver, by id."""
 
@@ -345,11 +337,6 @@ class LawPart(Part):
 
     rotor: LawRotor = field(default_factory=lambda: LawRotor(1.0, {}))
 
-    @property
-    def by_laws(self) -> bool:
-        """Yes."""
-        return True
-
     def _respond(self, effects: Sequence[Effect]) -> tuple[Array, Array, Flow]:
         loads, met = self.rotor.respond(effects, self.flow)
         return loads.T, loads.Q, met
@@ -357,4 +344,4 @@ class LawPart(Part):
 
 def law_part(record: Record, rotor: LawRotor) -> LawPart:
     """Part of a recording."""
-    return LawPart(record, rotor, (), rotor.flow(record), "laws", rotor=rotor)  # type: ignore[arg-type]
+    return LawPart(record, rotor, (), rotor.flow(record), BY_LAWS, rotor=rotor)  # type: ignore[arg-type]

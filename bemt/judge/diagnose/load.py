@@ -28,6 +28,7 @@ from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.propeller import rotor_of
 
 if TYPE_CHECKING:
+    from bemt.data.recordings.findings import Finding
     from bemt.judge.diagnose.record import Record
     from bemt.rotors.case import Case
 
@@ -44,7 +45,10 @@ _ONE_SPEED = 2.0
 
 def cases_of(given: Sequence[Any], off: Sequence[str], n: int) -> list[Case]:
     """Cases by object, path or label, one or one for each recording."""
-    found = [case for one in given for case in _cases(one)]
+    found: list[Case] = []
+    for one in given:
+        folder = isinstance(one, (str, os.PathLike)) and Path(one).is_dir()
+        found += map(load_case, find_cases([os.fspath(one)])) if folder else [rotor_of(one).case]
     if len(found) not in (1, n):
         got, expected = f"{len(found)} cases for {n} recordings", "one case, or one for each recording"
         raise InputError(Fault("--case", "", got, expected))
@@ -55,13 +59,6 @@ def cases_of(given: Sequence[Any], off: Sequence[str], n: int) -> list[Case]:
     if off:
         found = [c.replaced({"model.effects_off": [*c.get("model.effects_off"), *off]}) for c in found]
     return found
-
-
-def _cases(given: Any) -> list[Case]:
-    """Cases of one word: those of a folder, or that of a label."""
-    if isinstance(given, (str, os.PathLike)) and Path(given).is_dir():
-        return [load_case(p) for p in find_cases([os.fspath(given)])]
-    return [rotor_of(given).case]
 
 
 def load(
@@ -90,11 +87,7 @@ def load(
     ducted = case.ducted
     findings = check(imported, diameter_m=case.diameter_m, blades=int(case.get("rotor.blades")), ducted=ducted)
     found = tuple(f"{Path(path).name}: {f}" for f in findings if f.severity != "note")
-    wrong = {(f.channel, i) for f in findings if f.id == "misread" for i in f.rows}
-    for name in {name for name, _ in wrong}:
-        v = np.array(imported[name])
-        v[[i for channel, i in wrong if channel == name]] = np.nan
-        imported = replace(imported, values={**imported.values, name: v})
+    imported = _without_misread(imported, findings)
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
     log = imported.provenance["format"] != "table"
@@ -109,11 +102,22 @@ def load(
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
             points = replace(_points(imported, rows, path), notes=("short log: every row counts, transients too",))
-        made = records.from_series(_turned(points) if hand else points, case, correlated)
+        if hand:  # a rotor of the other hand: the sign of its torque is the sense of rotation
+            points = replace(points, values={**points.values, "torque_Nm": -points["torque_Nm"]})
+        made = records.from_series(points, case, correlated)
     turned = ("torque_Nm: negative under load (sense of rotation): sign reversed here",) if hand else ()
     notes = (*made.notes, *turned, *imported.notes, *rows.notes, *_unused(imported, rows, case))
     broken = tuple(f for f in findings if f.severity == "error" or (f.id == "sign_flipped" and f.severity == "warning"))
     return replace(made, findings=found, contradictions=broken, notes=notes, computed=imported.kind == "cfd")
+
+
+def _without_misread(imported: Dataset, findings: Sequence[Finding]) -> Dataset:
+    values = {**imported.values}
+    for f in findings:
+        if f.id == "misread":
+            values[f.channel] = np.array(values[f.channel])
+            values[f.channel][list(f.rows)] = np.nan
+    return replace(imported, values=values)
 
 
 def _speed_missing(imported: Dataset, path: str) -> None:
@@ -186,11 +190,6 @@ def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
         for rows, value in zip(reduction(reduced).rows, seen, strict=True):
             u[name][rows] = np.hypot(value, floor * full)
     return replace(series, u=u)
-
-
-def _turned(points: Dataset) -> Dataset:
-    """Torque of a rotor of the other hand, whose sign is the sense of rotation."""
-    return replace(points, values={**points.values, "torque_Nm": -points["torque_Nm"]})
 
 
 def _same_rotor(imported: Dataset, case: Case, path: str) -> None:

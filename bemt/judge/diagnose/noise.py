@@ -226,6 +226,9 @@ def unlike(covariance: Array, u: Array, chosen: Sequence[SmoothAlternative]) -> 
     return out
 
 
+_WORDS = ("thrust", "torque", "speed")
+
+
 def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternative, ...]:
     """Unknown smooth effects of the test: along each recorded variable but those ``told``, and pairs of them."""
     X: dict[str, Array] = {}
@@ -243,7 +246,6 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternat
     # a cause of the test is not in the reference, whether it is in the library or not
     free = problem.free
     present = [k for k in (0, 1, 2) if np.any(c == k)]
-    words = ("thrust", "torque", "speed")
     groups = [tuple(present)] if len(present) == 1 else [tuple(present), *((k,) for k in present)]
     out = []
     for names in sets:
@@ -253,19 +255,26 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternat
                 kernel = smooth(*((X[name][p[mine]], length) for name in names)) * alike(c[mine])
                 kernel *= np.multiply.outer(problem.scale[mine], problem.scale[mine])
                 for size in _RIVAL_SIZES:
-                    label = " and ".join(words[k] for k in group)
+                    label = " and ".join(_WORDS[k] for k in group)
                     out.append(SmoothAlternative(f"{label} over {', '.join(names)}: {size:.0%}", mine, kernel, size))
-    load, falling = _loading(problem)
+    return (*out, *_behind(problem, groups))
+
+
+def _behind(problem: Problem, groups: Sequence[tuple[int, ...]]) -> Iterator[SmoothAlternative]:
+    """Readings of a balance or mount that stays behind while the load falls, by groups of channels."""
+    (load, falling), free, c = _loading(problem), problem.free, problem.channel
     for group in groups:
         mine = free & np.isin(c, group) & falling
         here = free & np.isin(c, group) & (c < 2)
         if min(np.count_nonzero(mine), np.count_nonzero(here & ~falling)) < _FEW * len(group):
             continue
-        most = np.array([np.max(np.abs(problem.y[c == k])) for k in present])[np.searchsorted(present, c[mine])]
-        kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine]) * np.multiply.outer(most, most)
-        label = " and ".join(words[k] for k in group)
-        out += [SmoothAlternative(f"{label} while the load falls: {size:.0%}", mine, kernel, size) for size in _BEHIND]
-    return tuple(out)
+        most = np.zeros(c.size)
+        for k in group:
+            most[c == k] = np.max(np.abs(problem.y[c == k]))
+        kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine]) * np.multiply.outer(most[mine], most[mine])
+        label = " and ".join(_WORDS[k] for k in group)
+        for size in _BEHIND:
+            yield SmoothAlternative(f"{label} while the load falls: {size:.0%}", mine, kernel, size)
 
 
 def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:

@@ -22,7 +22,7 @@ from bemt.judge.diagnose.noise import law_of, smooth_modes
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.physics.effects.base import Effect
 from bemt.physics.effects.duct import DuctEffect
-from bemt.rotors.latents import NAMES, AsBuilt
+from bemt.rotors.latents import NAMES, STEP, AsBuilt
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Part, Problem
@@ -88,8 +88,8 @@ def _of_blade(problem: Problem, add: Add) -> Array:
     blade, offset = problem.blade, np.zeros_like(problem.y)
     tangents = np.zeros((problem.y.size, blade.at.size))
     for k in blade.used:
-        up, down = (_everywhere(problem, blade.changed(int(k), s * blade.steps[k])) for s in (1.0, -1.0))
-        tangents[:, k] = (up - down) / (2.0 * blade.steps[k]) * problem.stretch
+        up, down = (_everywhere(problem, blade.changed(int(k), s * STEP[k])) for s in (1.0, -1.0))
+        tangents[:, k] = (up - down) / (2.0 * STEP[k]) * problem.stretch
     if np.isfinite(tangents).all():
         offset = tangents @ (blade.at - blade.mean)
         for j in range(blade.root.shape[1]):
@@ -119,7 +119,9 @@ def _of_flow_and_level(problem: Problem, add: Add) -> None:
     """Speed, air, and the level of the model over the advance ratio."""
     f0, channel = problem.f0, problem.channel
     load = channel < 2
-    slope_V = np.concatenate([np.concatenate([_slope(p, c) for c in p.channels]) for p in problem.parts])[problem.kept]
+    slopes = [{"thrust_N": p.flow.dT_dV, "torque_Nm": p.flow.dQ_dV, "rpm": 0.0 * p.flow.V} for p in problem.parts]
+    slope_V = np.concatenate([of[c] for p, of in zip(problem.parts, slopes, strict=True) for c in p.channels])
+    slope_V = slope_V[problem.kept]
     V = np.concatenate([p.flow.V for p in problem.parts])[problem.point]
     # at fixed V a speed error moves loads by 2 and by the change of J; at J = 0 only by 2
     add("speed of rotation", np.where(load, PRIORS["speed of rotation"] * (2.0 * f0 - V * slope_V), 0.0))
@@ -222,11 +224,6 @@ def _drives(problem: Problem) -> Iterator[tuple[str, dict[int, Part]]]:
     else:
         for i, p in turning.items():
             yield f" ({p.record.name})" if len(turning) > 1 else "", {i: p}
-
-
-def _slope(part: Part, channel: str) -> Array:
-    by_name = {"thrust_N": part.flow.dT_dV, "torque_Nm": part.flow.dQ_dV}
-    return by_name.get(channel, np.zeros(len(part.record)))
 
 
 def following(problem: Problem, loads: Problem) -> Problem:

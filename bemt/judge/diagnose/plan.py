@@ -13,13 +13,11 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum
 from bemt.base.gaussian.whitening import whitener
 from bemt.base.tables import text_table
-from bemt.judge.diagnose import confusion as look
-from bemt.judge.diagnose import noise, posterior, prior, problem, signatures
+from bemt.judge.diagnose import form, knowledge, noise, posterior, problem, signatures
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
 from bemt.judge.diagnose.record import Record
-from bemt.judge.explanation import NONE, Explanation
-from bemt.judge.loss import COSTS
+from bemt.judge.loss import COSTS, NONE, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -41,7 +39,7 @@ DETECTABLE = {"visible": "yes", "marginal": "maybe", "invisible": "no"}
 class Plan:
     """What a plan can do."""
 
-    confusion: look.Confusion  # Distances
+    confusion: form.Confusion  # Distances
     # (N,) What the readings will say for each effect against nothing, usually and if the solver is at its best, as
     # standard deviations: the square root of twice the expected log odds [1]
     size: Array
@@ -73,9 +71,25 @@ class Plan:
     @property
     def text(self) -> str:
         """Tables for a terminal."""
-        return text(self)
+        c = self.confusion
+        rows = []
+        for a in np.argsort(-self.size):
+            near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= form.ALIKE]
+            nearest = min(near, default=(float("nan"), "-"))
+            rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{self.size[a]:.1f}",
+                         self.detectable[c.ids[a]],
+                         f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
+        header = ["effect", "", "size", "detectable", "nearest look-alike"]
+        out = [f"plan of {self.points} points: size of each effect at typical strength, in standard deviations",
+               text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
+        for group in c.classes():
+            out.append(f"  cannot be distinguished: {', '.join(group)}")
+        if self.added is not None:
+            out.append(f"  to add: {self.added.text}{self.added.tells}")
+        out += [f"  not visible: {i}: {why}" for i, why in self.absent.items()]
+        return "\n".join([*out, *(f"  note: {note}" for note in self.notes)])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Mapping[str, object]:
         """Plain values of schema ``bemt.plan/1``."""
         return document(self)
 
@@ -122,13 +136,9 @@ def record_of(imported: Dataset, case: Case) -> Record:
     return replace(made, notes=(*made.notes, *imported.notes, *rows.notes))
 
 
+@posterior.one_thread()
 def plan(record: Record, case: Case, progress: Callable[[str], None] | None = None) -> Plan:
     """Say what a plan can see."""
-    with posterior.one_thread():
-        return _plan(record, case, progress)
-
-
-def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) -> Plan:
     first = build([record], [case])
     flow = first.parts[0].flow
     own = {"thrust_N": flow.T0, "torque_Nm": flow.Q0, "rpm": record.rpm}
@@ -138,7 +148,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         whole, None, (lambda n: progress(f"solving with {n}")) if progress else None
     )
     found = posterior.bare(whole, candidates, noise.Hyper(*_HYPER, 1.0))
-    alike = look.confusion(found)
+    alike = form.confusion(found)
     size, best = _sizes(whole, candidates, [noise.Hyper(*h, 1.0) for h in (_HYPER, _BEST)])
     added = None
     groups = sorted(alike.classes(), key=len, reverse=True)
@@ -146,7 +156,7 @@ def _plan(record: Record, case: Case, progress: Callable[[str], None] | None) ->
         a, b = groups[0][:2]
         settings = {c.id: c.settings[c.middle] for c in candidates}
         added = suggestion.suggest(found, [suggestion.Rival(i, settings[i], 0.5) for i in (a, b)])
-    before = prior.log_priors(prior.prior_weights(whole, alike.ids), pairs=False)
+    before = knowledge.log_priors(knowledge.prior_weights(whole, alike.ids), pairs=False)
     odds = float(np.log(COSTS.wrong / COSTS.silent))  # from which a name is the answer of least loss
     bar = np.array([odds + before[NONE] - before[Explanation.of(i)] for i in alike.ids])
     return Plan(alike, size, best, bar, absent, added, len(record), record.notes)
@@ -178,7 +188,7 @@ def _sizes(
     return [np.asarray(row) for row in np.sqrt(2.0 * np.maximum(least, 0.0))]
 
 
-def document(answer: Plan) -> dict[str, Any]:
+def document(answer: Plan) -> Mapping[str, object]:
     """Give the document ``bemt.plan/1``."""
     c = answer.confusion
     return {
@@ -191,29 +201,3 @@ def document(answer: Plan) -> dict[str, Any]:
         "next_measurement": None if answer.added is None else answer.added.document(),
         "notes": list(answer.notes),
     }  # fmt: skip
-
-
-def text(answer: Plan) -> str:
-    """Tables for a terminal."""
-    c = answer.confusion
-    order = np.argsort(-answer.size)
-    rows = []
-    for a in order:
-        near = [(c.distance[a, b], c.ids[b]) for b in range(len(c.ids)) if b != a and c.size[b] >= look.ALIKE]
-        nearest = min(near, default=(float("nan"), "-"))
-        rows.append([c.ids[a], effects.catalogue()[c.ids[a]].title, f"{answer.size[a]:.1f}",
-                     DETECTABLE[answer.sight[c.ids[a]]],
-                     f"{nearest[1]} ({nearest[0]:.1f})" if near else "-"])  # fmt: skip
-    header = ["effect", "", "size", "detectable", "nearest look-alike"]
-    out = [f"plan of {answer.points} points: size of each effect at typical strength, in standard deviations",
-           text_table(header, rows, left=(0, 1, 3, 4), indent="  ")]  # fmt: skip
-    for group in c.classes():
-        out.append(f"  cannot be distinguished: {', '.join(group)}")
-    if answer.added is not None:
-        a = answer.added
-        both = f"{a.after:.1f} instead of {a.before:.1f}"
-        gain = f" (tells {' from '.join(a.separates)} at {both} standard deviations)" if a.separates else ""
-        out.append(f"  to add: {a.text}{gain}")
-    out += [f"  not visible: {i}: {why}" for i, why in answer.absent.items()]
-    out += [f"  note: {note}" for note in answer.notes]
-    return "\n".join(out)

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import log_sum, shares
 from bemt.base.gaussian.whitening import conditional
-from bemt.judge.diagnose import form, noise, prior
+from bemt.judge.diagnose import form, knowledge, noise
 from bemt.judge.diagnose.form import State
-from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.loss import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
 
@@ -149,7 +149,7 @@ def weigh(problem: Problem, candidates: Sequence[Candidate], pairs: bool = True)
         if pairs:
             _pairs(bank, state)
         states.append(state)
-    before = prior.log_priors(prior.prior_weights(problem, list(bank.spans)), pairs, prior.kinds(problem))
+    before = knowledge.log_priors(knowledge.prior_weights(problem, list(bank.spans)), pairs, knowledge.kinds(problem))
     rough = {c.id for c in candidates if problem.by_laws and effects.catalogue()[c.id].kind != "stand"
              and not effects.catalogue()[c.id].exact}  # fmt: skip
     probability = _posterior(states, before, rough)

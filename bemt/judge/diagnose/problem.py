@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade
+from bemt.judge.diagnose.other_rotor import PLAIN, CalibratedBlade
 from bemt.judge.diagnose.record import CHANNELS, Record
 from bemt.physics import effects
 from bemt.physics.bem import model as bem
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 _SLIPPED = 3.0
 # Speeds over the recorded ones beyond which the tables of these do not reach.
 _SLOWER, _FASTER = 0.7, 1.1
+
+
+BY_LAWS = "laws"
+"""Key of a rotor that is known by its reference alone (:mod:`bemt.judge.diagnose.law_rotor`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,11 +135,6 @@ class Part:
         return (*(e for e in self.baseline if e.id != blade.id), blade)
 
     @property
-    def by_laws(self) -> bool:
-        """Whether its rotor is known by its reference alone (:mod:`bemt.judge.diagnose.law_rotor`)."""
-        return False
-
-    @property
     def channels(self) -> tuple[str, ...]:
         """Channels that were measured, in the order of :data:`CHANNELS`."""
         return tuple(c for c in CHANNELS if c in self.record.measured)
@@ -200,7 +199,7 @@ class Problem:
     @property
     def by_laws(self) -> bool:
         """Whether there is no case, and signatures are those of scaling laws."""
-        return any(p.by_laws for p in self.parts)
+        return any(p.key == BY_LAWS for p in self.parts)
 
     @property
     def findings(self) -> tuple[str, ...]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bemt.physics.dataset import Dataset
     from bemt.rotors.case import Case
 
+T = TypeVar("T")
 CHANNELS = ("thrust_N", "torque_Nm", "rpm")
 """Readings that may be explained; the speed only where a pulse width was recorded."""
 
@@ -117,22 +118,11 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         values["rpm"] = np.full(n, case.rpm)
         notes.append(f"{NO_SPEED}; {case.rpm:g} rev/min of the case")
     air, recorded = _states(values, case, notes, series.name)
-    filled = series.derive(case.diameter_m, air.rho) if "rpm" in series else _with_rpm(series, case, air)
+    turning = series if "rpm" in series else replace(series, values={**series.values, "rpm": values["rpm"]})
+    filled = turning.derive(case.diameter_m, air.rho)
     got = {key: np.asarray(v, dtype=float) for key, v in filled.values.items()}
-    measured: dict[str, Array] = {}
-    u: dict[str, Array] = {}
-    for name in ("thrust_N", "torque_Nm"):
-        if name in got and np.isfinite(got[name]).any():
-            if not np.any(np.nan_to_num(got[name])):
-                notes.append(f"{name} is 0 in every row: not measured, ignored")
-                continue
-            measured[name], u[name] = got[name].copy(), np.asarray(filled.u[name], dtype=float).copy()
-    if not measured:
-        channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
-        raise InputError(
-            Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients",
-                  "`bemt import` shows how each column was read and what names one")
-        )  # fmt: skip
+    loads = _loads_of(series, got, notes)
+    measured: dict[str, Array] = {k: got[k].copy() for k in loads}
     rpm = got["rpm"].copy()
     if "airspeed_m_s" in got:
         V = got["airspeed_m_s"].copy()
@@ -143,13 +133,13 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         got["sideslip_rad"] = np.radians(got["sideslip_deg"])
     extra = {k: got[k].copy() for k in COVARIATES if k in got and np.isfinite(got[k]).all()}
     if "pwm_s" in extra and "rpm" in series:
-        measured["rpm"], u["rpm"] = rpm.copy(), np.asarray(filled.u["rpm"], dtype=float).copy()
+        measured["rpm"] = rpm.copy()
         full = extra["pwm_s"] > _FULL_THROTTLE
         if full.any() and not full.all():
             measured["rpm"][full] = np.nan
             notes.append(f"{int(full.sum())} speeds at full throttle left out: the pulse width does not set them")
-    loads = np.any([np.isfinite(measured[k]) for k in measured if k != "rpm"], axis=0)
-    keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & loads
+    u = {k: np.array(filled.u[k], dtype=float) for k in measured}
+    keep = np.isfinite(rpm) & (rpm > 0) & np.isfinite(V) & np.any([np.isfinite(measured[k]) for k in loads], axis=0)
     kinks = _kinks(rpm, extra)
     if kinks.any():
         notes.append(f"{int(kinks.sum())} points where the rotor starts or stops{DROPPED}: no acceleration there")
@@ -163,16 +153,26 @@ def from_series(series: Dataset, case: Case, correlated: Mapping[str, Mapping[st
         keep &= ~again
     if not keep.any():
         if np.any(rpm < 0.0) and not np.any(rpm > 0.0):
-            told = f"a speed that is negative in all rows, down to {np.nanmin(rpm):g}"
-            raise InputError(Fault(series.name, "rpm", told, "a speed above 0", "Turn its sign in the file"))
+            no_speed = f"a speed that is negative in all rows, down to {np.nanmin(rpm):g}"
+            raise InputError(Fault(series.name, "rpm", no_speed, "a speed above 0", "Turn its sign in the file"))
         raise InputError(Fault(series.name, "", "no point with a speed and a load", "one or more"))
-    correlated = correlated or {}
-    record = Record(
-        series.name, rpm, V, air, measured, u, extra,
-        {k: float(v["gain"]) for k, v in correlated.items() if v.get("gain")},
-        {k: float(v["zero"]) for k, v in correlated.items() if v.get("zero")}, recorded, tuple(notes),
-    ).take(np.flatnonzero(keep))  # fmt: skip
-    return thinned(record)
+    gain, zero = ({k: float(v[of]) for k, v in (correlated or {}).items() if v.get(of)} for of in ("gain", "zero"))
+    record = Record(series.name, rpm, V, air, measured, u, extra, gain, zero, recorded, tuple(notes))
+    return thinned(record.take(np.flatnonzero(keep)))
+
+
+def _loads_of(series: Dataset, got: Mapping[str, Array], notes: list[str]) -> list[str]:
+    """Loads that were measured; refused where there is none."""
+    told = [k for k in ("thrust_N", "torque_Nm") if k in got and np.isfinite(got[k]).any()]
+    loads = [k for k in told if np.any(np.nan_to_num(got[k]))]
+    notes += [f"{k} is 0 in every row: not measured, ignored" for k in told if k not in loads]
+    if not loads:
+        channels = ", ".join(series.values) + "".join(f"; {n}" for n in notes if n.endswith("left out"))
+        raise InputError(
+            Fault(series.name, "", f"channels {channels}", "a thrust, a torque or a power, or coefficients",
+                  "`bemt import` shows how each column was read and what names one")
+        )  # fmt: skip
+    return loads
 
 
 def _without_flicker(series: Dataset, notes: list[str]) -> Dataset:
@@ -224,11 +224,6 @@ def _kinks(rpm: Array, extra: Mapping[str, Array]) -> NDArray[np.bool_]:
     large = np.abs(rise) > 0.01 * np.abs(rpm[1:])
     out[1:-1] = dense[:-1] & dense[1:] & (np.abs(right - left) > 0.6 * size) & (large[:-1] | large[1:])
     return out
-
-
-def _with_rpm(series: Dataset, case: Case, air: Air) -> Dataset:
-    rpm = np.full(len(series), case.rpm)
-    return replace(series, values={**series.values, "rpm": rpm}).derive(case.diameter_m, air.rho)
 
 
 def _states(values: Mapping[str, Array], case: Case, notes: list[str], file: str) -> tuple[Air, bool]:
@@ -373,25 +368,36 @@ def merged(records: Sequence[Record]) -> Record:
     if len(records) == 1:
         return records[0]
     join = np.concatenate
-
-    def channel(of: str, name: str) -> Array:
-        return join([getattr(r, of).get(name, np.full(len(r), np.nan)) for r in records])
-
-    names = list(dict.fromkeys(n for r in records for n in r.measured))
-    notes = tuple(dict.fromkeys(note for r in records for note in r.notes))
-    return thinned(Record(
-        ", ".join(r.name for r in records), join([r.rpm for r in records]), join([r.V for r in records]),
-        air_of_points({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
-        {n: channel("measured", n) for n in names}, {n: channel("u", n) for n in names}, concatenated(records),
-        {n: max(r.gain.get(n, 0.0) for r in records) for n in names if any(n in r.gain for r in records)},
-        {n: max(r.zero.get(n, 0.0) for r in records) for n in names if any(n in r.zero for r in records)},
-        all(r.air_recorded for r in records), notes, records[0].reference,
-        tuple(dict.fromkeys(f for r in records for f in r.findings)),
-        tuple(dict.fromkeys(f for r in records for f in r.contradictions)),
-        max((r.repeatability for r in records if np.isfinite(r.repeatability)), default=np.nan),
-        top_rpm=min(r.top_rpm for r in records),
-        computed=all(r.computed for r in records),
+    (measured, u), whole = (_columns(records, of) for of in ("measured", "u")), records[0]
+    return thinned(replace(
+        whole, name=", ".join(r.name for r in records), rpm=join([r.rpm for r in records]),
+        V=join([r.V for r in records]), measured=measured, u=u, extra=concatenated(records),
+        air=air_of_points({k: join([getattr(r.air, k) for r in records]) for k in _AIR}),
+        gain=_largest(r.gain for r in records), zero=_largest(r.zero for r in records),
+        air_recorded=all(r.air_recorded for r in records), notes=_once(r.notes for r in records),
+        findings=_once(r.findings for r in records), contradictions=_once(r.contradictions for r in records),
+        repeatability=float(np.fmax.reduce([r.repeatability for r in records])), electrical=False,
+        top_rpm=min(r.top_rpm for r in records), computed=all(r.computed for r in records),
     ))  # fmt: skip
+
+
+def _columns(records: Sequence[Record], of: str) -> dict[str, Array]:
+    """Channels of all records under each other; NaN where one has not measured."""
+    names = dict.fromkeys(n for r in records for n in r.measured)
+    return {n: np.concatenate([getattr(r, of).get(n, np.full(len(r), np.nan)) for r in records]) for n in names}
+
+
+def _largest(told: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Largest value of each channel."""
+    out: dict[str, float] = {}
+    for one in told:
+        out |= {n: max(v, out.get(n, v)) for n, v in one.items()}
+    return out
+
+
+def _once(told: Iterable[tuple[T, ...]]) -> tuple[T, ...]:
+    """Each of them once, in their order."""
+    return tuple(dict.fromkeys(one for some in told for one in some))
 
 
 def owners(records: Sequence[Record], whole: Record) -> NDArray[np.intp]:

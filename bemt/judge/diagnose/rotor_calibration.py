@@ -5,9 +5,8 @@ from __future__ import annotations
 import copy
 import math
 import os
-import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from bemt.base.action import in_words_of_the_library
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED, Fault, InputError
 from bemt.base.given import path_text
 from bemt.base.tables import json_text, number_text, plain, write_atomic
-from bemt.judge.diagnose.folder import beside, elsewhere
+from bemt.judge.diagnose.folder import beside, elsewhere, name_after
 from bemt.judge.diagnose.load import cases_of, load
 from bemt.physics.air import Air
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
@@ -85,7 +84,7 @@ def write(
     if case.path.is_file() and out.resolve() == case.folder.resolve():
         raise InputError(Fault(option, "", "the folder of the case itself", "another folder", "It would be replaced"))
     source = _source(case)
-    source["name"] = measured_name(case.name)
+    source["name"] = name_after(case.name, "measured")
     blade: Any = source["blade"]
     blade["known_from"] = "reference"
     blade.pop("as_built", None)
@@ -109,16 +108,6 @@ def write(
     write_atomic(out / POSTERIOR, json_text(posterior_document(found.posterior, found.reference, provenance)))
     write_atomic(out / "case.toml", f"{head}\n{tomlkit.dumps(source).rstrip()}\n")
     return [*(name.as_posix() for name in files), POSTERIOR, "case.toml"]
-
-
-def measured_name(name: str) -> str:
-    """Name of the calibrated case: its own, or a sweep of both could not tell them apart.
-
-    >>> measured_name("prop_10x5"), measured_name("prop_10x5_measured"), measured_name("prop_10x5_measured_2")
-    ('prop_10x5_measured', 'prop_10x5_measured_2', 'prop_10x5_measured_3')
-    """
-    match = re.fullmatch(r"(.*_measured)(?:_([1-9]\d*))?", name)
-    return f"{match[1]}_{int(match[2] or 1) + 1}" if match else f"{name}_measured"
 
 
 def _source(case: Case) -> Any:
@@ -221,7 +210,7 @@ class CalibratedRotor:
         lines += [f"      bemt drive {typed}"] if self.source.case.file.drive is not None else []
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Mapping[str, object]:
         """Plain values of schema ``bemt.rotor_calibration/1``."""
         case, one = self.source.case, self.found
         numbers = {
@@ -230,7 +219,7 @@ class CalibratedRotor:
             for k, name in enumerate(NAMES)
         }  # fmt: skip
         airspeed = flight_point(case, one)
-        out: dict[str, Any] = plain({
+        out: Mapping[str, object] = plain({
             "schema": SCHEMA, "case": case.name, "reference": [Path(p).name for p in self.recordings],
             "points": one.points, "converged": one.found.converged, "steps": one.found.steps,
             "log_evidence": one.found.log_evidence, "size": _size(one), "excess": one.found.excess,

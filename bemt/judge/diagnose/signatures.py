@@ -7,7 +7,7 @@ fixed set of vectors, for the recording and for hundreds of bootstrapped nulls a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from bemt.physics.effects import Effect, Parameter
 
 # Setting, its signature, whether it was solved, its prior weight.
-_Column = tuple[dict[str, Any], Array, bool, float]
+Setting = Mapping[str, Any]
+"""Parameters of an effect by name: numbers, or the words that some choose from."""
+_Column = tuple[Setting, Array, bool, float]
 
 _FINE = {1: 41, 2: 15, 3: 7}
 _LARGEST = 0.02
@@ -34,7 +36,7 @@ class Candidate:
     """One effect over its ranges."""
 
     id: str  # Effect
-    settings: tuple[dict[str, Any], ...]  # G settings of its parameters
+    settings: tuple[Setting, ...]  # G settings of its parameters
     signatures: Array  # (M, G) Change of the readings for each [units of the readings]
     weight: Array  # (G,) Prior probability of each setting, adds up to 1 [1]
     solved: NDArray[np.bool_]  # (G,) Whether the setting was solved rather than interpolated
@@ -42,11 +44,6 @@ class Candidate:
     directions: Callable[[Effect], Array] | None = None
     _other: dict[int, Array] = field(default_factory=dict, repr=False)
     _cells: dict[int, Array] = field(default_factory=dict, repr=False)
-
-    @property
-    def kind(self) -> str:
-        """Kind of the effect: air, stand or drive."""
-        return effects.catalogue()[self.id].kind
 
     def seen_as(self, signatures: Array) -> Candidate:
         """The same settings, of which other signatures (M, G) are known [units of the readings]."""
@@ -105,7 +102,7 @@ class Candidate:
         return int(np.nanargmin(np.where(size > 0, np.abs(size - median), np.nan)))
 
 
-def effect_of(id: str, setting: dict[str, Any]) -> Effect:  # noqa: A002
+def effect_of(id: str, setting: Setting) -> Effect:  # noqa: A002
     """Effect with a setting of its parameters."""
     return effects.catalogue()[id](**setting)
 
@@ -172,7 +169,7 @@ def _merged(columns: Sequence[_Column]) -> list[_Column]:
     shared = [(columns[group[0]][0], [columns[k][0] for k in group]) for group in groups.values()]
     differing = {n for first, some in shared for n, v in first.items() if any(q.get(n) != v for q in some)}
     idle = {n for n in differing if _idle(n, columns)}
-    out = []
+    out: list[_Column] = []
     for group in groups.values():
         setting, signature, solved, _ = columns[group[0]]
         told = {n: v for n, v in setting.items() if n not in idle}

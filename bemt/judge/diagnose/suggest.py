@@ -14,7 +14,7 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare.change_document import AIR_OF_BOTH, DAYS
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.assemble import assemble
-from bemt.judge.diagnose.confusion import ALIKE
+from bemt.judge.diagnose.form import ALIKE
 from bemt.judge.diagnose.nuisance import PRIORS
 from bemt.judge.diagnose.problem import Part, Problem
 from bemt.judge.diagnose.record import Record
@@ -104,7 +104,15 @@ class Suggestion:
     gain: float = 0.0  # Expected share of the doubt between the explanations that it takes away [1]
     otherwise: Suggestion | None = None  # What to do if there can be no such reference or run, or nothing to mend
 
-    def document(self) -> dict[str, Any]:
+    @property
+    def tells(self) -> str:
+        """What it separates and by how much, in words."""
+        if not self.separates:
+            return ""
+        both = f"{self.after:.1f} instead of {self.before:.1f}"
+        return f" (tells {' from '.join(self.separates)} at {both} standard deviations)"
+
+    def document(self) -> Mapping[str, object]:
         """Plain values for JSON."""
         return {"text": self.text, "points": [dict(p) for p in self.points], "separates": list(self.separates),
                 "distance_before": self.before, "distance_after": self.after, "kind": self.kind,
@@ -182,13 +190,15 @@ def _extended(part: Part, option: _Option) -> Problem:
     both = air_of_points({k: join([getattr(old.air, k), air[k]]) for k in air})
     plain = [e for e in part.baseline if not bem.acts_on_points(e)]
     flow = bem.flow_of(part.model.prepared(plain), rpm, V, both, extra, part.flow.chord)
-    ratio = {c: _relative(old.u[c], old.measured[c]) for c in old.u if c in old.measured}
     filled = {}
     for c, values in (("thrust_N", flow.T0), ("torque_Nm", flow.Q0)):
         if c in old.measured:
             filled[c] = join([old.measured[c], values[-option.rpm.size :]])
-    u = {c: join([old.u[c], np.abs(filled[c][-option.rpm.size :]) * (ratio[c] if np.isfinite(ratio[c]) else np.nan)])
-         for c in filled}  # fmt: skip
+    u = {}
+    for c, values in filled.items():  # the usual share of a reading that its uncertainty is; NaN where none is stated
+        share = old.u[c] / np.maximum(np.abs(old.measured[c]), 1e-12)
+        usual = np.median(share[known]) if (known := np.isfinite(share)).any() else np.nan
+        u[c] = join([old.u[c], np.abs(values[-option.rpm.size :]) * usual])
     record = Record(old.name, rpm, V, both, filled, u, extra, old.gain, old.zero, old.air_recorded)
     return assemble((replace(part, record=record, flow=flow, _solved={}),))
 
@@ -219,12 +229,6 @@ def _points(record: Record, option: _Option) -> tuple[dict[str, float], ...]:
         more = {new: float(option.extra[old][k]) * f for old, (new, f) in units.items() if old in option.extra}
         out.append({"rpm": float(option.rpm[k]), "airspeed_m_s": float(option.V[k]), **changed, **more})
     return tuple(out)
-
-
-def _relative(u: Array, y: Array) -> float:
-    """Usual share of a reading that its uncertainty is; NaN where none is stated."""
-    known = np.isfinite(u) & np.isfinite(y)
-    return float(np.median(u[known] / np.maximum(np.abs(y[known]), 1e-12))) if known.any() else float("nan")
 
 
 def nothing_called_for(found: Evidence, rivals: Sequence[Rival], unknown: float) -> Suggestion:
@@ -322,7 +326,7 @@ def suggest(found: Evidence, rivals: Sequence[Rival], unknown: float = 0.0, refe
     total = float(doubt.sum()) + of_unknown
 
     part = problem.parts[0]
-    now = _distances(assemble_alone(problem), effect, hyper)
+    now = _distances(problem if len(problem.parts) == 1 else assemble(problem.parts[:1]), effect, hyper)
     names = tuple(r.effect or "nothing" for r in rivals[:2])
     before = float(now[0, 1])
 
@@ -410,8 +414,3 @@ def _check(name: str, record: Record) -> str:
         share = PRIORS["thrust gain"]
         return f"hang dead weights on the cells before and after a run: the gain is then known to {share / 4:.2%}"
     return ""
-
-
-def assemble_alone(problem: Problem) -> Problem:
-    """Plan of the first recording alone."""
-    return problem if len(problem.parts) == 1 else assemble(problem.parts[:1])

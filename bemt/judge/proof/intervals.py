@@ -17,8 +17,8 @@ import numpy as np
 
 from bemt import __version__
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.diagnose.interval_scales import FILE, scale_of
-from bemt.judge.proof import seal
+from bemt.judge.diagnose.fit import FILE, scale_of
+from bemt.judge.proof import rows
 from bemt.judge.proof.rows import Entry, Estimate
 from bemt.judge.proof.score import VISIBLE, judge
 from bemt.physics import effects
@@ -40,7 +40,7 @@ class Off:
 
 def misses(folder: Path) -> tuple[dict[str, str], list[Off]]:
     """Open the key of a kept proof, answered with the factors in use; half-widths that each true parameter is off."""
-    key = seal.unseal(folder)
+    key = rows.unseal(folder)
     out = []
     for entry in key.items:
         told = _told(folder, entry)
@@ -56,7 +56,7 @@ def _told(folder: Path, entry: Entry) -> Mapping[str, Estimate]:
     """Parameters that the kept answer gives where it names the causes and the plan can see them."""
     if not entry.causes or entry.set == "unlisted" or min(entry.separation) < VISIBLE:
         return {}
-    answer = seal.stored(folder / "answers" / f"{entry.folder}.json").answer
+    answer = rows.stored(folder / "answers" / f"{entry.folder}.json").answer
     if not judge(entry, answer).right or set(answer.effects) != set(entry.causes):
         return {}
     listed = {frozenset(r.effect.split("+")): r.parameters for r in answer.ranking}
@@ -89,7 +89,7 @@ def calibrate(found: Sequence[Off], sets: Sequence[Mapping[str, Any]]) -> dict[s
     }  # fmt: skip
 
 
-def _factor(scores: Sequence[float]) -> dict[str, Any]:
+def _factor(scores: Sequence[float]) -> dict[str, float]:
     """Conformal quantile of the scores, their number, and the share that needed no factor.
 
     Between ranks: the next higher one holds 95 % where there are eighteen.

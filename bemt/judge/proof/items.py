@@ -6,18 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, applied
-from bemt.judge.proof.rigs import Rig, conditions, extended
+from bemt.judge.proof.causes import CAUSES, LISTED, Cause, Change, Rig, applied, conditions, extended
 from bemt.judge.proof.rows import Entry, TrueValue
-from bemt.judge.proof.separation import FREEDOM, Yardstick, freedom, yardstick
-from bemt.judge.proof.stand import StandErrors, full_scales, record
+from bemt.judge.proof.stand import FREEDOM, StandErrors, Yardstick, freedom, full_scales, record, yardstick
 from bemt.judge.proof.truth import TrueAnswer
-from bemt.judge.proof.truth_ccblade import EXPRESSIBLE
 from bemt.judge.proof.truth_section import SectionPhysics
-from bemt.judge.proof.truth_world import Conditions, TrueLoads, World, loads
+from bemt.judge.proof.truth_world import EXPRESSIBLE, Conditions, TrueLoads, World, loads
 
 _DIGITS = 6
 # Share of the items that state the uncertainty of their readings, and that come with a run without the cause.
@@ -184,57 +181,53 @@ def make_item(
 ) -> Item:  # fmt: skip
     """Measure a truth with concealed causes."""
     h = hidden(bench, ids, strengths, seed, kind)
-    causes, changes, world, stand, stated, referenced = h.causes, h.changes, h.world, h.stand, h.stated, h.referenced
-    own_world, own_stand, rng, more = h.own_world, h.own_stand, h.rng, h.more
-    real, columns = bench.measure(world, stand, rng)
+    causes, stand, rng = h.causes, h.stand, h.rng
+    real, columns = bench.measure(h.world, stand, rng)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
     if np.mean(good) < 0.8:
         raise ValueError(f"{bench.rig.name} {bench.plan} {ids}: the truth has no solution at most rows")
 
-    rows = bench.rows
     air_known = "air_density" not in ids and (bench.plan == "two_air" or bool(rng.random() < 0.5))
-    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
+    shown = _shown(bench, real, columns, stand, air_known, rng, h.stated)
     off = tuple(dict.fromkeys(e for c in causes for e in c.off))
     on = ("ground_effect",) if bench.plan == "wall" and "ground_effect" not in ids else ()
     files = {
         "recording.csv": recording_text({n: v[good] for n, v in shown.items()}),
-        "case.toml": case_text(
+        "case.toml": case_of(
             bench, [e for e in off if e in standard], [e for e in on if e in known], with_duct="duct" not in off
         ),
-        "stations.csv": stations_text(bench.rig),
+        "stations.csv": stations_text(bench.rig.rotor.r_R, bench.rig.rotor.c_R, np.degrees(bench.rig.rotor.beta)),
     }
-    kept = [(c, ch) for c, ch in zip(causes, changes, strict=True) if not c.removable]
-    for _, change in kept:
-        own_world, own_stand = applied(own_world, own_stand, change)
-    taken = [c for c in causes if c.removable]
-    reference = _reference(bench, taken, own_world, own_stand, air_known, more, stated)
-    if referenced and reference:
+    reference = _reference(bench, h, air_known)
+    if h.referenced and reference:
         files["reference.csv"] = reference
+    entry = Entry(
+        set=kind, causes=ids, kinds=tuple(c.kind for c in causes), strengths=strengths, plan=bench.plan,
+        rig=bench.rig.name, ducted=bench.rig.duct is not None, seed=seed, referenced="reference.csv" in files,
+        stated=h.stated, air_known=air_known, rows=int(np.count_nonzero(good)),
+        stand={k: v for k, v in vars(stand).items() if k in _QUALITY},
+    )  # fmt: skip
+    return Item(files, _judged(entry, bench, h), reference)
 
-    base = StandErrors(**{k: v for k, v in vars(stand).items() if k in _QUALITY})
-    signed = [bench.signature(ch, c) for ch, c in zip(changes, causes, strict=True)]
-    plain_loads, plain_columns = bench.measure(bench.plain(), StandErrors())
-    electric: dict[str, Array] = {
-        n: plain_columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in plain_columns
-    }
-    rule = yardstick(plain_loads, rows.run, base, bench.tangents(), electric)
-    parts = [_judge(rule, bench, cause, s) for cause, s in zip(causes, signed, strict=True)]
+
+def _judged(entry: Entry, bench: Bench, h: Hidden) -> Entry:
+    """Entry with the sizes of its causes and how well the plan can see them."""
+    signed = [bench.signature(ch, c) for ch, c in zip(h.changes, h.causes, strict=True)]
+    loads_, columns = bench.measure(bench.plain(), StandErrors())
+    electric: dict[str, Array] = {n: columns[n] for n in ("voltage_V", "current_A", "pwm_us") if n in columns}
+    rule = yardstick(loads_, bench.rows.run, StandErrors(**entry.stand), bench.tangents(), electric)
+    parts = [_judge(rule, bench, cause, s) for cause, s in zip(h.causes, signed, strict=True)]
     noise, whole, alike = zip(*parts, strict=True) if parts else ((), (), ())
     together = None
     if len(parts) > 1:  # how far the weaker of a pair stands out when the stronger may take what it can
         a, b = (rule.whole(rule.stack(s)) for s in signed)
         together = _across(a, b), _across(b, a)
     true = {c.id: {n: TrueValue(v, u) for n, (v, u) in ch.parameters.items()}
-            for c, ch in zip(causes, changes, strict=True)}  # fmt: skip
-    entry = Entry(
-        set=kind, causes=ids, kinds=tuple(c.kind for c in causes), strengths=strengths, parameters=true,
-        separation=whole, separation_noise=noise, alike=alike,
-        variables=tuple(_varied(c.variables, rows) for c in causes), plan=bench.plan, rig=bench.rig.name,
-        ducted=bench.rig.duct is not None, seed=seed, referenced="reference.csv" in files, stated=stated,
-        air_known=air_known, rows=int(np.count_nonzero(good)),
-        stand={k: v for k, v in vars(stand).items() if k in _QUALITY}, separation_together=together,
+            for c, ch in zip(h.causes, h.changes, strict=True)}  # fmt: skip
+    return replace(
+        entry, parameters=true, separation=whole, separation_noise=noise, alike=alike, separation_together=together,
+        variables=tuple(_varied(c.variables, bench.rows) for c in h.causes),
     )  # fmt: skip
-    return Item(files, entry, reference)
 
 
 def _shown(
@@ -297,19 +290,17 @@ def _measured_again(
     return recording_text({n: v[good] for n, v in shown.items()}) if np.count_nonzero(good) > 1 else ""
 
 
-def _reference(
-    bench: Bench, causes: Sequence[Cause], world: World, stand: StandErrors, air_known: bool, rng: np.random.Generator,
-    stated: bool,
-) -> str:  # fmt: skip
-    """The same rotor at the same points on another day, without some causes; "" where it has no solution."""
-    for cause in causes:
-        world, stand = applied(world, stand, cause.without)
-        if cause.id == "ground_effect":
-            world = replace(world, ground=0.0)
-    ducted = all(c.without.ducted is not False for c in causes)
-    real, columns = bench.measure(world, stand, rng, ducted=ducted)
+def _reference(bench: Bench, h: Hidden, air_known: bool) -> str:
+    """The same rotor at the same points on another day, without what can be taken away; "" where it has no solution."""
+    world, stand, ducted = h.own_world, h.own_stand, True
+    for cause, change in sorted(zip(h.causes, h.changes, strict=True), key=lambda pair: pair[0].removable):
+        world, stand = applied(world, stand, cause.without if cause.removable else change)
+        if cause.removable:
+            world = replace(world, ground=0.0) if cause.id == "ground_effect" else world
+            ducted = ducted and cause.without.ducted is not False
+    real, columns = bench.measure(world, stand, h.more, ducted=ducted)
     good = np.isfinite(columns["thrust_N"]) & np.isfinite(columns["torque_Nm"])
-    shown = _shown(bench, real, columns, stand, air_known, rng, stated)
+    shown = _shown(bench, real, columns, stand, air_known, h.more, h.stated)
     return recording_text({n: v[good] for n, v in shown.items()}) if np.mean(good) >= 0.8 else ""
 
 
@@ -344,58 +335,52 @@ def recording_text(columns: Mapping[str, Array]) -> str:
     return "\n".join([*head[1:], *(",".join(row) for row in body)]) + "\n"
 
 
-def stations_text(rig: Rig) -> str:
+def stations_text(r_R: ArrayLike, c_R: ArrayLike, beta_deg: ArrayLike) -> str:
     """Stations of a blade as CSV."""
-    rows = zip(rig.rotor.r_R, rig.rotor.c_R, np.degrees(rig.rotor.beta), strict=True)
+    rows = np.column_stack([r_R, c_R, beta_deg]).tolist()
     return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
 
 
-def case_text(bench: Bench, off: Collection[str], on: Collection[str], with_duct: bool = True) -> str:
+Cell = str | float | list[str] | tuple[float, str]
+"""Value of a case: words, a number, effects, or a number with its format."""
+
+
+def case_text(name: str, tables: Mapping[str, Mapping[str, Cell]], form: str = ".7g") -> str:
+    """Case file."""
+
+    def shown(v: Cell) -> str:
+        if isinstance(v, list):
+            return f"[{', '.join(map(shown, v))}]"
+        return f'"{v}"' if isinstance(v, str) else f"{v[0]:{v[1]}}" if isinstance(v, tuple) else f"{v:{form}}"
+
+    lines = ['schema = "bemt.case/1"', f'name = "{name}"']
+    for head, rows in tables.items():
+        lines += ["", f"[{head}]", *(f"{k} = {shown(v)}" for k, v in rows.items())]
+    return "\n".join(lines) + "\n"
+
+
+def case_of(bench: Bench, off: Sequence[str], on: Sequence[str], with_duct: bool = True) -> str:
     """Case file of a rig: its geometry, its laboratory's air, and what the baseline leaves out."""
     rig, rows = bench.rig, bench.rows
     rotor, section = rig.rotor, rig.rotor.section
     duct = rig.duct if with_duct else None
-    lines = [
-        'schema = "bemt.case/1"',
-        f'name = "{rig.name}"',
-        "",
-        "[rotor]",
-        f'kind = "{"fan" if duct is not None else "propeller"}"',
-        f"blades = {rotor.blades}",
-        f"diameter_mm = {2e3 * rotor.radius:.4f}",
-        f"hub_ratio = {rotor.hub:g}",
-        "",
-        "[blade]",
-        'stations = "stations.csv"',
-        "",
-        "[blade.section]",
-        f"camber = {section.camber:.5f}",
-        f"camber_position = {section.position:g}",
-        f"thickness = {section.thickness:.5f}",
-        "",
-        "[operating]",
-        f"rpm = {float(np.median(rows.rpm)):.1f}",
-        "airspeed_m_s = 0",
-        "",
-        "[air]",
-        f"pressure_hPa = {float(np.max(rows.pressure_Pa)) / 100.0:.2f}",
-        f"temperature_C = {float(np.median(rows.temperature_C)):.2f}",
-        "",
-        "[model]",
-        "stations = 30",
-        f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]",
-        f"effects_on = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in on)}]",
-    ]
+    tables: dict[str, dict[str, Cell]] = {
+        "rotor": {"kind": "fan" if duct is not None else "propeller", "blades": rotor.blades,
+                  "diameter_mm": (2e3 * rotor.radius, ".4f"), "hub_ratio": (rotor.hub, "g")},
+        "blade": {"stations": "stations.csv"},
+        "blade.section": {"camber": (section.camber, ".5f"), "camber_position": (section.position, "g"),
+                          "thickness": (section.thickness, ".5f")},
+        "operating": {"rpm": (float(np.median(rows.rpm)), ".1f"), "airspeed_m_s": 0},
+        "air": {"pressure_hPa": (float(np.max(rows.pressure_Pa)) / 100.0, ".2f"),
+                "temperature_C": (float(np.median(rows.temperature_C)), ".2f")},
+        "model": {"stations": 30, "effects_off": [*off], "effects_on": [*on]},
+    }  # fmt: skip
     if duct is not None:
         R = rotor.radius * 1e3
         gap = float(np.nanmax(rows.gap)) * 1e3 if np.any(np.isfinite(rows.gap)) else duct.gap * R
-        lines += [
-            "",
-            "[duct]",
-            f"tip_gap_mm = {gap:.4f}",
-            f"length_mm = {duct.length * R:.3f}",
-            f"lip_radius_mm = {duct.lip_radius * R:.3f}",
-            f"rotor_position_mm = {duct.position * R:.3f}",
-            f"exit_area_ratio = {duct.exit_ratio:.5f}",
-        ]
-    return "\n".join(lines) + "\n"
+        tables["duct"] = {
+            "tip_gap_mm": (gap, ".4f"), "length_mm": (duct.length * R, ".3f"),
+            "lip_radius_mm": (duct.lip_radius * R, ".3f"), "rotor_position_mm": (duct.position * R, ".3f"),
+            "exit_area_ratio": (duct.exit_ratio, ".5f"),
+        }  # fmt: skip
+    return case_text(rig.name, tables)

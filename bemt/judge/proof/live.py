@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from bemt.judge.proof.causes import applied
+from bemt.judge.proof.causes import applied, extended
 from bemt.judge.proof.items import Bench, Hidden, hidden
-from bemt.judge.proof.rigs import extended
 from bemt.judge.proof.rows import Entry
 from bemt.judge.proof.stand import full_scales, record
 from bemt.judge.proof.truth_world import Conditions, TrueLoads, loads

@@ -16,93 +16,33 @@ was. Its answers stand each for itself.
 from __future__ import annotations
 
 import json
-import math
 import shlex
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from itertools import count, pairwise, product
+from itertools import count, pairwise
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from bemt.base.document import Documented
-from bemt.base.tables import json_text, text_table, write_atomic
+from bemt.base.tables import json_text, write_atomic
 from bemt.judge.diagnose.suggest import minutes
-from bemt.judge.proof import draw, prove, score, seal
-from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof import prove, rows, score
+from bemt.judge.proof.causes import CAUSES, Rig
+from bemt.judge.proof.follow import DONE, MODEL, Course, Loop, scored
 from bemt.judge.proof.items import Bench, further_run, recorded_again
-from bemt.judge.proof.rigs import Rig
 from bemt.judge.proof.rows import Entry, Step, ToldAnswer
 from bemt.physics import effects
 
-SCHEMA = "bemt.loop/1"
 _SETS = ("single", "sensor", "pair", "null", "mismatch", "unlisted")
-_DONE = ("named", "sensor")
 _NEW, _REFERENCE, _CASE = "new_run.csv", "reference.csv", "case.toml"
 _FIXED_POINTS = 6
 A_RUN = 0.1
 """Cost of a run, in units of an "insufficient": ten of them are worth one answer; declared."""
-_MODEL = "model"
 # Effects of the air that somebody at the stand sets wrong, and right again: barometer, blade angle and alignment.
 _SET_UP = ("air_density", "pitch_offset", "oblique_inflow")
-
-
-@dataclass(frozen=True)
-class Course:
-    """How one item went."""
-
-    folder: str  # Item
-    answers: list[ToldAnswer]  # First answer, then one after each step
-    # What each step was: ``reference``, ``run``, ``look``, ``mend`` (recorded once more without what was named) or
-    # ``model`` (into the case, no run)
-    steps: list[str] = field(default_factory=list)
-    minutes: list[float] = field(default_factory=list)  # Time of the stand for each step. [min]
-    aside: list[list[str]] = field(default_factory=list)  # Causes that each step put aside
-    # Why it ended: "none" is left to find, "named" and nothing to be done about it, "named again", a kind of step that
-    # the loop cannot take, "no run", "used up", "failed"
-    end: str = ""
-
-    @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Course:
-        """Course that was kept."""
-        return cls(**{**document, "answers": [ToldAnswer.from_document(a) for a in document["answers"]]})
-
-    def document(self) -> dict[str, Any]:
-        """The course to be kept."""
-        return {**vars(self), "answers": [a.document() for a in self.answers]}
-
-    def after(self, runs: int) -> int:
-        """Place of the last answer that so many runs gave."""
-        used = np.cumsum([0, *(step != _MODEL for step in self.steps)])
-        return int(np.count_nonzero(used[: len(self.answers)] <= runs)) - 1
-
-
-class After(Documented):
-    """What was found after so many runs, each of how many, and the time of the stand [min]."""
-
-    runs: int
-    found: tuple[int, int]
-    found_or_class: tuple[int, int]
-    pairs_named: tuple[int, int]
-    pairs: tuple[int, int]
-    right_when_claimed: tuple[int, int]
-    nulls_accused: tuple[int, int]
-    unlisted_named: tuple[int, int]
-    minutes: float
-
-
-class Loop(Documented):
-    """Document of a loop."""
-
-    schema: str
-    programme: str
-    items: int
-    after: tuple[After, ...]
-    ends: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -257,7 +197,7 @@ class _Item:
 def _recommended(item: _Item, answer: ToldAnswer) -> _Taken | str:
     """Take the step that follows from an answer; else say why there is none."""
     step = answer.step
-    if answer.verdict in _DONE:
+    if answer.verdict in DONE:
         return _put_aside(item, answer.effects, answer.confirmed)
     if step.kind == "look" and not step.checks:  # of a class, the fault that is sure is to be put right
         return _put_aside(item, [s[0] for s in answer.sets if len(s) == 1 and _at_the_stand(s[0])], False)
@@ -281,7 +221,7 @@ def _put_aside(item: _Item, names: Sequence[str], by_check: bool) -> _Taken | st
         return "named"
     item.aside += new
     if not faults:
-        return _Taken(_MODEL, 0.0, words, new)
+        return _Taken(MODEL, 0.0, words, new)
     points = item.mend(faults)
     if not points:
         return "no run"
@@ -388,14 +328,15 @@ def follow(
         last = course.answers[-1]
         if wanted is not None and number == runs:
             return replace(course, end="used up")
-        if wanted is None and last.verdict == "none" and _expected(last) < enough:
+        loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict)
+        if wanted is None and last.verdict == "none" and isinstance(loss, int | float) and loss < enough:
             return replace(course, end="none")
         taken = _recommended(item, last) if wanted is None else _fixed(item, number, wanted)
         if isinstance(taken, str):
             if wanted is not None and number < 2:  # no reference can be had: the next run of the programme
                 continue
             return replace(course, end=taken)
-        item.left -= taken.kind != _MODEL
+        item.left -= taken.kind != MODEL
         course.steps.append(taken.kind)
         course.minutes.append(taken.minutes)
         course.aside.append(taken.aside)
@@ -413,12 +354,6 @@ def follow(
     raise AssertionError("a course has an end")
 
 
-def _expected(answer: ToldAnswer) -> float:
-    """Expected loss of what was said. [one "insufficient"]"""
-    value = dict(answer.whole.get("expected_loss") or {}).get(answer.verdict)
-    return float(value) if isinstance(value, int | float) else math.inf
-
-
 def loop(
     out: Path, runs: int = 3, jobs: int = 2, fixed: bool = False, say: Callable[[str], None] | None = None,
     hands: Hands | None = None,
@@ -427,14 +362,13 @@ def loop(
 
     With ``hands`` everything is measured by these, in ``loop_wired``; the loop then ends where a run is not worth it.
     """
-    key = seal.unseal(out)
+    key = rows.unseal(out)
     kept = out / "_".join(["loop", *(["fixed"] if fixed else []), *(["wired"] if hands else [])])
     kept.mkdir(exist_ok=True)
-    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
+    benches = prove.benches_of(key)
     todo = []
     for entry in sorted(key.items, key=_rank):
-        answer = seal.stored(out / "answers" / f"{entry.folder}.json").answer
+        answer = rows.stored(out / "answers" / f"{entry.folder}.json").answer
         if entry.set in _SETS and answer:
             todo.append((entry, answer))
 
@@ -443,7 +377,7 @@ def loop(
         file = kept / f"{entry.folder}.json"
         if file.exists():
             return Course.of(json.loads(file.read_text("utf-8")))
-        bench = found[entry.rig, entry.plan]
+        bench = benches[entry.rig, entry.plan]
         mine = Bench(bench.rig, bench.plan, bench.rows)
         if hands is None:
             course = _course(out, entry, mine, answer, runs, fixed)
@@ -453,16 +387,11 @@ def loop(
         write_atomic(file, json.dumps(course.document()))
         return course
 
-    courses: list[Course] = []
-    with ThreadPoolExecutor(jobs) as pool:
-        for k, course in enumerate(pool.map(one, todo), 1):
-            courses.append(course)
-            if say:
-                say(f"followed {k}/{len(todo)}")
-    scored = _scored([e for e, _ in todo], courses, runs, fixed)
-    write_atomic(out / f"{kept.name}.json", json_text(scored.document()))
-    write_atomic(out / f"{kept.name}.txt", text(scored) + "\n")
-    return scored
+    courses = prove.on_threads(one, todo, jobs, prove.teller("followed", say))
+    found = scored([e for e, _ in todo], courses, runs, fixed)
+    write_atomic(out / f"{kept.name}.json", json_text(found.document()))
+    write_atomic(out / f"{kept.name}.txt", found.text + "\n")
+    return found
 
 
 def _rank(entry: Entry) -> int:
@@ -470,88 +399,3 @@ def _rank(entry: Entry) -> int:
     if not entry.causes or entry.set == "unlisted":
         return 1
     return (0 if entry.set == "pair" else 1) if score.judge(entry, ToldAnswer()).separation >= score.VISIBLE else 2
-
-
-def _named(entry: Entry, course: Course, at: int) -> list[str]:
-    """What a course has named up to an answer; of names for one cause, which the plan cannot tell apart, one."""
-    last = course.answers[at]
-    said = [*(n for some in course.aside[:at] for n in some), *(last.effects if last.verdict in _DONE else ())]
-    names = list(dict.fromkeys(said))
-    allowed = entry.allowed
-    if not all(any(n in a for a in allowed) for n in names):
-        return names
-    of_each = [[n for n in names if n in a] or [""] for a in allowed]
-    return max((list(filter(None, dict.fromkeys(some))) for some in product(*of_each)), key=len)
-
-
-def judge(entry: Entry, course: Course, runs: int) -> tuple[score.Judged, bool]:
-    """Judge what a course has said after so many runs, and whether what it named is what is at work.
-
-    Everything that was named counts, and so does the class of the last answer: where nothing is left to find, that is a
-    wrong claim, but what was named before stays found.
-    """
-    at = course.after(runs)
-    last, names = course.answers[at], _named(entry, course, at)
-    if not names:
-        return score.judge(entry, last), False
-    sets = tuple((n,) for n in names)
-    named = score.judge(entry, replace(last, verdict="named", effects=tuple(names), sets=sets))
-    # a class with what was put aside in it asks for no second cause
-    if last.verdict != "class" or set(names) & set(last.effects):
-        return named, named.right
-    there = {c for c, allowed in zip(entry.causes, entry.allowed, strict=True) if not allowed & set(names)}
-    right = bool(there & set(last.effects)) and set().union(*entry.allowed) >= set(names)
-    said = replace(last, effects=(*names, *last.effects), sets=(*sets, last.effects))
-    return replace(named, right=right, answer=said), named.right
-
-
-def _scored(entries: Sequence[Entry], courses: Sequence[Course], runs: int, fixed: bool) -> Loop:
-    """What was found after each number of runs, and what it cost."""
-    after = []
-    for k in range(runs + 1):
-        pairs_of = [judge(e, c, k) for e, c in zip(entries, courses, strict=True)]
-        judged = [j for j, _ in pairs_of]
-        visible = [(j, exact) for j, exact in pairs_of if j.entry.set in ("single", "sensor") and j.visible]
-        pairs = [(j, exact) for j, exact in pairs_of if j.entry.set == "pair" and j.visible]
-        nothing = [j for j in judged if j.entry.set in ("null", "mismatch")]
-        caused = [j for j in judged if j.entry.causes and j.entry.set != "unlisted" and j.claims]
-        spent = [sum(c.minutes[: c.after(k)]) for e, c in zip(entries, courses, strict=True) if e.causes]
-        after.append(After(
-            runs=k,
-            found=_count(exact for _, exact in visible),
-            found_or_class=_count(exact or j.right for j, exact in visible),
-            pairs_named=_count(exact for _, exact in pairs),
-            pairs=_count(exact or score.in_sets(j) for j, exact in pairs),
-            right_when_claimed=_count(j.right for j in caused),
-            nulls_accused=_count(j.claims for j in nothing),
-            unlisted_named=_count(j.claims for j in judged if j.entry.set == "unlisted"),
-            minutes=float(np.mean(spent)) if spent else math.nan,
-        ))  # fmt: skip
-    ends: dict[str, int] = {}
-    for c in courses:
-        ends[c.end] = ends.get(c.end, 0) + 1
-    programme = "fixed" if fixed else "recommended"
-    return Loop(SCHEMA, programme, len(courses), tuple(after), dict(sorted(ends.items())))
-
-
-def _count(flags: Iterable[bool]) -> tuple[int, int]:
-    values = [bool(f) for f in flags]
-    return sum(values), len(values)
-
-
-def text(found: Loop) -> str:
-    """Table of a loop."""
-
-    def share(pair: Sequence[int]) -> str:
-        return f"{pair[0]}/{pair[1]} ({100 * pair[0] / pair[1]:.0f} %)" if pair[1] else "-"
-
-    rows = [[str(a.runs), *map(share, (a.found, a.found_or_class, a.pairs_named, a.pairs, a.right_when_claimed,
-             a.nulls_accused, a.unlisted_named)), f"{a.minutes:.0f}"] for a in found.after]  # fmt: skip
-    header = ["runs", "named", "named or in class", "pairs named", "pairs in sets", "right when it claims",
-              "nulls accused", "unlisted named", "stand [min]"]  # fmt: skip
-    title = {"fixed": "the fixed programme: a reference, a sweep at rest, a sweep in wind",
-             "recommended": "the step that follows from each answer"}[found.programme]  # fmt: skip
-    ends = ", ".join(f"{k} {n}" for k, n in found.ends.items())
-    return "\n".join([
-        f"{found.items} items, {title}", text_table(header, rows, left=(), indent="  "), f"  ended by: {ends}",
-    ])  # fmt: skip

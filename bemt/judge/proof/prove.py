@@ -1,4 +1,4 @@
-"""Conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
+"""Draw and conceal causes, seal the key, let the diagnosis run on its own, open the key, score."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,18 +23,182 @@ from bemt import __version__
 from bemt.base.checkout import commit
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import json_text, write_atomic
-from bemt.judge.proof import draw, items, proof_text, real, score, seal
-from bemt.judge.proof.causes import CAUSES
-from bemt.judge.proof.items import Bench
-from bemt.judge.proof.rigs import extended
-from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ToldAnswer
-from bemt.judge.proof.separation import yardstick
-from bemt.judge.proof.stand import StandErrors
+from bemt.judge.proof import causes, real, rows, score
+from bemt.judge.proof.causes import CAUSES, LISTED, UNLISTED, extended
+from bemt.judge.proof.items import Bench, Item, make_item
+from bemt.judge.proof.rows import Entry, Key, Miss, Proof, ScoreRow, ToldAnswer
+from bemt.judge.proof.stand import StandErrors, yardstick
 
-__all__ = [
-    "SCHEMA", "asked", "conceal", "diagnose_all", "diagnose_folder", "on_threads", "proof", "prove", "question",
-    "teller",
-]  # fmt: skip
+_STRENGTHS = (0.5, 1.0, 1.7)
+_PHYSICAL = ("reynolds", "compressibility", "drag_divergence", "stall_delay", "duct", "tip_gap", "ground_effect")
+_GRIDS = ("grid_shuffled", "grid_ordered", "two_air")
+
+
+@dataclass(frozen=True)
+class ProofSize:
+    """Counts of a run of the proof."""
+
+    # Items of each set; a null is noise only, a mismatch the difference of truth and solver only. [-]
+    items: dict[str, int]
+    plans: tuple[tuple[bool, tuple[str, ...]], ...]  # Rigs: whether ducted, and plans. [-]
+    code: str = "vortex"  # Code of the truth
+
+
+_OPEN, _DUCTED, _POOR = causes.OPEN_PLANS, causes.DUCTED_PLANS, causes.UNDERPOWERED
+SIZES = {
+    "small": ProofSize(
+        {"single": 16, "pair": 3, "null": 5, "mismatch": 3, "unlisted": 5, "sensor": 6, "underpowered": 3},
+        (
+            (False, ("grid_shuffled", "endurance", "static_sweep", "static_narrow")),
+            (False, ("two_air", "wall", "transient", "single_line")),
+            (True, ("grid_shuffled", "gap")),
+        ),
+    ),
+    "full": ProofSize(
+        {"single": 240, "pair": 60, "null": 70, "mismatch": 35, "unlisted": 80, "sensor": 80, "underpowered": 40},
+        (*((False, (*_OPEN, *_POOR)),) * 6, *((True, (*_DUCTED, "static_narrow")),) * 4),
+    ),
+    "stand": ProofSize(  # what a pulse width can do: settled points, no endurance
+        {"single": 20, "pair": 10, "null": 8, "mismatch": 0, "unlisted": 10, "sensor": 12, "underpowered": 0},
+        (
+            *((False, ("static_sweep", "grid_shuffled", "grid_ordered", "wall")),) * 4,
+            *((True, ("static_sweep", "grid_shuffled", "gap")),) * 3,
+        ),
+    ),
+    "ccblade": ProofSize(
+        {"single": 30, "pair": 6, "null": 10, "mismatch": 4, "unlisted": 6, "sensor": 12, "underpowered": 0},
+        ((False, _GRIDS),) * 3,
+        "ccblade",
+    ),
+}
+"""Runs of the proof by name."""
+
+
+def benches(size: ProofSize, seeds: np.random.SeedSequence) -> list[Bench]:
+    """Draw rigs and their plans."""
+    out = []
+    for k, ((ducted, plans), seed) in enumerate(zip(size.plans, seeds.spawn(len(size.plans)), strict=True)):
+        rng = np.random.default_rng(seed)
+        rig = causes.draw_rig(f"{'ducted' if ducted else 'open'}_{k}", ducted, rng, size.code)
+        out += [Bench.draw(rig, plan, rng) for plan in plans]
+    return out
+
+
+def benches_of(key: Key) -> dict[tuple[str, str], Bench]:
+    """Benches of a sealed key by rig and plan."""
+    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
+    return {(b.rig.name, b.plan): b for b in benches(SIZES[key.size], first)}
+
+
+def _pick(
+    found: list[Bench], ids: Collection[str], rng: np.random.Generator, plans: Collection[str] = ()
+) -> Bench | None:
+    fit = [b for b in found if (not plans or b.plan in plans) and set(ids) <= {c.id for c in b.allowed()}]
+    return fit[int(rng.integers(len(fit)))] if fit else None
+
+
+def _strength(name: str, k: int, rng: np.random.Generator) -> float:
+    """Three strengths, each a little off; what is real everywhere cannot be much stronger or weaker."""
+    f = _STRENGTHS[k % 3] * float(rng.uniform(0.85, 1.15))
+    return float(f**0.35) if name in _PHYSICAL else f
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One item that was drawn and not yet measured: its bench by number, and what :func:`make_item` takes."""
+
+    bench: int
+    ids: tuple[str, ...]
+    strengths: tuple[float, ...]
+    seed: int
+    kind: str
+
+
+def draw_items(
+    size: ProofSize, seed: int, known: Collection[str], standard: Collection[str],
+    tell: Callable[[int, int], None] = lambda i, n: None, jobs: int = 1,
+) -> Iterator[Item]:  # fmt: skip
+    """Draw and measure all items of a run, in mixed order; the same items whatever the number of processes."""
+    found, drawn = _drawn(size, seed)
+    # a bench keeps what it has solved, so all its items are made in one place
+    mine = {b: [k for k, d in enumerate(drawn) if d.bench == b] for b in sorted({d.bench for d in drawn})}
+    work = [(found[b], [drawn[k] for k in ks], known, standard) for b, ks in mine.items()]
+    made: list[Item | None] = [None] * len(drawn)
+    done = 0
+    for ks, of_bench in zip(mine.values(), _measured(work, jobs), strict=True):
+        for k, item in zip(ks, of_bench, strict=True):
+            made[k] = item
+        done += len(ks)
+        tell(done, len(drawn))
+    yield from (item for item in made if item is not None)
+
+
+def _measured(work: Sequence[tuple[Any, ...]], jobs: int) -> Iterator[list[Item]]:
+    """Items of every bench, in order."""
+    if jobs == 1:
+        yield from map(_of_bench, work)
+        return
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(_of_bench, work)
+
+
+def _of_bench(work: tuple[Bench, list[Drawn], Collection[str], Collection[str]]) -> list[Item]:
+    bench, drawn, known, standard = work
+    return [make_item(bench, d.ids, d.strengths, d.seed, d.kind, known, standard) for d in drawn]
+
+
+def _pair(found: list[Bench], rng: np.random.Generator) -> tuple[Bench, tuple[str, ...]]:
+    """Two causes at once, of which one is of the air."""
+    while True:
+        bench = _pick(found, (), rng, _GRIDS)
+        assert bench is not None
+        able = [c.id for c in bench.allowed() if c.kind != "unlisted" and c.id != "unit_slip"]
+        ids = tuple(str(i) for i in rng.choice(able, 2, replace=False))
+        if any(CAUSES[i].kind == "air" for i in ids):
+            return bench, ids
+
+
+def _drawn(size: ProofSize, seed: int) -> tuple[list[Bench], list[Drawn]]:
+    """Benches, and all items in mixed order."""
+    first, second = np.random.SeedSequence(seed).spawn(2)
+    found = benches(size, first)
+    rng = np.random.default_rng(second)
+    jobs: list[tuple[str, tuple[str, ...], tuple[float, ...], Bench]] = []
+
+    def cycle(pool: list[str], kind: str, plans: Collection[str] = ()) -> None:
+        """Every cause in turn at every strength, as long as some bench allows it."""
+        able = [i for i in pool if _pick(found, (i,), rng, plans)]
+        turn = [(i, k) for k in rng.permutation(3) for i in rng.permutation(able)]
+        for j in range(size.items[kind]):
+            name, k = turn[j % len(turn)]
+            bench = _pick(found, (name,), rng, plans)
+            assert bench is not None
+            jobs.append((kind, (str(name),), (_strength(str(name), int(k), rng),), bench))
+
+    good = [p for p in (*_OPEN, *_DUCTED) if p not in _POOR]
+    air = [i for i in LISTED if CAUSES[i].kind in ("air", "drive")]
+    cycle(air, "single", good)
+    cycle([i for i in LISTED if CAUSES[i].kind == "stand"], "sensor", good)
+    cycle(list(UNLISTED), "unlisted", good)
+    cycle(air, "underpowered", _POOR)
+    for _ in range(size.items["pair"]):
+        bench, ids = _pair(found, rng)
+        jobs.append(("pair", ids, tuple(_strength(i, int(rng.integers(1, 3)), rng) for i in ids), bench))
+    for kind in ("null", "mismatch"):
+        for _ in range(size.items[kind]):
+            plain = _pick(found, (), rng, good)
+            assert plain is not None
+            jobs.append((kind, (), (), plain))
+    number = {id(bench): k for k, bench in enumerate(found)}
+    drawn = []
+    for at in rng.permutation(len(jobs)):
+        kind, ids, strengths, bench = jobs[int(at)]
+        drawn.append(Drawn(number[id(bench)], ids, strengths, int(rng.integers(2**62)), kind))
+    return found, drawn
+
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -55,14 +219,14 @@ def conceal(
     """Draw and write all items, and the sealed key."""
     from bemt.physics import effects
 
-    if (out / "items").exists() or (out / seal.KEY).exists():
+    if (out / "items").exists() or (out / rows.KEY).exists():
         raise InputError(Fault(out.as_posix(), "", "a proof", "a folder without one", "Choose another --out"))
     known = set(effects.catalogue())
     standard = {e.id for e in effects.standard()}
     entries = []
-    drawn: Iterable[items.Item] = (
+    drawn: Iterable[Item] = (
         real.draw_real(np.random.default_rng(seed)) if size == REAL
-        else draw.draw_items(draw.SIZES[size], seed, known, standard, teller("concealed", say), jobs)
+        else draw_items(SIZES[size], seed, known, standard, teller("concealed", say), jobs)
     )  # fmt: skip
     for k, item in enumerate(drawn):
         name = f"{k:04d}"
@@ -74,9 +238,9 @@ def conceal(
             (out / ASKED / name).mkdir(parents=True)
             for file, text in {**item.files, "reference.csv": item.reference}.items():
                 write_atomic(out / ASKED / name / file, text)
-        hashes = {file: seal.sha256(text) for file, text in item.files.items()}
+        hashes = {file: rows.sha256(text) for file, text in item.files.items()}
         entries.append(replace(item.entry, folder=name, files=hashes))
-    return seal.seal(out, Key(KEY_SCHEMA, __version__, str(seed), size, tuple(entries)))
+    return rows.seal(out, Key(KEY_SCHEMA, __version__, str(seed), size, tuple(entries)))
 
 
 def teller(what: str, say: Callable[[str], None] | None) -> Callable[[int, int], None]:
@@ -135,7 +299,7 @@ def diagnose_all(out: Path, jobs: int, say: Callable[[str], None] | None = None)
     Answers go to ``answers/<folder>.json`` and ``answers_with_reference/<folder>.json``.
     """
     _diagnose_folders(sorted((out / "items").iterdir()), out / "answers", jobs, teller("diagnosed", say))
-    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(seal.stored(out / "answers" / f"{f.name}.json").answer)]
+    asked = [f for f in sorted((out / ASKED).glob("*")) if asks(rows.stored(out / "answers" / f"{f.name}.json").answer)]
     _diagnose_folders(asked, out / f"answers_{ASKED}", jobs, teller("reference given", say))
 
 
@@ -162,38 +326,38 @@ def _diagnose_folders(folders: Sequence[Path], answers: Path, jobs: int, tell: C
 
 def proof(out: Path, digest: str | None = None) -> Proof:
     """Open the key and score the answers."""
-    key = seal.unseal(out, digest)
-    judged, again, seconds, errors = [], [], [], {}
-    settled: list[bool] = []
+    key = rows.unseal(out, digest)
     made = key.size != REAL
-    first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)} if made else {}
-    for entry in key.items:
-        stored = seal.stored(out / "answers" / f"{entry.folder}.json")
-        judged.append(score.judge(entry, stored.answer))
-        if made and asks(stored.answer) and (out / ASKED / entry.folder).exists():
-            again.append(score.judge(entry, seal.stored(out / f"answers_{ASKED}" / f"{entry.folder}.json").answer))
-        if made and stored.answer:
-            settles = resolves(found[entry.rig, entry.plan], entry, stored.answer)
-            settled += [] if settles is None else [settles]
-        seconds.append(stored.seconds)
-        if not stored.answer:
-            errors[entry.folder] = stored.error
-    misses = tuple(
-        Miss(j.entry.folder, j.entry.set, j.entry.causes, j.entry.plan, j.entry.rig, j.separation, j.entry.alike,
-             j.said, j.answer.verdict or None, j.answer.effects,
-             tuple((r.effect, r.probability) for r in j.answer.ranking[:4]), errors.get(j.entry.folder, ""))
-        for j in judged if not j.right and (j.claims or j.visible or not j.answer)
-    )  # fmt: skip
-    rows = score.score(judged, settled, again) if made else score.score_real(judged)
+    stored = {e.folder: rows.stored(out / "answers" / f"{e.folder}.json") for e in key.items}
+    judged = [score.judge(e, stored[e.folder].answer) for e in key.items]
+    seconds = sorted(one.seconds for one in stored.values())
+    misses = tuple(_miss(j, stored[j.entry.folder].error) for j in judged
+                   if not j.right and (j.claims or j.visible or not j.answer))  # fmt: skip
+    scored = _scored(out, key, judged) if made else score.score_real(judged)
     return Proof(
         SCHEMA, __version__, key.size, key.seed, _commit(),
-        digest or (out / seal.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(rows),
+        digest or (out / rows.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(scored),
         baselines=tuple(score.baselines(judged)) if made else (), strata=tuple(score.strata(judged)) if made else (),
         risk_coverage=tuple(score.risk_coverage(judged)), confusion=score.confusion(judged),
         answers={} if made else score.answers(judged), misses=misses,
-        seconds_median=sorted(seconds)[len(seconds) // 2] if seconds else math.nan,
+        seconds_median=seconds[len(seconds) // 2] if seconds else math.nan,
     )  # fmt: skip
+
+
+def _scored(out: Path, key: Key, judged: Sequence[score.Judged]) -> list[ScoreRow]:
+    """Score of generated items, with the runs that answers recommend and the references that they ask for."""
+    found = benches_of(key)
+    settles = [resolves(found[j.entry.rig, j.entry.plan], j.entry, j.answer) for j in judged if j.answer]
+    again = [score.judge(j.entry, rows.stored(out / f"answers_{ASKED}" / f"{j.entry.folder}.json").answer)
+             for j in judged if asks(j.answer) and (out / ASKED / j.entry.folder).exists()]  # fmt: skip
+    return score.score(judged, [one for one in settles if one is not None], again)
+
+
+def _miss(j: score.Judged, error: str) -> Miss:
+    e, a = j.entry, j.answer
+    ranking = tuple((r.effect, r.probability) for r in a.ranking[:4])
+    return Miss(e.folder, e.set, e.causes, e.plan, e.rig, j.separation, e.alike, j.said, a.verdict or None, a.effects,
+                ranking, "" if a else error)  # fmt: skip
 
 
 def _commit() -> str:
@@ -221,9 +385,9 @@ def prove(
     with tempfile.TemporaryDirectory(prefix="bemt-proof-") as spare:
         folder = Path(out) if out else Path(spare)
         began = time.monotonic()
-        if seed is None and (folder / seal.SEAL).exists():  # an interrupted run: its key stays as it is
-            digest = (folder / seal.SEAL).read_text(encoding="utf-8").strip()
-            words = f"going on with the sealed key of size {seal.unseal(folder, digest).size}, SHA-256 {digest}"
+        if seed is None and (folder / rows.SEAL).exists():  # an interrupted run: its key stays as it is
+            digest = (folder / rows.SEAL).read_text(encoding="utf-8").strip()
+            words = f"going on with the sealed key of size {rows.unseal(folder, digest).size}, SHA-256 {digest}"
         else:
             digest = conceal(folder, size, secrets.randbits(63) if seed is None else seed, say, jobs)
             words = f"key sealed, SHA-256 {digest}"
@@ -236,8 +400,8 @@ def prove(
         )
         if out:
             write_atomic(folder / "proof.json", json_text(found.document()))
-            write_atomic(folder / "proof.txt", proof_text.text(found) + "\n")
-            write_atomic(folder / "proof.html", proof_text.html(found))
+            write_atomic(folder / "proof.txt", score.text(found) + "\n")
+            write_atomic(folder / "proof.html", score.html(found))
     return found
 
 

@@ -1,7 +1,9 @@
 """Published recordings with a known effect hidden from the model, or with none: the proof's real part.
 
-``real.toml`` registers what is concealed and where it is known from.  The recordings are found in the data folders and
-are no part of the project.
+``real.toml`` registers what is concealed and where it is known from, ``pairs.toml`` pairs that differ by one documented
+thing. The recordings are found in the data folders and are no part of the project. A pair becomes two tables of steady
+points, ``reference.csv`` (A) and ``recording.csv`` (B), which the answering process compares without a case, or with a
+case made of the label.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import csv
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,14 +22,195 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.base.given import data_roots, find_data
 from bemt.data.readers.uiuc_names import class_of
-from bemt.judge.proof.items import Item, recording_text
-from bemt.judge.proof.pairs import draw_pairs
+from bemt.judge.proof.items import Cell, Item, case_text, recording_text, stations_text
 from bemt.judge.proof.rows import Entry
 from bemt.physics.sections import rule as section_rule
 from bemt.rotors.case.unknowns import section_of
 
 if TYPE_CHECKING:
     from bemt.data.readers.uiuc import UiucPropeller
+
+_KEPT = ("rpm", "airspeed_m_s", "thrust_N", "torque_Nm", "density_kg_m3", "electrical_power_W", "voltage_V",
+         "second_rotor_rad_s", "run")  # fmt: skip
+_PROPELLERS = 4
+
+
+@dataclass(frozen=True)
+class PairOf:
+    """Two recordings of the manifest."""
+
+    kind: str  # Set
+    # Names of the recordings
+    a: str
+    b: str
+    # What was changed, and what cannot be told from it there
+    causes: tuple[str, ...]
+    alike: tuple[str, ...]
+    reason: str  # Where that is documented
+    case: Mapping[str, Any] | None = None  # Label of the rotor, for a case
+
+
+@cache
+def _manifest() -> Mapping[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("pairs.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _recordings() -> Mapping[str, Mapping[str, Any]]:
+    """Name of a recording to how it is read."""
+    out = {}
+    for group in _manifest()["recordings"]:
+        conditions = group.get("where", [{}])
+        for k, name in enumerate(group["names"]):
+            where = conditions[min(k, len(conditions) - 1)]
+            out[str(group.get("as", "{}")).format(name)] = {**group, "path": group["file"].format(name), "cells": where}
+    return out
+
+
+@cache
+def pairs() -> tuple[PairOf, ...]:
+    """All pairs of the manifest, those with a label twice."""
+    out = []
+    for group in _manifest()["pair"]:
+        for a, b in group["ab"]:
+            one = PairOf(
+                group["set"], a, b, tuple(group["causes"]), tuple(group.get("alike", ())), str(group["reason"])
+            )
+            out.append(one)
+            out += [
+                PairOf(f"{one.kind}, case", a, b, one.causes, one.alike, one.reason, told["case"])
+                for told in _manifest()["labelled"]
+                if one.kind in told["sets"] and told["only"] in a
+            ]
+    return tuple(out)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A silent pair, the step that was recommended, and the recordings that took it."""
+
+    of: tuple[str, str]
+    step: str
+    ab: tuple[str, str]
+
+
+def followed() -> tuple[Followed, ...]:
+    """Steps of the manifest that somebody took."""
+    return tuple(
+        Followed((r["of"][0], r["of"][1]), r["step"], (r["ab"][0], r["ab"][1])) for r in _manifest()["followed"]
+    )
+
+
+def pair_files(a: str, b: str) -> dict[str, str] | None:
+    """Files of an item that compares two recordings; None where one of them is not found."""
+    places = ((name, root / _recordings()[name]["path"]) for name in (a, b) for root in reversed(data_roots()))
+    found = {name: path for name, path in places if path.is_file()}
+    if len(found) < len({a, b}):
+        return None
+    texts = [_text(found[name], name) for name in (a, b)]
+    return {"reference.csv": texts[0], "recording.csv": texts[1], "compare": "A reference, B recording\n"}
+
+
+def _plain(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+    """Columns of a plain table, by heading or by number."""
+    if "numbered" in how:
+        rows = np.loadtxt(path)
+        columns = {name: rows[:, k - 1] for name, k in how["numbered"].items()}
+    else:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            read = [row for row in csv.DictReader(stream) if all(row[k] == v for k, v in how["cells"].items())]
+        scale = how.get("scale", {})
+        columns = {
+            name: np.array([float(row[head]) for row in read]) / scale.get(name, 1.0)
+            for name, head in how["table"].items()
+        }
+    if "half" in how:
+        command = next(iter(columns.values()))
+        drop = np.flatnonzero(np.diff(command) < 0.0)
+        top = int(drop[0]) + 1 if drop.size else command.size
+        part = slice(0, top) if how["half"] == "up" else slice(top, None)
+        columns = {k: v[part] for k, v in columns.items()}
+    if "rpm" in columns:
+        good = columns["rpm"] > 0.0
+        columns = {k: v[good] for k, v in columns.items()}
+    return columns
+
+
+def _flight(path: Path, mass_kg: float) -> dict[str, Array]:
+    """Thrust per propeller of a flight: mass times acceleration along the rotors, averaged over a tenth of a second."""
+    from bemt.data.recordings.load import import_file
+
+    v = import_file(path).values
+    flying = (v["rpm"] > 0.5 * np.median(v["rpm"])) & (v["height_m"] > 0.3)
+    block = np.floor(v["time_s"][flying] * 10.0).astype(int)
+    _, block = np.unique(block, return_inverse=True)
+    count = np.bincount(block)
+
+    def mean(x: Array) -> Array:
+        return np.asarray(np.bincount(block, x[flying]) / count)
+
+    thrust = mass_kg * mean(v["acceleration_z_m_s2"]) / _PROPELLERS
+    return {"rpm": np.sqrt(mean(v["rpm"] ** 2)), "thrust_N": thrust, "voltage_V": mean(v["voltage_V"])}
+
+
+def _read(path: Path, how: Mapping[str, Any]) -> dict[str, Array]:
+    """Steady points of one recording, in SI."""
+    from bemt.data.recordings.load import import_file
+    from bemt.judge.compare.matched import stand_run
+    from bemt.judge.compare.selection import selected
+
+    if "mass_kg" in how:
+        columns = _flight(path, float(how["mass_kg"]))
+    elif "table" in how or "numbered" in how:
+        columns = _plain(path, how)
+    else:
+        run = stand_run(selected(import_file(path), how.get("rows", ()), path.name), path.name)
+        columns = {k: run.points[k] for k in _KEPT if k in run.points}
+        if run.command:
+            columns["pulse_width_s" if run.command == "pwm_s" else run.command] = run.points["command"]
+    n = next(iter(columns.values())).size
+    columns |= {k: np.full(n, float(v)) for k, v in how.get("constant", {}).items()}
+    load = [np.isfinite(columns[k]) for k in ("thrust_N", "torque_Nm") if k in columns]
+    good = np.any(load, axis=0) & np.isfinite(columns.get("rpm", np.ones(n)))
+    return {k: v[good] for k, v in columns.items() if np.isfinite(v[good]).any()}
+
+
+def _case_of_label(label: Mapping[str, Any]) -> str:
+    """Case of a label: an APC-like blade where nothing more is known."""
+    fan = "chord_law" in label
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": label["blades"], "hub_ratio": label.get("hub_ratio", 0.1)}
+    rotor |= {k: label[k] for k in ("diameter_in", "diameter_mm") if k in label}
+    blade: dict[str, Cell] = {k: label[k] for k in ("pitch_in", "pitch_mm") if k in label}
+    blade |= {"chord_law": label.get("chord_law", "apc_like")} | ({"max_chord_over_R": 0.35} if fan else {})
+    section: dict[str, Cell] = {"camber": 0.05, "thickness": 0.09} if fan else {"camber": 0.04, "thickness": 0.10}
+
+    operating = {"rpm": label["rpm"], "airspeed_m_s": 0.0}
+    return case_text("label", {"rotor": rotor, "blade": blade, "blade.section": section, "operating": operating,
+                               "air": {"density_kg_m3": 1.2}}, "g")  # fmt: skip
+
+
+def draw_pairs() -> Iterator[Item]:
+    """Make an item of every pair whose recordings are found."""
+    for pair in pairs():
+        files = pair_files(pair.a, pair.b)
+        if files is None:
+            continue
+        files |= {} if pair.case is None else {"case.toml": _case_of_label(pair.case)}
+        n = len(pair.causes)
+        yield Item(files, Entry(
+            set=pair.kind, causes=pair.causes, strengths=(1.0,) * n, separation=(99.0,) * n, alike=(pair.alike,) * n,
+            variables=((),) * n, plan="pair", rig=f"{pair.a} | {pair.b}",
+            rows=files["recording.csv"].count("\n") - 1, reason=pair.reason,
+        ))  # fmt: skip
+
+
+@cache
+def _text(path: Path, name: str) -> str:
+    columns = _read(path, _recordings()[name])
+    if "run" in columns and np.ptp(columns["run"]) == 0.0:
+        del columns["run"]
+    return recording_text(columns)
+
 
 CLEAR, ABSENT = 0.10, 0.02
 """Change of CT or CP over the speeds that counts as clear, and below which there is none. [1]"""
@@ -62,22 +246,12 @@ def _item(
     return Item(files | ({} if reference is None else {"reference.csv": recording_text(reference)}), entry)
 
 
-def _case(name: str, rotor: Mapping[str, Any], section: Mapping[str, float], rpm: float, air: Mapping[str, float],
+def _case(name: str, rotor: Mapping[str, Cell], section: Mapping[str, Cell], rpm: float, air: Mapping[str, Cell],
           off: Collection[str] = ()) -> str:  # fmt: skip
-    def table(head: str, rows: Mapping[str, Any]) -> list[str]:
-        words = (f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {v:.7g}" for k, v in rows.items())
-        return [f"[{head}]", *words, ""]
-
-    lines = ['schema = "bemt.case/1"', f'name = "{name}"', "", *table("rotor", rotor),
-             *table("blade", {"stations": "stations.csv"}), *table("blade.section", section),
-             *table("operating", {"rpm": rpm, "airspeed_m_s": 0.0}), *table("air", air), "[model]", "stations = 30",
-             f"effects_off = [{', '.join(f'{chr(34)}{e}{chr(34)}' for e in off)}]"]  # fmt: skip
-    return "\n".join(lines) + "\n"
-
-
-def _stations(r_R: Array, c_R: Array, beta_deg: Array) -> str:
-    rows = zip(r_R, c_R, beta_deg, strict=True)
-    return "r_over_R,chord_over_R,beta_deg\n" + "".join(f"{x:.5f},{c:.6f},{b:.4f}\n" for x, c, b in rows)
+    return case_text(name, {
+        "rotor": rotor, "blade": {"stations": "stations.csv"}, "blade.section": section,
+        "operating": {"rpm": rpm, "airspeed_m_s": 0.0}, "air": air, "model": {"stations": 30, "effects_off": [*off]},
+    })  # fmt: skip
 
 
 def change_over_speed(rpm: Array, coefficient: Array) -> float:
@@ -96,18 +270,18 @@ def change_over_speed(rpm: Array, coefficient: Array) -> float:
 
 
 def _uiuc_case(
-    p: UiucPropeller, rpm: float, air: Mapping[str, float], off: Collection[str] = (), turned: float = 0.0
+    p: UiucPropeller, rpm: float, air: Mapping[str, Cell], off: Collection[str] = (), turned: float = 0.0
 ) -> tuple[str, str]:
     g = p.geometry
     assert g is not None
     s = section_rule.section_at(0.75, p.family)
-    rotor = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": p.blades, "diameter_in": p.diameter_in, "hub_ratio": 0.1}
     camber = section_of(class_of(p.family))[0].value if s.shape == "naca4" else s.camber
-    section = {"camber": camber, "camber_position": s.position, "thickness": s.thickness}
+    section: dict[str, Cell] = {"camber": camber, "camber_position": s.position, "thickness": s.thickness}
     keep = (g.r_R <= 1.0) & (g.r_R > 0.1)
     name = p.name.replace(".", "p")
     return (_case(name, rotor, section, rpm, air, off),
-            _stations(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
+            stations_text(g.r_R[keep], np.maximum(g.c_R[keep], 0.005), g.beta_deg[keep] + turned))  # fmt: skip
 
 
 def _dimensional(p: UiucPropeller) -> dict[str, Array]:
@@ -174,14 +348,14 @@ def _x22a() -> Iterator[Item]:
     shape = np.genfromtxt(root / "x22a_geometry.csv", delimiter=",", skip_header=1)
     with (root / "x22a_measured_CT_CP_vs_J.csv").open(encoding="utf-8") as stream:
         rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
-    rotor = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 3, "diameter_m": 2 * R, "hub_ratio": 0.2}
     for angle in (19, 29):
         q = rows[rows[:, 0] == angle]
         columns = {"rpm": np.full(len(q), 1200.0), "J": q[:, 1], "CT": q[:, 2], "CP": q[:, 3]}
         text = _case(f"x22a_{angle}", rotor, {"camber": 0.02, "thickness": 0.08}, 1200.0, {"density_kg_m3": 1.225},
                      ("duct",))  # fmt: skip
         keep = shape[:, 0] <= 1.0
-        blade = _stations(shape[keep, 0], shape[keep, 3] / R, shape[keep, 2] + angle - 20.0)
+        blade = stations_text(shape[keep, 0], shape[keep, 3] / R, shape[keep, 2] + angle - 20.0)
         yield _item("real duct", f"x22a_{angle}", columns, text, blade, ["J", "airspeed_m_s"])
 
 
@@ -192,7 +366,7 @@ def _caradonna_tung() -> Iterator[Item]:
     with (root / "caradonna_tung_CT_vs_tipMach.csv").open(encoding="utf-8") as stream:
         rows = np.array([[float(x) for x in row[:4]] for row in list(csv.reader(stream))[1:]])
     r_R = np.linspace(0.18, 1.0, 10)
-    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2.286, "hub_ratio": 0.17}
     for angle in np.unique(rows[:, 0]):
         q = rows[rows[:, 0] == angle]
         # thrust alone was measured: CT_rotor = T/(rho A (Omega R)^2)
@@ -200,7 +374,7 @@ def _caradonna_tung() -> Iterator[Item]:
                    "thrust_N": q[:, 3] * 1.225 * np.pi * 1.143**2 * (q[:, 1] * np.pi / 30.0 * 1.143) ** 2}  # fmt: skip
         text = _case(f"caradonna_tung_{angle:g}", rotor, {"camber": 0.0, "thickness": 0.12}, float(q[0, 1]),
                      {"density_kg_m3": 1.225}, ("compressibility", "drag_divergence"))  # fmt: skip
-        blade = _stations(r_R, np.full(r_R.size, 0.1905 / 1.143), np.full(r_R.size, float(angle)))
+        blade = stations_text(r_R, np.full(r_R.size, 0.1905 / 1.143), np.full(r_R.size, float(angle)))
         yield _item("real mach", f"caradonna_tung_{angle:g}", columns, text, blade, ["M_tip", "rpm"])
 
 
@@ -215,9 +389,9 @@ def _tmotor() -> Iterator[Item]:
         if name.strip() in ("radius", "chord", "pitch"):
             given[name.strip()] = np.array([float(v) for v in values.split()])
     R = 0.3556
-    blade = _stations(given["radius"] / R, given["chord"] / R, given["pitch"])
-    rotor = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
-    section = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
+    blade = stations_text(given["radius"] / R, given["chord"] / R, given["pitch"])
+    rotor: dict[str, Cell] = {"kind": "propeller", "blades": 2, "diameter_m": 2 * R, "hub_ratio": 0.0844}
+    section: dict[str, Cell] = {"camber": 0.04, "camber_position": 0.4, "thickness": 0.10}
     columns = {"rpm": rows[:, 0], "airspeed_m_s": np.zeros(len(rows)), "thrust_N": rows[:, 3], "torque_Nm": rows[:, 4]}
     for kind, density in (("real null", DENSITY), ("real density", WRONG_DENSITY)):
         text = _case("tmotor_28", rotor, section, 2200.0, {"density_kg_m3": density})

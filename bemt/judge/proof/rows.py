@@ -1,13 +1,21 @@
-"""What the proof keeps: key and entries, answers as far as they are read, and the document of a score."""
+"""What the proof keeps: key and entries, answers as far as they are read, the document of a score.
+
+The seal is a key that is fixed before the diagnosis begins, and the check that nothing was changed since.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from pathlib import Path
 from typing import Any, Self
 
 from bemt.base.document import Documented
+from bemt.base.errors import Fault, InputError
+from bemt.base.tables import json_text, write_atomic
 
 Names = set[str]  # An entry has a field of that name
 
@@ -129,7 +137,7 @@ class ToldAnswer(Documented):
         """Whether there is an answer."""
         return bool(self.verdict)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """The answer as it was printed, with what a check has found since."""
         now = {"effects": list(self.effects), "confirmed": True} if self.confirmed else {}
         return {**self.whole, "verdict": self.verdict, **now}
@@ -230,3 +238,58 @@ class Proof(Documented):
     misses: tuple[Miss, ...] = ()
     seconds_median: float = math.nan
     seconds: Mapping[str, float] | None = None  # Spent on concealing and on diagnosing
+
+
+KEY, SEAL = "key.json", "key.sha256"
+
+
+def sha256(text: str) -> str:
+    """Hash of a text.
+
+    Examples
+    --------
+    >>> sha256("")[:8]
+    'e3b0c442'
+    """
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def seal(folder: Path, key: Key) -> str:
+    """Write a key and its hash."""
+    text = json_text(key.document())
+    folder.mkdir(parents=True, exist_ok=True)
+    write_atomic(folder / KEY, text)
+    digest = sha256(text)
+    write_atomic(folder / SEAL, digest + "\n")
+    return digest
+
+
+def unseal(folder: Path, digest: str | None = None) -> Key:
+    """Read a key after checking it and every file that it vouches for."""
+    path = folder / KEY
+    try:
+        text = path.read_text(encoding="utf-8")
+        wanted = digest or (folder / SEAL).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise InputError(Fault(str(error.filename), "", "no such file", "the key and its seal of a proof")) from error
+    if sha256(text) != wanted:
+        raise InputError(Fault(path.as_posix(), "", f"SHA-256 {sha256(text)}", wanted, "The key was changed"))
+    key = Key.from_document(json.loads(text))
+    faults = []
+    for item in key.items:
+        for name, known in item.files.items():
+            file = folder / "items" / item.folder / name
+            try:
+                found = sha256(file.read_text(encoding="utf-8"))
+            except (OSError, UnicodeDecodeError):
+                found = "nothing readable"
+            if found != known:
+                faults.append(Fault(file.as_posix(), "", found, f"SHA-256 {known}", "The file was changed"))
+    if faults:
+        raise InputError(faults)
+    return key
+
+
+def stored(file: Path) -> Stored:
+    """What a file of an answer holds; no answer where there is no file."""
+    return Stored.from_document(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else Stored()

@@ -1,4 +1,4 @@
-"""Score of the proof: what was said beside what was there, in the rows of DIAGNOSIS 5."""
+"""Score of the proof: what was said beside what was there, in the rows of DIAGNOSIS 5, as table and HTML file."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from itertools import permutations
 
 import numpy as np
 
+from bemt.base.page import Cell, render, table
+from bemt.base.tables import text_table
 from bemt.judge.proof.causes import CAUSES
-from bemt.judge.proof.rows import Entry, Risk, ScoreRow, Stratum, ToldAnswer, ToldLocation
+from bemt.judge.proof.rows import Entry, Proof, Risk, ScoreRow, Stratum, ToldAnswer, ToldLocation
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
@@ -185,51 +187,87 @@ def score(
     judged: Sequence[Judged], settled: Sequence[bool] = (), again: Sequence[Judged] = ()
 ) -> list[ScoreRow]:  # fmt: skip
     """The table of DIAGNOSIS 5; ``again`` are items that asked for a reference, with the answer that it led to."""
+    p = _Pool(judged)
+    return [*_claimed(p), *_of_sets(p), *_numbers(p, settled), *_with_reference([j for j in again if j.answer]),
+            _share("failed", (not j.answer for j in (*judged, *again)), "0", 0.0, True)]  # fmt: skip
 
-    def of(*sets: str) -> list[Judged]:
-        return [j for j in judged if j.entry.set in sets]
 
-    def told(*sets: str) -> list[Judged]:
+@dataclass(frozen=True)
+class _Pool:
+    """Items by what is asked of them."""
+
+    judged: Sequence[Judged]
+
+    def of(self, *sets: str, seen: bool = False) -> list[Judged]:
+        """Items of these sets; ``seen``: that the plan can see."""
+        return [j for j in self.judged if j.entry.set in sets and (j.visible or not seen)]
+
+    def told(self, *sets: str) -> list[Judged]:
         """Items with an answer: who does not answer has not refrained from a wrong claim."""
-        return [j for j in of(*sets) if j.answer]
+        return [j for j in self.of(*sets) if j.answer]
 
-    visible = [j for j in of("single", "sensor") if j.visible]
-    pairs = [j for j in of("pair") if j.visible and j.entry.plan.startswith(("grid", "two_air"))]
-    hidden = [j for j in told("single", "sensor", "underpowered") if not j.visible]
-    with_cause = [j for j in of("single", "sensor", "pair", "underpowered") if j.claims]
-    unlisted = told("unlisted")
-    clear = [j for j in unlisted if j.separation >= _CLEAR]
-    sizes = [p for j in visible + pairs for p in _parameters(j)]
-    seen = [j for j in visible + pairs if j.answer]
-    held = [_held_out(j) for j in seen]
-    where = [j for j in visible if j.answer and j.entry.variables[0]]
+    @property
+    def visible(self) -> list[Judged]:
+        """Single causes that the plan can see."""
+        return self.of("single", "sensor", seen=True)
+
+    @property
+    def pairs(self) -> list[Judged]:
+        """Pairs in plans over speed and advance ratio."""
+        return [j for j in self.of("pair", seen=True) if j.entry.plan.startswith(("grid", "two_air"))]
+
+
+def _claimed(p: _Pool) -> list[ScoreRow]:
+    """Rows of what was claimed, and of what was not to be."""
+    visible = p.visible
+    hidden = [j for j in p.told("single", "sensor", "underpowered") if not j.visible]
+    with_cause = [j for j in p.of("single", "sensor", "pair", "underpowered") if j.claims]
+    by_reference = (
+        ("with", [j for j in visible if _referenced(j)]),
+        ("without", [j for j in visible if not _referenced(j)]),
+    )
     return [
-        _share("claims on nulls, noise", (j.claims for j in told("null")), "<= 2 %", 0.02, True),
-        _share("claims on nulls, solver mismatch only", (j.claims for j in told("mismatch")), "<= 2 %", 0.02, True),
+        _share("claims on nulls, noise", (j.claims for j in p.told("null")), "<= 2 %", 0.02, True),
+        _share("claims on nulls, solver mismatch only", (j.claims for j in p.told("mismatch")), "<= 2 %", 0.02, True),
         _share("top 1, visible", (j.top1 for j in visible), ">= 90 %", 0.90),
         _share("top 3, visible", (j.top3 for j in visible), ">= 98 %", 0.98),
         _share("right when it claims", (j.right for j in with_cause), ">= 98 %", 0.98),
-        _share("claims that name only what is not at work", (_beside(j) for j in with_cause), "<= 3 %", 0.03, True),
+        _share("claims that name only what is not at work", map(_beside, with_cause), "<= 3 %", 0.03, True),
         _share("claims on visible", (j.claims for j in visible), ">= 75 %", 0.75),
-        *(_share(f"claims on visible, {word} a reference", (j.claims for j in visible if is_one(j)), "", 0.0)
-          for word, is_one in (("with", _referenced), ("without", lambda j: not _referenced(j)))),
+        *(_share(f"claims on visible, {word} a reference", (j.claims for j in some), "", 0.0)
+          for word, some in by_reference),
         _share("wrong claims on what the plan cannot see", (j.claims and not j.right for j in hidden), "<= 2 %", 0.02,
                True),
+    ]  # fmt: skip
+
+
+def _of_sets(p: _Pool) -> list[ScoreRow]:
+    """Rows of pairs, of what is not listed, of the stand."""
+    pairs, unlisted = p.pairs, p.told("unlisted")
+    clear = [j for j in unlisted if j.separation >= _CLEAR]
+    return [
         _share("pairs named exactly, rpm x J", (j.right and j.answer.verdict != "class" for j in pairs), ">= 75 %",
                0.75),
-        _share("pairs named, or one of each in its set, rpm x J", (in_sets(j) for j in pairs), ">= 75 %", 0.75),
+        _share("pairs named, or one of each in its set, rpm x J", map(in_sets, pairs), ">= 75 %", 0.75),
         _share("unlisted given a listed name", (j.claims for j in unlisted), "<= 5 %", 0.05, True),
         _share("unlisted at 10 sigma called unknown", (j.answer.verdict == "unknown" for j in clear), ">= 80 %",
                0.80),
-        _share("sensor faults blamed on the air", (_blamed(j) for j in told("sensor")), "<= 2 %", 0.02, True),
+        _share("sensor faults blamed on the air", map(_blamed, p.told("sensor")), "<= 2 %", 0.02, True),
+    ]  # fmt: skip
+
+
+def _numbers(p: _Pool, settled: Sequence[bool]) -> list[ScoreRow]:
+    """Rows of sizes, predictions, places and next steps."""
+    seen = [j for j in p.visible + p.pairs if j.answer]
+    sizes, held = [one for j in seen for one in _parameters(j)], [_held_out(j) for j in seen]
+    where = [j for j in p.visible if j.answer and j.entry.variables[0]]
+    return [
         _median("parameter error, median", [s for s, _ in sizes], "<= 15 %", 0.15),
         _share("90 % interval holds the truth", (inside for _, inside in sizes), "85 to 95 %", 0.85),
         _median("held-out RMSE after / before, median", [a for a, _ in held], "<= 0.5", 0.5),
         _median("held-out RMSE after / noise, median", [b for _, b in held], "<= 1.2", 1.2),
-        _share("right variable in the location", (_located(j) for j in where), ">= 90 %", 0.90),
+        _share("right variable in the location", map(_located, where), ">= 90 %", 0.90),
         _share("recommended run settles the tie", settled, ">= 70 %", 0.70),
-        *_with_reference([j for j in again if j.answer]),
-        _share("failed", (not j.answer for j in (*judged, *again)), "0", 0.0, True),
     ]  # fmt: skip
 
 
@@ -267,10 +305,14 @@ def score_real(judged: Sequence[Judged]) -> list[ScoreRow]:
 
 def answers(judged: Sequence[Judged]) -> dict[str, dict[str, int]]:
     """How often each set was answered how."""
+    return _counted((j.entry.set, answered(j)) for j in judged)
+
+
+def _counted(found: Iterable[tuple[str, str]]) -> dict[str, dict[str, int]]:
     out: dict[str, dict[str, int]] = {}
-    for j in judged:
-        row = out.setdefault(j.entry.set, {})
-        row[answered(j)] = row.get(answered(j), 0) + 1
+    for there, said in found:
+        row = out.setdefault(there, {})
+        row[said] = row.get(said, 0) + 1
     return dict(sorted(out.items()))
 
 
@@ -336,9 +378,70 @@ def strata(judged: Sequence[Judged], edges: Sequence[float] = (0.0, 3.0, 5.0, 10
 
 def confusion(judged: Sequence[Judged], key: Callable[[Judged], str] | None = None) -> dict[str, dict[str, int]]:
     """How often what was there was called what."""
-    out: dict[str, dict[str, int]] = {}
-    for j in judged:
-        there = key(j) if key else "+".join(j.entry.causes) or j.entry.set
-        row = out.setdefault(there, {})
-        row[j.said] = row.get(j.said, 0) + 1
-    return dict(sorted(out.items()))
+    return _counted((key(j) if key else "+".join(j.entry.causes) or j.entry.set, j.said) for j in judged)
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.1f} %" if math.isfinite(value) else "-"
+
+
+def _rows(rows: Sequence[ScoreRow]) -> list[list[str]]:
+    out = []
+    for r in rows:
+        share, value = math.isfinite(r.low), r.value
+        words = f"{value:.3g}" if math.isfinite(value) else "-"
+        interval = f"{_percent(r.low)} to {_percent(r.high)}" if share and r.n else ""
+        count = f"{r.hits}/{r.n}" if share else str(r.n)
+        state = {True: "yes", False: "NO", None: "no data"}[r.met] if r.target else ""
+        out.append([r.what, count, _percent(value) if share else words, interval, r.target, state])
+    return out
+
+
+MET = {"yes": "fine", "NO": "fault", "no data": "unknown"}
+_HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
+
+
+def _tables(found: Proof) -> list[tuple[str, list[str], list[list[str]]]]:
+    strata = [[f"above {s.low:g}" if math.isnan(s.high) else f"{s.low:g} to {s.high:g}", str(s.n),
+               str(s.top1), str(s.claims), str(s.right)] for s in found.strata]  # fmt: skip
+    risk = [[_percent(r.coverage), f"{r.n:.0f}", _percent(r.risk), f"{r.probability:.3f}"]
+            for r in found.risk_coverage]  # fmt: skip
+    confusion = [[there, ", ".join(f"{said} {n}" for said, n in sorted(row.items(), key=lambda kv: -kv[1]))]
+                 for there, row in found.confusion.items()]  # fmt: skip
+    kinds = ("found", "class", "none", "unknown", "insufficient", "wrong", "failed")
+    answers = [[kind, *(str(row.get(k, 0)) for k in kinds)] for kind, row in found.answers.items()]
+    misses = [
+        [m.folder, m.set, "+".join(m.causes) or "-", m.plan, f"{m.separation:.1f}",
+         "class: " + ", ".join(m.effects) if m.verdict == "class" else m.said]
+        for m in found.misses
+    ]  # fmt: skip
+    tables = [
+        ("Score", _HEADER, _rows(found.score)),
+        ("Answers by set", ["set", *kinds], answers),
+        ("Simpler rules on the same data", _HEADER, _rows(found.baselines)),
+        ("Single causes by separation", ["sigma", "items", "top 1", "claims", "right claims"], strata),
+        ("Wrong claims against claims listened to", ["share", "claims", "wrong", "down to probability"], risk),
+        ("What was there, and what was said", ["there", "said"], confusion),
+        ("Misses", ["item", "set", "there", "plan", "sigma", "said"], misses),
+    ]
+    return [t for t in tables if t[2] or t[0] == "Misses"]
+
+
+def text(found: Proof) -> str:
+    """Give the tables for a terminal."""
+    parts = [f"{found.items} concealed items ({found.size}), seed {found.seed}, "
+             f"commit {found.commit or 'unknown'}\nkey SHA-256 {found.key_sha256}"]  # fmt: skip
+    for title, header, rows in _tables(found):
+        left = (0, 1, 2, 3, 5) if title == "Misses" else (0, 1) if "said" in header else (0,)
+        parts.append(f"{title}\n" + text_table(header, rows, left=left, indent="  ") if rows else f"{title}: none")
+    return "\n\n".join(parts)
+
+
+def html(found: Proof) -> str:
+    """Give one HTML file with the same tables."""
+    tables = [(title, table(header, [[Cell(c, badge=MET[c]) if c in MET else c for c in row] for row in rows]))
+              for title, header, rows in _tables(found)]  # fmt: skip
+    lead = f"{found.items} items ({found.size}), seed {found.seed}, commit {found.commit or 'unknown'}."
+    title = "Proof on concealed causes"
+    return render("bemt.judge.proof", "proof.html", ["page.js"], title=title, lead=lead, key=found.key_sha256,
+                  tables=tables)  # fmt: skip

@@ -3,19 +3,196 @@
 `World` says what is there and how strong, `Conditions` where and when; `loads` gives thrust and torque.  Every
 correction has another form than the one in the solver's library (named in `World`), so that a diagnosis never fits the
 formula that made the data.
+
+A duct is a wall of ring vortices that cancel the flow through it; from the trailing edge on, a semi-infinite vortex
+tube of strength w (jet over outer speed) goes straight back.  What the rings do at the rotor disk is linear in w and in
+the speed of flight, and is solved once per duct shape.  The jet's speed follows from Bernoulli across the rotor, the
+whole thrust from the mass flow that the rings let through: T = rho A (V + u) w.
+
+The blades are those of `bemt.judge.proof.truth`, or of CCBlade of WISDEM (extra ``wisdem``), somebody else's
+blade-element momentum code, which shares no line with this project's solver.  It gives no loads at rest and knows
+uniform axial flow only; what an item may conceal with it is in `EXPRESSIBLE`.  Sections are those of
+`bemt.judge.proof.truth_section`.
+
+References
+----------
+.. [1] D. Kuechemann, J. Weber, "Aerodynamics of Propulsion", 1953, ch. 3-4 (ring-vortex method; not checked).
+.. [2] S. A. Ning, "A simple solution method for the blade element momentum equations with guaranteed convergence",
+       Wind Energy 17(9), 2014, DOI 10.1002/we.1636.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.proof import truth, truth_ccblade, truth_duct
+from bemt.base.errors import Fault, InputError
+from bemt.judge.proof import truth
+from bemt.judge.proof import truth_section as ts
 from bemt.judge.proof.truth_section import SectionPhysics
+
+EXPRESSIBLE = frozenset({
+    "reynolds", "compressibility", "drag_divergence", "stall_delay", "section", "pitch_offset", "untwist",
+    "air_density", "rpm_scale", "airspeed_offset", "airspeed_gain", "thrust_gain", "torque_gain", "thrust_zero",
+    "torque_zero", "cross_talk", "thrust_drift", "torque_drift", "unit_slip", "resonance", "bearing_drag", "hysteresis",
+    "bubble_step",
+})  # fmt: skip
+"""Causes that act on sections, blade angle, air or stand."""
+LEAST_J = 0.02
+"""Advance ratio below which CCBlade is not asked. [1]"""
+
+
+_ALPHA = np.radians(np.concatenate([np.arange(-180.0, -30.0, 2.0), np.arange(-30.0, 40.0, 0.2),
+                                    np.arange(40.0, 181.0, 2.0)]))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Foil:
+    """Section in CCBlade's sense: a turbine's, which is a propeller's turned over.
+
+    Its Reynolds number is CCBlade's own, that of the flow without induction.
+    """
+
+    cl: Array
+    cd: Array
+
+    def evaluate(self, alpha: float, Re: float, return_cm: bool = False) -> tuple[float, ...]:  # noqa: N803
+        """Lift and drag coefficients; CCBlade calls this."""
+        out = (-float(np.interp(-alpha, _ALPHA, self.cl)), float(np.interp(-alpha, _ALPHA, self.cd)))
+        return (*out, 0.0) if return_cm else out
+
+
+def solve(
+    rotor: truth.TruthRotor, rpm: Array, airspeed: Array, temperature_C: Array, pressure_Pa: Array,
+    physics: ts.SectionPhysics, extra: Mapping[str, Array],
+) -> truth.TrueAnswer:  # fmt: skip
+    """Loads of an open rotor in axial flow."""
+    try:
+        from wisdem.ccblade.ccblade import CCBlade
+    except ImportError as error:
+        raise InputError(
+            Fault("", "wisdem", "a package that is not installed", "CCBlade", "pip install 'bemt[wisdem]'")
+        ) from error
+    if "duct" in extra or np.any(extra.get("axial", 0.0)) or np.any(np.asarray(extra.get("induction", 1.0)) != 1.0):
+        raise ValueError("CCBlade models uniform axial flow only")
+    P, N, R = rpm.size, rotor.x.size, rotor.radius
+    rho, mu, sound = truth.air(temperature_C, pressure_Pa)
+    omega = rpm * (2.0 * np.pi / 60.0)
+    beta = rotor.twist + np.broadcast_to(extra.get("twist", 0.0), (P, N))
+    r = rotor.x * R
+    W = np.hypot(np.outer(omega, r), airspeed[:, None])
+    thrust, torque = np.full(P, np.nan), np.full(P, np.nan)
+    for k in np.flatnonzero(airspeed > LEAST_J * rpm / 60.0 * 2.0 * R):
+        ratio = float(omega[k] * R / np.hypot(airspeed[k], omega[k] * R))
+        re, mach = rho[k] * W[k] * rotor.chord / mu[k], W[k] / sound[k]
+        shape = (_ALPHA.size, N)
+        alpha = np.broadcast_to(_ALPHA[:, None], shape)
+        Re, M, c_r, speed = (np.broadcast_to(v, shape) for v in (re, mach, rotor.chord / r, ratio))
+        cl, cd = ts.loads(alpha, Re, M, c_r, speed, rotor.aspect, rotor.section, physics)
+        foils = [_Foil(cl[:, i], cd[:, i]) for i in range(N)]
+        blade = CCBlade(r, rotor.chord, np.degrees(beta[k]), foils, rotor.hub * R, R, rotor.blades, float(rho[k]),
+                        float(mu[k]), shearExp=0.0)  # fmt: skip
+        got = blade.evaluate([float(airspeed[k])], [float(rpm[k])], [0.0])
+        loads = got[0] if isinstance(got, tuple) else got
+        T, Q = -float(np.ravel(loads["T"])[0]), -float(np.ravel(loads["Q"])[0])
+        if T != 0.0 and np.isfinite(T + Q):
+            thrust[k], torque[k] = T, Q
+    good = np.isfinite(thrust)
+    none = np.zeros((P, N))
+    at75 = int(np.argmin(np.abs(rotor.x - 0.75)))
+    area = np.pi * R**2 * (1.0 - rotor.hub**2)
+    # mean induced speed by momentum, for what is derived from it
+    induced = -0.5 * airspeed + np.sqrt(0.25 * airspeed**2 + np.maximum(np.nan_to_num(thrust), 0.0) / (2 * rho * area))
+    return truth.TrueAnswer(
+        thrust, torque, good, none, none, none, induced, np.full(P, np.nan),
+        rho * W[:, at75] * rotor.chord[at75] / mu, omega * R / sound, np.where(good, 0.0, np.inf),
+    )  # fmt: skip
+
+
+_PHI = (np.arange(96) + 0.5) * (2.0 * np.pi / 96)
+
+
+@dataclass(frozen=True)
+class TruthDuct:
+    """Shape of a duct; lengths over the tip radius."""
+
+    # Length; rotor plane behind the lip. [-]
+    length: float
+    position: float
+    gap: float = 0.01  # Tip clearance over the tip radius. [-]
+    exit_ratio: float = 1.0  # Exit area over the area of the rotor annulus. [-]
+    lip_radius: float = 0.1  # Radius of the lip over the tip radius. [-]
+
+
+def ring_speed(x: Array, z: Array, a: Array) -> tuple[Array, Array]:
+    """Axial and radial speed of unit ring vortices. [-]"""
+    x, z, a = np.broadcast_arrays(x, z, a)
+    cos = np.cos(_PHI)
+    s2 = (a**2 + x**2 + z**2)[..., None] - 2.0 * (a * x)[..., None] * cos
+    k = a[..., None] / np.maximum(s2, 1e-8) ** 1.5 / (2.0 * _PHI.size)
+    return np.sum(k * (a[..., None] - x[..., None] * cos), axis=-1), np.sum(k * z[..., None] * cos, axis=-1)
+
+
+def tube_speed(x: Array, z: Array, a: float) -> tuple[Array, Array]:
+    """Axial and radial speed of a semi-infinite vortex tube of unit strength that begins at z = 0 and goes to +z."""
+    x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
+    cos = np.cos(_PHI)
+    s2 = np.maximum((a**2 + x**2)[..., None] - 2.0 * a * x[..., None] * cos, 1e-8)
+    root = np.sqrt(s2 + z[..., None] ** 2)
+    axial = np.mean(a * (a - x[..., None] * cos) / s2 * (1.0 + z[..., None] / root), axis=-1) / 2.0
+    radial = -np.mean(a * cos / root, axis=-1) / 2.0
+    return axial, radial
+
+
+@lru_cache(maxsize=64)
+def disk_speeds(duct: TruthDuct, hub: float, x: tuple[float, ...]) -> tuple[Array, Array]:
+    """Axial speed at the rotor disk per jet excess w and per speed of flight. [-]"""
+    wall = 1.0 + duct.gap
+    # the hub ends behind the rotor: the jet fills a circle of the exit's area
+    leave = np.sqrt(duct.exit_ratio * (wall**2 - hub**2) + hub**2)
+    m = 40
+    ends = duct.length * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, m + 1)))
+    aft = max(duct.length - duct.position, 1e-6)
+
+    def radius(z: Array) -> Array:
+        # a rounded lip opens the mouth; behind the rotor the wall goes straight to the exit
+        mouth = duct.lip_radius * np.maximum(1.0 - z / max(duct.lip_radius, 1e-9), 0.0) ** 2
+        return np.asarray(wall + mouth + (leave - wall) * np.clip((z - duct.position) / aft, 0.0, 1.0))
+
+    rings, points = ends[:-1] + 0.25 * np.diff(ends), ends[:-1] + 0.75 * np.diff(ends)
+    slope = (radius(points + 1e-4) - radius(points - 1e-4)) / 2e-4
+    axial, radial = ring_speed(radius(points)[:, None], points[:, None] - rings[None, :], radius(rings)[None, :])
+    matrix = radial - slope[:, None] * axial
+    ta, tr = tube_speed(radius(points), points - duct.length, float(radius(np.array(duct.length))))
+    right = np.stack([-(tr - slope * ta), slope], axis=1)  # for w = 1 and for V = 1
+    # the strength per length at the trailing edge runs on into the tube; wider of two conditions, by least squares
+    kutta = np.zeros((1, m))
+    kutta[0, -1] = 1.0
+    scale = 10.0
+    matrix = np.vstack([matrix, scale * kutta])
+    right = np.vstack([right, [[scale * np.diff(ends)[-1], 0.0]]])
+    strengths = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    at = np.asarray(x)
+    axial, _ = ring_speed(at[:, None], duct.position - rings[None, :], radius(rings)[None, :])
+    tube = tube_speed(at, np.full(at.size, duct.position - duct.length), float(radius(np.array(duct.length))))[0]
+    out = axial @ strengths
+    return out[:, 0] + tube, out[:, 1]
+
+
+def seal(gap_over_span: Array, scale: float) -> Array:
+    """Strength of the images of the tip vortices in the wall behind a gap. [-]
+
+    Notes
+    -----
+    1 / (1 + g / 0.03): half of the image is lost at 3 % of the span (declared; gives one to two points of thrust per
+    point of gap over span).
+    """
+    return np.asarray(1.0 / (1.0 + scale * np.asarray(gap_over_span) / 0.03))
 
 
 @dataclass(frozen=True)
@@ -96,10 +273,10 @@ def _wall_factor(x: Array, distance: Array) -> Array:
     out = np.ones((distance.size, x.size))
     radius, left = 0.78, 0.6
     inside = np.minimum(x, radius - 0.08)
-    here = truth_duct.tube_speed(inside, np.zeros(x.size), radius)[0]
+    here = tube_speed(inside, np.zeros(x.size), radius)[0]
     for z in np.unique(distance[np.isfinite(distance)]):
-        wall = truth_duct.tube_speed(inside, np.full(x.size, -z), radius)[0]
-        far = truth_duct.tube_speed(inside, np.full(x.size, -2.0 * z), radius)[0]
+        wall = tube_speed(inside, np.full(x.size, -z), radius)[0]
+        far = tube_speed(inside, np.full(x.size, -2.0 * z), radius)[0]
         out[distance == z] = 1.0 - left * (2.0 * wall - far) / here
     return out
 
@@ -109,17 +286,17 @@ def _solve(
     c: Conditions,
     pressure: Array,
     world: World,
-    extra: dict[str, Any],
+    extra: dict[str, Array],
     start: truth.TrueAnswer | None,
 ) -> truth.TrueAnswer:
     v = c.airspeed * np.cos(np.radians(world.oblique))
     if rotor.code == "ccblade":
-        return truth_ccblade.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra)
+        return solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra)
     return truth.solve(rotor, c.rpm, v, c.temperature_C, pressure, world.section, extra, start)
 
 
 def loads(
-    rotor: truth.TruthRotor, world: World, c: Conditions, duct: truth_duct.TruthDuct | None = None,
+    rotor: truth.TruthRotor, world: World, c: Conditions, duct: TruthDuct | None = None,
     start: truth.TrueAnswer | None = None,
 ) -> TrueLoads:  # fmt: skip
     """Thrust and torque of every row."""
@@ -129,17 +306,16 @@ def loads(
     area = np.pi * rotor.radius**2
     shape = (c.rpm.size, rotor.x.size)
     twist = np.full(shape, np.radians(world.pitch_offset))
-    if world.untwist:
-        twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
-    extra: dict[str, Any] = {"twist": twist}
+    twist = twist + np.radians(world.untwist) * np.outer(rho * omega**2 / world.untwist_at, _torsion(rotor))
+    extra: dict[str, Array] = {"twist": twist}
     span = (1.0 - rotor.hub) * rotor.radius
     leak = np.zeros(c.rpm.size)
     per_v: Array = np.zeros(rotor.x.size)
     if duct is not None:
-        per_w, per_v = truth_duct.disk_speeds(duct, rotor.hub, tuple(rotor.x))
+        per_w, per_v = disk_speeds(duct, rotor.hub, tuple(rotor.x))
         gap = np.where(np.isfinite(c.gap), c.gap, duct.gap * rotor.radius) / span
         leak = world.leak * gap
-        extra |= {"duct": per_w, "seal": truth_duct.seal(gap, world.leak)}
+        extra |= {"duct": per_w, "seal": seal(gap, world.leak)}
     if world.ground and np.any(np.isfinite(c.wall)):
         extra["induction"] = 1.0 + world.ground * (_wall_factor(rotor.x, c.wall / rotor.radius) - 1.0)
     along = c.airspeed * np.cos(np.radians(world.oblique))
@@ -167,16 +343,7 @@ def loads(
     answer = how(rotor, c, pressure, world, extra, start)
     thrust, torque = answer.thrust, answer.torque
     if duct is not None:
-        ring = rotor.x * np.diff(rotor.edges)
-        through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
-        whole = rho * area * (1.0 - rotor.hub**2) * through * answer.jet
-        skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
-        shroud = whole - thrust - skin
-        if world.lip:
-            # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
-            turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
-            shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
-        thrust = (thrust + shroud) * (1.0 - 1.3 * leak)
+        thrust = (thrust + _shroud(rotor, duct, world, rho, along, per_v, answer)) * (1.0 - 1.3 * leak)
         torque = torque * (1.0 - 0.5 * leak)
     if world.nacelle_cd:
         slip = along + 2.0 * np.maximum(np.nan_to_num(answer.induced), 0.0)
@@ -189,6 +356,23 @@ def loads(
     if world.inertia and c.transient:
         torque = torque + world.inertia * np.gradient(omega, c.time)
     return TrueLoads(thrust, torque, answer.re75, answer.m_tip, answer)
+
+
+def _shroud(
+    rotor: truth.TruthRotor, duct: TruthDuct, world: World, rho: Array, along: Array, per_v: Array,
+    answer: truth.TrueAnswer,
+) -> Array:  # fmt: skip
+    """Thrust of the duct alone: that of the mass flow, less the blades' and the friction."""
+    ring = rotor.x * np.diff(rotor.edges)
+    through = np.sum((along[:, None] * (1.0 + per_v) + answer.ua) * ring, axis=1) / np.sum(ring)
+    whole = rho * (np.pi * rotor.radius**2) * (1.0 - rotor.hub**2) * through * answer.jet
+    skin = 0.5 * rho * (0.006 * 2.0 * np.pi * rotor.radius**2 * duct.length) * (through**2 + along**2)
+    shroud = whole - answer.thrust - skin
+    if world.lip:
+        # suction peak over head of the lip, with the flow that turns into the mouth; separates gradually above 4
+        turn = np.maximum(through - along, 0.0) ** 2 / (2.0 * duct.lip_radius) / np.maximum(120.0, 1e-9)
+        shroud = shroud * (1.0 - 0.6 * world.lip / (1.0 + np.exp(-(turn - 4.0) / 0.6)))
+    return np.asarray(shroud)
 
 
 def _two_stage_lag(time: Array, target: Array, lag: float) -> Array:
@@ -208,7 +392,7 @@ def _round(
     c: Conditions,
     pressure: Array,
     world: World,
-    extra: dict[str, Any],
+    extra: dict[str, Array],
     start: truth.TrueAnswer | None,
 ) -> truth.TrueAnswer:
     """Mean of eight azimuths of a blade in a stream across the disk.

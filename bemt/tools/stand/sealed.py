@@ -12,16 +12,14 @@ import numpy as np
 from bemt import __version__
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import write_atomic
-from bemt.judge.proof import draw, seal
-from bemt.judge.proof.causes import CAUSES
+from bemt.judge.proof import prove, rows
+from bemt.judge.proof.causes import CAUSES, WALL, Rig, draw_rig
 from bemt.judge.proof.items import Bench
 from bemt.judge.proof.prove import KEY_SCHEMA
-from bemt.judge.proof.rigs import WALL, Rig, draw_rig
 from bemt.judge.proof.rows import Entry, Key
 from bemt.judge.proof.truth import TruthRotor
-from bemt.judge.proof.truth_duct import TruthDuct
 from bemt.judge.proof.truth_section import TrueSection
-from bemt.judge.proof.truth_world import Conditions
+from bemt.judge.proof.truth_world import Conditions, TruthDuct
 
 if TYPE_CHECKING:
     from bemt.rotors.case import Case
@@ -37,7 +35,7 @@ _NOTHING = 0.25
 
 def bench_of(folder: Path, item: str) -> tuple[Bench, Entry]:
     """Bench and entry of an item of a sealed key."""
-    key = seal.unseal(folder)
+    key = rows.unseal(folder)
     entry = next(e for e in key.items if e.folder == item)
     if key.size == _OWN:
         from bemt.rotors.case import load_case
@@ -46,7 +44,7 @@ def bench_of(folder: Path, item: str) -> tuple[Bench, Entry]:
         rig = rig_of(load_case(told["case"]), told["top_rpm"])
         return Bench(rig, entry.plan, rows_of(told["points"])), entry
     first, _ = np.random.SeedSequence(int(key.seed)).spawn(2)
-    found = {(b.rig.name, b.plan): b for b in draw.benches(draw.SIZES[key.size], first)}
+    found = {(b.rig.name, b.plan): b for b in prove.benches(prove.SIZES[key.size], first)}
     return found[entry.rig, entry.plan], entry
 
 
@@ -68,7 +66,7 @@ def seal_case(
     )  # fmt: skip
     told = {"case": case.path.resolve().as_posix(), "top_rpm": top_rpm, "points": [dict(p) for p in points]}
     write_atomic(folder / _POINTS, json.dumps(told))
-    return seal.seal(folder, Key(KEY_SCHEMA, __version__, str(seed), _OWN, (entry,)))
+    return rows.seal(folder, Key(KEY_SCHEMA, __version__, str(seed), _OWN, (entry,)))
 
 
 def rig_of(case: Case, top_rpm: float) -> Rig:
