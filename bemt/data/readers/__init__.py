@@ -83,6 +83,10 @@ class SourceText(Collector):
         """Lines without line ends; line numbers in faults count from 1."""
         return self.text.splitlines()
 
+    def may_be_cut(self, line: int) -> bool:
+        """Whether a line is the last and has no end."""
+        return line == len(self.lines) and not self.text.endswith(("\n", "\r"))
+
     @property
     def about(self) -> dict[str, str]:
         """Provenance of what is read from it."""
