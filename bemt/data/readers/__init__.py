@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -45,6 +45,20 @@ HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+
+
+class Importer(Protocol):
+    """What every reader has, a module or an object."""
+
+    KIND: str
+
+    @property
+    def sniff(self) -> Callable[[bytes | str], bool]:
+        """Tell whether the head of a file has this format."""
+
+    @property
+    def read(self) -> Callable[[str | os.PathLike[str]], Any]:
+        """Read a file."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +270,7 @@ def number(token: str) -> float | None:
 
 
 @cache
-def importers() -> Mapping[str, Any]:
+def importers() -> Mapping[str, Importer]:
     """Find the readers in this folder.
 
     Returns
@@ -269,7 +283,7 @@ def importers() -> Mapping[str, Any]:
     TypeError
         If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
     """
-    found: dict[str, Any] = {}
+    found: dict[str, Importer] = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
         for reader in getattr(module, "READERS", (module,)):
