@@ -132,6 +132,21 @@ def _header(source: SourceText, line: int, text: str) -> tuple[dict[str, int], l
     return columns, ignored
 
 
+def _by_condition(
+    source: SourceText, rows: Sequence[PolarRow], said: list[str]
+) -> dict[tuple[float, float], dict[float, PolarRow]]:
+    """Rows by Reynolds and Mach number and by angle; an angle that comes again is told, or a fault."""
+    groups: dict[tuple[float, float], dict[float, PolarRow]] = {}
+    for row in rows:
+        old = groups.setdefault((NO_RE if row.Re is None else row.Re, row.M), {}).setdefault(round(row.alpha, 9), row)
+        if (old.cl, old.cd) != (row.cl, row.cd):
+            got = f"another row at {math.degrees(row.alpha):.6g} deg (line {old.line} has other values)"
+            source.add(row.line, got, "each angle once per Reynolds and Mach number")
+        elif old is not row:
+            said.append(f"line {row.line} repeats line {old.line}")
+    return groups
+
+
 def assemble(
     source: SourceText, rows: Sequence[PolarRow], *, name: str = "", kind: str = "CSV", radians: bool = False,
     notes: Sequence[str] = (),
@@ -139,26 +154,19 @@ def assemble(
     """Check rows of any polar format and make the Polar."""
     said = list(notes)
     _doubts(source, rows, radians)
-    groups: dict[tuple[float, float], dict[float, PolarRow]] = {}
-    for row in rows:
-        group = groups.setdefault((NO_RE if row.Re is None else row.Re, row.M), {})
-        old = group.setdefault(round(row.alpha, 9), row)
-        if old is not row and (old.cl, old.cd) != (row.cl, row.cd):
-            got = f"another row at {math.degrees(row.alpha):.6g} deg (line {old.line} has other values)"
-            source.add(row.line, got, "each angle once per Reynolds and Mach number")
-        elif old is not row:
-            said.append(f"line {row.line} repeats line {old.line}")
+    groups = _by_condition(source, rows, said)
     tables = []
     for (reynolds, mach), group in sorted(groups.items()):
         used = [group[a] for a in sorted(group)]
         lo, hi = (math.degrees(used[k].alpha) for k in (0, -1))
         label = f" at Re {reynolds:.4g}, Mach {mach:g}" if len(groups) > 1 else ""
-        if not rows or lo > 0.0 or hi < MIN_SPAN_DEG or len(used) < 3:
+        if lo > 0.0 or hi < MIN_SPAN_DEG or len(used) < 3:
             got = f"{len(used)} angles from {lo:.4g} to {hi:.4g} deg{label}"
             source.add("", got, f"three or more that hold 0 and reach {MIN_SPAN_DEG:g} deg")
-        columns = np.array([(r.alpha, r.cl, r.cd) for r in used])
-        columns[0, 0], columns[-1, 0] = (_snap(columns[k, 0]) for k in (0, -1))
-        tables.append(ExtrapolatedTable(columns[:, 0], columns[:, 1], columns[:, 2], reynolds, mach))
+        alpha, cl, cd = np.array([(r.alpha, r.cl, r.cd) for r in used]).T
+        # 180 deg that lost its last digits is exactly +-pi
+        alpha[[0, -1]] = [math.copysign(math.pi, a) if abs(abs(a) - math.pi) < 1e-4 else a for a in alpha[[0, -1]]]
+        tables.append(ExtrapolatedTable(alpha, cl, cd, reynolds, mach))
     if not rows and not source.faults:
         source.add("", "no rows", "rows of alpha, cl and cd")
     sizes = len({r for r, _ in groups}), len({m for _, m in groups})
@@ -172,23 +180,23 @@ def assemble(
     return from_tables(tables, name=name or Path(source.name).stem, source=label, notes=said)
 
 
-def _snap(alpha: float) -> float:
-    """Exactly +-pi for 180 deg that lost its last digits."""
-    return math.copysign(math.pi, alpha) if abs(abs(alpha) - math.pi) < 1e-4 else alpha
+_EACH: tuple[tuple[str, str, float, float, str, str], ...] = (
+    ("cd", "cd", 5e-324, math.inf, "a drag coefficient above 0", ""),
+    ("cl", "cl", -5.0, 5.0, "a lift coefficient within +-5", "Are columns swapped?"),
+    ("Re", "Re", 1e3, 1e9, "a Reynolds number from 1e3 to 1e9", "Millions? Write 0.1 million as 1e5"),
+    ("M", "Mach", 0.0, 1.5, "a Mach number from 0 to 1.5", ""),
+)
+"""Of each row: attribute, its name, least and largest value, words, hint (of Re: below 1000)."""
 
 
 def _doubts(source: SourceText, rows: Sequence[PolarRow], radians: bool) -> None:
     """Faults of magnitude: units are never converted on suspicion, but refused with a hint."""
     for row in rows:
-        if row.cd <= 0.0:
-            source.add(row.line, f"cd = {row.cd:g}", "a drag coefficient above 0")
-        if abs(row.cl) > 5.0:
-            source.add(row.line, f"cl = {row.cl:g}", "a lift coefficient within +-5", "Are columns swapped?")
-        if row.Re is not None and not 1e3 <= row.Re <= 1e9:
-            hint = "Millions? Write 0.1 million as 1e5" if 0.0 < row.Re < 1e3 else ""
-            source.add(row.line, f"Re = {row.Re:g}", "a Reynolds number from 1e3 to 1e9", hint)
-        if not 0.0 <= row.M <= 1.5:
-            source.add(row.line, f"Mach = {row.M:g}", "a Mach number from 0 to 1.5")
+        for attribute, word, low, high, expected, hint in _EACH:
+            value = getattr(row, attribute)
+            if value is not None and not low <= value <= high:
+                why = hint if word != "Re" or 0.0 < value < low else ""
+                source.add(row.line, f"{word} = {value:g}", expected, why)
     if not rows:
         return
     alpha = np.array([r.alpha for r in rows])
@@ -295,35 +303,36 @@ def _rewritten(text: str) -> str:
     )
 
 
-def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
-    """Name, rows and notes of one file."""
-    text = _rewritten(source.text)
-    title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
-    notes = []
-    if title is None:
-        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
-    if kind and (kind.group(1).lower() != "fixed" or kind.group(2).lower() != "fixed"):
-        got = f"Reynolds number {kind.group(1)}, Mach number {kind.group(2)}"
-        line = str(text.count("\n", 0, kind.end()) + 1)
-        source.add(line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
-    reynolds, mach = None, 0.0
+def _state(source: SourceText, text: str) -> tuple[float | None, float, list[str]]:
+    """Reynolds and Mach number of the run, and a note."""
+    state = _STATE.search(text)
     if state is None:
         got, hint = "no line 'Mach = ... Re = ... e 6 Ncrit = ...'", "Save the polar with viscous mode on"
         source.add("", got, "the state of the run", hint)
-    else:
-        values = [number(state.group(k)) for k in (1, 2, 4)]
-        line = str(text.count("\n", 0, state.start()) + 1)
-        if any(v is None for v in values):
-            source.add(line, repr(state.group(0)), "numbers for Mach, Re and Ncrit")
-        else:
-            mach, reynolds = float(values[0] or 0.0), float(values[1] or 0.0) * 10.0 ** int(state.group(3))
-            notes.append(f"Ncrit {values[2]:g}")
-            if reynolds == 0.0:
-                reynolds = None
-                hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
-                source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
-    if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
-        notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
+        return None, 0.0, []
+    mach, millions, ncrit = (number(state[k]) for k in (1, 2, 4))
+    line = text.count("\n", 0, state.start()) + 1
+    if mach is None or millions is None or ncrit is None:
+        source.add(line, repr(state[0]), "numbers for Mach, Re and Ncrit")
+        return None, 0.0, []
+    if millions == 0.0:
+        hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
+        source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
+    return millions * 10.0 ** int(state[3]) or None, mach, [f"Ncrit {ncrit:g}"]
+
+
+def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
+    """Name, rows and notes of one file."""
+    text = _rewritten(source.text)
+    title, kind, trip = (p.search(text) for p in (_TITLE, _TYPE, _TRIP))
+    if title is None:
+        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
+    if kind and {kind[1].lower(), kind[2].lower()} != {"fixed"}:
+        got = f"Reynolds number {kind[1]}, Mach number {kind[2]}"
+        source.add(text.count("\n", 0, kind.end()) + 1, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
+    reynolds, mach, notes = _state(source, text)
+    if trip and trip.groups() != ("1.000", "1.000"):
+        notes.append(f"forced transition at x/c {trip[1]} (top), {trip[2]} (bottom)")
     rows: list[PolarRow] = []
     lines = text.splitlines()
     start = next((i for i, line in enumerate(lines) if _HEADER.match(line)), len(lines))
@@ -334,7 +343,7 @@ def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
             rows += row_of(source, i, cells, reynolds, mach, ("alpha", "CL", "CD"))
     if not rows:
         source.add("", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?")
-    return (title.group(1) if title else ""), rows, notes
+    return (title[1] if title else ""), rows, notes
 
 
 # C81 airfoil tables: lift and drag over angle of attack and Mach number, fixed width.
