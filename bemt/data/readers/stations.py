@@ -15,9 +15,8 @@ from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
 from bemt.data.readers._words import english, plain
-from bemt.data.readers.headings import splits
 from bemt.data.readers.split import SplitTable, decimal_mark, split_table
-from bemt.data.readers.unit_text import unit_for
+from bemt.data.readers.unit_text import splits, unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 WIDEST = 0.8

@@ -17,7 +17,7 @@ from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import packed, unpacked
 from bemt.base.tables import number_of
-from bemt.data.readers import load_bytes, polars, uiuc
+from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
@@ -123,7 +123,7 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
 def _as_text(head: str) -> tuple[str, str] | None:
     """What a text looks like that is no table of numbers."""
     lines, words = [line for line in head.splitlines() if line.strip()], head.split()
-    if polars.resembles(head):
+    if polars_c81.resembles(head):
         hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
         return ("a C81 table with a different column width", hint)
     if len(lines) == 1 and re.search(r"[,;\t]", lines[0]):

@@ -171,6 +171,33 @@ def facts_of(
     )  # fmt: skip
 
 
+def where_of(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
+    """Lines of the first of some rows."""
+    lines = [str(facts.lines[int(r)]) for r in rows[:6]]
+    more = f" and {len(rows) - 6} more" if len(rows) > 6 else ""
+    return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
+
+
+# Rows from which a recording is a log, and share of those under load that are misread in one.
+_LOG, _FEW_ROWS = 100, 0.2
+
+
+def enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:
+    """Whether rows are more than the transients and spikes of a log: one in a table, 1 % of many."""
+    return bool(np.any(odd)) and float(odd.sum()) > 0.01 * (float(among.sum()) if len(odd) >= MANY else 0.0)
+
+
+def contradicts(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> str:
+    """Severity of what cannot be so: a few rows of a log are misread, a table or much of a log contradicts itself."""
+    few = len(odd) >= _LOG and float(odd.sum()) < _FEW_ROWS * float(among.sum())
+    return "warning" if few else "error"
+
+
+def rows_of(mask: NDArray[np.bool_]) -> tuple[int, ...]:
+    """Rows of a mask."""
+    return tuple(int(i) for i in np.flatnonzero(mask))
+
+
 # Wind that a recording does not state: below some speed of rotation the propeller is a windmill.
 # Thrust this small, share of the largest, has no sign; fewest readings of either sign; share of these on the wrong side
 # of the zero, as misread speeds are; thrust coefficients next to the zero, share of the largest, that are no jump.
