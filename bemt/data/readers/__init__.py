@@ -52,12 +52,10 @@ class Importer(Protocol):
 
     KIND: str
 
-    @property
-    def sniff(self) -> Callable[[bytes | str], bool]:
+    def sniff(self, head: bytes | str, /) -> bool:
         """Tell whether the head of a file has this format."""
 
-    @property
-    def read(self) -> Callable[[str | os.PathLike[str]], Any]:
+    def read(self, path: str | os.PathLike[str], /) -> Any:
         """Read a file."""
 
 
@@ -232,6 +230,17 @@ def head_text(head: bytes | str) -> str:
     if isinstance(head, str):
         return head.removeprefix("\ufeff")
     return "" if _binary(head) else decode(head)
+
+
+def begins(pattern: str) -> Callable[[bytes | str], bool]:
+    r"""Sniffer of files whose text begins so, in capitals or not.
+
+    >>> sniff = begins(r"\s*DFDC\s+Version")
+    >>> sniff("DFDC Version 0.55"), sniff(b"XROTOR VERSION: 7.55")
+    (True, False)
+    """
+    mark = re.compile(pattern, re.IGNORECASE)
+    return lambda head: mark.match(head_text(head)) is not None
 
 
 def first_cells(head: bytes | str) -> set[str]:

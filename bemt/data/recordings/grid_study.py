@@ -118,26 +118,16 @@ class LoadStudy(Documented):
         return f"{lead}; order {self.order:.2f}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %, {end}"
 
 
-def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
-    """Give the representative cell size (V/N)^(1/d). [m]
-
-    >>> round(cell_size(1e6) / cell_size(8e6), 3)
-    2.0
-    """
-    if not (cells > 0 and volume > 0 and dimensions in (2, 3)):
-        got = f"{cells:g} cells, volume {volume:g}, {dimensions} dimensions"
-        raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
-    return float((volume / cells) ** (1.0 / dimensions))
-
-
 def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
     """Give refinement ratios from cell counts, finest grid first. [1]
 
     >>> [round(r, 3) for r in ratios([8e6, 1e6, 125e3])]
     [2.0, 2.0]
     """
-    sizes = [cell_size(n, 1.0, dimensions) for n in cells]
-    return tuple(b / a for a, b in zip(sizes, sizes[1:], strict=False))
+    if not (min(cells) > 0 and dimensions in (2, 3)):
+        got = f"{', '.join(f'{n:g}' for n in cells)} cells, {dimensions} dimensions"
+        raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
+    return tuple(float((a / b) ** (1.0 / dimensions)) for a, b in zip(cells, cells[1:], strict=False))
 
 
 def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:
