@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 
@@ -339,19 +339,24 @@ def detect(path: str | os.PathLike[str]) -> str:
             place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
         kinds = [k for k, m in known.items() if m.sniff(head)]
         kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
-        for command, where in plugins.offered("FILE_KINDS").items() if not kinds else ():
-            if kind := plugins.load(where)(target):
-                place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
-        if not kinds and _binary(head):
-            place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
         if not kinds:
-            hint = "Give --format (format = in a case) if its head is unusual"
-            expected = f"a table under a line of headings, or a file of one of the {len(known)} formats that are read"
-            place.refuse("", "content of no known format", expected, hint)
+            _unknown(target, head, place)
     if len(kinds) > 1:
         hint = " or ".join(f'format = "{kind}"' for kind in kinds)
         place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")
     return kinds[0]
+
+
+def _unknown(target: Path, head: bytes, place: Collector) -> NoReturn:
+    """Refuse a file that no reader claims, with what reads it or what it is."""
+    for command, where in plugins.offered("FILE_KINDS").items():
+        if kind := plugins.load(where)(target):
+            place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
+    if _binary(head):
+        place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
+    hint = "Give --format (format = in a case) if its head is unusual"
+    expected = f"a table under a line of headings, or a file of one of the {len(importers())} formats that are read"
+    place.refuse("", "content of no known format", expected, hint)
 
 
 def _head(target: Path, place: Collector) -> bytes:

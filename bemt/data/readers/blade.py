@@ -298,11 +298,11 @@ def read_qprop(path: str | os.PathLike[str]) -> BladeFile:
             told = f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}"
             rows.add(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
     last = f"{r[-1]:g} m"
-    if math.isfinite(R) and R > 1.5 * r[-1]:
+    if R > 1.5 * r[-1]:
         rows.add(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
     if blades != as_count(blades):
         rows.add(line, f"{blades:g} blades", "a whole number")
-    if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
+    if R * (1 + 1e-9) < r[-1]:
         rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
     name, beta = rows.rows[0][1].strip(), np.radians(b)
     return rows.finish(

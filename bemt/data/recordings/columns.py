@@ -213,13 +213,12 @@ def slow_rotor(facts: Facts) -> Iterator[Finding]:
     Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
     by the next row; none needs more than `SLOWEST_S`, whatever its size.
     """
-    t, response = facts.get("time_s"), next((k for k in ("rpm", "thrust_N") if facts.get(k) is not None), None)
-    command = next((v for k in ("pwm_s", "throttle") if (v := facts.get(k)) is not None), None)
-    if t is None or command is None or response is None:
+    t, told, command = facts.get("time_s"), facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
+    if t is None or command is None or told is None:
         return
-    y = facts.values[response]
-    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(command) & np.isfinite(y))
-    t, c, y = t[rows], command[rows], np.abs(y[rows])
+    response, (_, c), y = told[0], command, told[1]
+    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(c) & np.isfinite(y))
+    t, c, y = t[rows], c[rows], np.abs(y[rows])
     if rows.size < 2 * HELD or float(np.ptp(c)) == 0.0 or float(np.ptp(y)) == 0.0:
         return
     level = (c - c.min()) / np.ptp(c)

@@ -127,7 +127,8 @@ def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
     if not (min(cells) > 0 and dimensions in (2, 3)):
         got = f"{', '.join(f'{n:g}' for n in cells)} cells, {dimensions} dimensions"
         raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
-    return tuple(float((a / b) ** (1.0 / dimensions)) for a, b in zip(cells, cells[1:], strict=False))
+    sizes = [float((1.0 / n) ** (1.0 / dimensions)) for n in cells]
+    return tuple(b / a for a, b in zip(sizes, sizes[1:], strict=False))
 
 
 def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:

@@ -187,7 +187,7 @@ def import_files(
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
     exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
-    if exports and all(exports.values()) and not runs:
+    if exports and all((*exports.values(), not runs)):
         for name, what in exports.items():
             errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
         to_do = None

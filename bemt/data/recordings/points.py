@@ -280,8 +280,7 @@ def from_samples(rec: Dataset, name: str) -> Found:
     for run in labels[np.argsort(first)].tolist():
         rows = np.flatnonzero(runs == run)
         rows, t = _clock(rec, rows, found)
-        inside = ((key, v if len(rows) == len(v) else v[rows]) for key, v in data.items())
-        part = {key: v for key, v in inside if np.any(np.isfinite(v))}
+        part = {key: some for key, v in data.items() if np.any(np.isfinite(some := _part(v, rows)))}
         if signal not in part:
             found.lost += lost(rec, rows, "", f"a run without {signal}")
             continue
@@ -339,7 +338,12 @@ def _clock(rec: Dataset, rows: NDArray[np.intp], found: Found) -> tuple[NDArray[
     none = rows[~np.isfinite(t[rows])]
     found.lost += lost(rec, none, "", "no time")
     kept = rows[np.isfinite(t[rows])]
-    return kept, t if len(kept) == len(t) else t[kept]
+    return kept, _part(t, kept)
+
+
+def _part(values: Array, rows: Rows) -> Array:
+    """Values of some rows; no copy for all of them."""
+    return values if len(rows) == len(values) else values[rows]
 
 
 def from_rows(rec: Dataset) -> Found:

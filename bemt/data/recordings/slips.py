@@ -366,7 +366,7 @@ def outlier_runs(levels: Sequence[Level]) -> list[tuple[Level, Finding]]:
             if likely:
                 finding = Finding(likely[0].id, channel, _evidence(odd), _fix(odd, likely))
                 found[id(odd.level)] = (odd.level, finding)
-    return [found[id(v)] for v in levels if id(v) in found]
+    return list(filter(None, (found.get(id(v)) for v in levels)))
 
 
 @dataclass(frozen=True)
