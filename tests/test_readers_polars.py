@@ -11,10 +11,10 @@ import pytest
 
 from bemt.base.errors import InputError
 from bemt.data import readers as importers
-from bemt.data.readers import polars
+from bemt.data.readers import polars, polars_c81
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, Polar
 
-KINDS = {reader.KIND: reader for reader in polars.READERS}
+KINDS = {reader.KIND: reader for reader in (*polars.READERS, polars_c81)}
 ALPHA = np.arange(-12.0, 16.5, 1.0)
 
 
@@ -169,7 +169,7 @@ def test_xfoil_round_trip_and_several_files(put: Callable[[str], Path]) -> None:
 @pytest.mark.parametrize("count", [2, 9, 11])
 def test_c81_round_trip(count: int, put: Callable[[str], Path]) -> None:
     machs = np.round(np.linspace(0.0, 0.8, count), 2)
-    p = polars.read_polar_c81(put(c81(ALPHA, machs)))
+    p = polars_c81.read(put(c81(ALPHA, machs)))
     assert p.name == "NACA 4412 TEST" and p.Re.size == 1
     np.testing.assert_allclose(p.M, machs)
     for m in machs:
@@ -177,7 +177,7 @@ def test_c81_round_trip(count: int, put: Callable[[str], Path]) -> None:
 
 
 def test_c81_tables_with_other_mach_numbers_are_joined(put: Callable[[str], Path]) -> None:
-    p = polars.read_polar_c81(put(c81(ALPHA, np.array([0.0, 0.4, 0.8]), np.array([0.0, 0.8]))))
+    p = polars_c81.read(put(c81(ALPHA, np.array([0.0, 0.4, 0.8]), np.array([0.0, 0.8]))))
     assert p.M.tolist() == [0.0, 0.4, 0.8] and "lift and drag interpolated to one grid" in p.notes
     cl, cd = p.lookup(np.deg2rad(ALPHA), 1e5, 0.4)
     np.testing.assert_allclose(cl, cl_of(ALPHA, 1e5, 0.4), atol=1e-9)

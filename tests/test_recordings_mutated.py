@@ -15,10 +15,11 @@ from pathlib import Path
 import pytest
 
 from bemt.base.errors import InputError
-from bemt.data.recordings.adapt import findings, is_recording, points_text, reduction_document, reduction_of
+from bemt.data.recordings.adapt import findings, is_recording, reduction_of
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.load import import_file
 from bemt.data.recordings.reduce import reduction
+from bemt.data.recordings.shown import points_text, reduction_document
 from bemt.physics.dataset import Dataset
 
 INJURIES = (

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 
@@ -45,6 +45,18 @@ HEAD_BYTES = 16384
 """Number of bytes passed to ``sniff``."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+
+
+class Importer(Protocol):
+    """What every reader has, a module or an object."""
+
+    KIND: str
+
+    def sniff(self, head: bytes | str, /) -> bool:
+        """Tell whether the head of a file has this format."""
+
+    def read(self, path: str | os.PathLike[str], /) -> Any:
+        """Read a file."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +94,10 @@ class SourceText(Collector):
     def lines(self) -> list[str]:
         """Lines without line ends; line numbers in faults count from 1."""
         return self.text.splitlines()
+
+    def may_be_cut(self, line: int) -> bool:
+        """Whether a line is the last and has no end."""
+        return line == len(self.lines) and not self.text.endswith(("\n", "\r"))
 
     @property
     def about(self) -> dict[str, str]:
@@ -216,6 +232,17 @@ def head_text(head: bytes | str) -> str:
     return "" if _binary(head) else decode(head)
 
 
+def begins(pattern: str) -> Callable[[bytes | str], bool]:
+    r"""Sniffer of files whose text begins so, in capitals or not.
+
+    >>> sniff = begins(r"\s*DFDC\s+Version")
+    >>> sniff("DFDC Version 0.55"), sniff(b"XROTOR VERSION: 7.55")
+    (True, False)
+    """
+    mark = re.compile(pattern, re.IGNORECASE)
+    return lambda head: mark.match(head_text(head)) is not None
+
+
 def first_cells(head: bytes | str) -> set[str]:
     r"""Cells of the first line of a comma-separated file, for sniffers.
 
@@ -252,7 +279,7 @@ def number(token: str) -> float | None:
 
 
 @cache
-def importers() -> Mapping[str, Any]:
+def importers() -> Mapping[str, Importer]:
     """Find the readers in this folder.
 
     Returns
@@ -265,7 +292,7 @@ def importers() -> Mapping[str, Any]:
     TypeError
         If a module with a KIND lacks sniff or read, or repeats a kind (a bug, not an input error).
     """
-    found: dict[str, Any] = {}
+    found: dict[str, Importer] = {}
     for info in pkgutil.iter_modules(__path__):
         module = importlib.import_module(f"{__name__}.{info.name}")
         for reader in getattr(module, "READERS", (module,)):
@@ -312,19 +339,24 @@ def detect(path: str | os.PathLike[str]) -> str:
             place.refuse("", "an empty file", "results as a table of text", "Did the export finish?")
         kinds = [k for k, m in known.items() if m.sniff(head)]
         kinds = [k for k in kinds if not getattr(known[k], "FALLBACK", False)] or kinds
-        for command, where in plugins.offered("FILE_KINDS").items() if not kinds else ():
-            if kind := plugins.load(where)(target):
-                place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
-        if not kinds and _binary(head):
-            place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
         if not kinds:
-            hint = "Give --format (format = in a case) if its head is unusual"
-            expected = f"a table under a line of headings, or a file of one of the {len(known)} formats that are read"
-            place.refuse("", "content of no known format", expected, hint)
+            _unknown(target, head, place)
     if len(kinds) > 1:
         hint = " or ".join(f'format = "{kind}"' for kind in kinds)
         place.refuse("", f"content claimed by {', '.join(kinds)}", "one format", f"Give {hint}")
     return kinds[0]
+
+
+def _unknown(target: Path, head: bytes, place: Collector) -> NoReturn:
+    """Refuse a file that no reader claims, with what reads it or what it is."""
+    for command, where in plugins.offered("FILE_KINDS").items():
+        if kind := plugins.load(where)(target):
+            place.refuse("", kind, "a recording of a stand", f"It is read by {command} {target}")
+    if _binary(head):
+        place.refuse("", "binary data (NUL bytes)", "a text file", "Export the data as plain text (CSV)")
+    hint = "Give --format (format = in a case) if its head is unusual"
+    expected = f"a table under a line of headings, or a file of one of the {len(importers())} formats that are read"
+    place.refuse("", "content of no known format", expected, hint)
 
 
 def _head(target: Path, place: Collector) -> bytes:

@@ -28,7 +28,7 @@ import numpy as np
 
 from bemt.base.averaging import Mean
 from bemt.base.tables import number_of
-from bemt.data.readers import Reader, SourceText, load_text, number
+from bemt.data.readers import Reader, SourceText, begins, load_text, number
 from bemt.data.readers.cfd import (
     Column,
     ExportRow,
@@ -184,16 +184,7 @@ def _block(source: SourceText, lines: list[tuple[int, str]]) -> Dataset:
 
 FLUENT_ASCII = "fluent_ascii"
 
-_FIRST = ("nodenumber", "cellnumber")
-
-
-def sniff_fluent_ascii(head: bytes | str) -> bool:
-    r"""Tell whether the first line names node or cell numbers and a coordinate.
-
-    >>> sniff_fluent_ascii("nodenumber,  x-coordinate, pressure\n 1, 0.1, 3"), sniff_fluent_ascii("node,x\n1,2")
-    (True, False)
-    """
-    return any(line.lower().lstrip('"').startswith(_FIRST) for line in head_lines(head, 1))
+sniff_fluent_ascii = begins(r"\s*\"*(nodenumber|cellnumber)")
 
 
 def read_fluent_ascii(path: str | os.PathLike[str]) -> Dataset:

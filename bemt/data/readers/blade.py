@@ -12,7 +12,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.tables import number_of
-from bemt.data.readers import Reader, SourceText, head_text, load_text, number
+from bemt.data.readers import Reader, SourceText, begins, head_text, load_text, number
 from bemt.physics.sections.parametric import QpropSection, XrotorSection
 from bemt.physics.sections.polars import DEFAULT_RE, Polar
 
@@ -175,18 +175,7 @@ density_kg_m3 = {rho:.9g}
 # XROTOR: saved rotors of version 6.9 and later.
 
 XROTOR = "xrotor"
-_XROTOR_HEAD = re.compile(r"\s*XROTOR\s+VERSION", re.I)
-
-
-def sniff_xrotor(head: bytes | str) -> bool:
-    r"""Tell whether a file begins as XROTOR's SAVE writes it.
-
-    >>> sniff_xrotor("XROTOR VERSION:  7.55\nblade\n"), sniff_xrotor("DFDC Version 0.55\n")
-    (True, False)
-    """
-    return _XROTOR_HEAD.match(head_text(head)) is not None
-
-
+sniff_xrotor = begins(r"\s*XROTOR\s+VERSION")
 _SECTION = (
     (1, "r/R of a section"), (4, "A0deg dCLdA CLmax CLmin"), (4, "dCLdAstall dCLstall Cmconst Mcrit"),
     (3, "CDmin CLCDmin dCDdCL^2"), (2, "REref REexp"),
@@ -309,11 +298,11 @@ def read_qprop(path: str | os.PathLike[str]) -> BladeFile:
             told = f"CL_a {s.cla:g}, CD0 {s.cd0:g}, CLmin {s.clmin:g}, CLmax {s.clmax:g}"
             rows.add(f"section {k + 1}", told, "a slope per radian from 0.5 to 15, drag above 0, CLmin < CLmax")
     last = f"{r[-1]:g} m"
-    if math.isfinite(R) and R > 1.5 * r[-1]:
+    if R > 1.5 * r[-1]:
         rows.add(line, f"R = {R:g} m with a last radius of {last}", "a tip near it", "R takes no Rfac: metres")
     if blades != as_count(blades):
         rows.add(line, f"{blades:g} blades", "a whole number")
-    if math.isfinite(R) and not R * (1 + 1e-9) >= r[-1]:
+    if R * (1 + 1e-9) < r[-1]:
         rows.add(line, f"R = {R:g}", f"at least the last radius, {last}", "R is in metres, whatever Rfac is")
     name, beta = rows.rows[0][1].strip(), np.radians(b)
     return rows.finish(
@@ -324,16 +313,6 @@ def read_qprop(path: str | os.PathLike[str]) -> BladeFile:
 # DFDC: case files with a bladed rotor in a duct (the centre body gives the hub).
 
 DFDC = "dfdc"
-_DFDC_HEAD = re.compile(r"\s*DFDC\s+Version", re.I)
-
-
-def sniff_dfdc(head: bytes | str) -> bool:
-    r"""Tell whether a file begins as a DFDC case.
-
-    >>> sniff_dfdc("DFDC Version 0.55\nduct\n"), sniff_dfdc("XROTOR VERSION: 7.55\n")
-    (True, False)
-    """
-    return _DFDC_HEAD.match(head_text(head)) is not None
 
 
 def read_dfdc(path: str | os.PathLike[str]) -> BladeFile:
@@ -423,5 +402,5 @@ def _crossings(outline: np.ndarray, x: float) -> list[float]:
 READERS = (
     Reader(XROTOR, sniff_xrotor, read_xrotor, BLADE=True),
     Reader(QPROP, sniff_qprop, read_qprop, BLADE=True),
-    Reader(DFDC, sniff_dfdc, read_dfdc, BLADE=True),
+    Reader(DFDC, begins(r"\s*DFDC\s+Version"), read_dfdc, BLADE=True),
 )

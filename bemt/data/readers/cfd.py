@@ -175,7 +175,7 @@ def _value(text: str, commas: bool) -> float | None:
 
 def _maybe_cut(source: SourceText, rows: Sequence[ExportRow]) -> bool:
     """Whether the last row may have lost its end: no line end, and not of the fixed format of the rows before it."""
-    if not rows or source.text.endswith(("\n", "\r")) or rows[-1].line != len(source.lines) or not rows[-1].cells:
+    if not rows or not rows[-1].cells or not source.may_be_cut(rows[-1].line):
         return False
     last = rows[-1].cells[-1].lstrip("+-")
     before = [row.cells[-1].lstrip("+-") for row in rows[-50:-1] if row.cells]

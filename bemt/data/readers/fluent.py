@@ -19,8 +19,8 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,20 +35,28 @@ from bemt.physics.dataset import Dataset
 FLUENT_FORCES = "fluent_forces"
 
 _TITLE = re.compile(r"(Forces|Moments|Center of Pressure)\b(?!\s*[\[(])(.*)")
+_RULES = re.compile(r"[-\s]+")
 _CELL = re.compile(r"\([^()]*\)|\S+")
 _GROUP = re.compile(r"(\S(?:.*?\S)?)\s*(?:[\[(]([^\])]*)[\])])?\s*$")
 _BASE = {"forces": "force", "moments": "moment", "coefficients": "coefficient"}
 _SI = {"force": "N", "moment": "Nm"}
 
 
-@dataclass(frozen=True)
-class ForceEntry:
+class ForceEntry(NamedTuple):
     """One number of a force report: name without its zone, unit, zone, value."""
 
     name: str
     unit: str
     zone: str
     value: float
+
+
+class _Named(NamedTuple):
+    """A column: an axis stands between `stem` and `end`, which is the unit in SI and the direction."""
+
+    stem: str
+    end: str
+    unit: str
 
 
 def sniff_fluent_forces(head: bytes | str) -> bool:
@@ -65,119 +73,101 @@ def sniff_fluent_forces(head: bytes | str) -> bool:
     return first and any(line.startswith("Zone ") for k in titles for line in lines[k + 1 : k + 3])
 
 
-def _vector(cell: str) -> list[float] | None:
-    inner = cell.strip("()").split() if cell.startswith("(") else [cell]
-    values = [number(part) for part in inner]
-    return None if None in values or not values else [v for v in values if v is not None]
+def _vector(cell: str) -> list[float]:
+    """Numbers of a cell; none if one of its parts is no number."""
+    values = [number(part) for part in (cell.strip("()").split() if cell.startswith("(") else [cell])]
+    return [] if None in values else [v for v in values if v is not None]
 
 
-def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[tuple[str, str]] | str:
-    """Name and unit of each column, or what is wrong with the header."""
+def _names(title: str, rest: str, groups_line: str, zone_line: str) -> list[_Named] | str:
+    """Names and units of the columns, or what is wrong with the header."""
     columns = zone_line.split()[1:]
     if title == "Center of Pressure":
-        unit = re.search(r"\(([^()]*)\)\s*$", rest)
-        si = si_unit(unit[1]) if unit else None
-        suffix = f"_{si}" if si else ""
-        return [(f"center_of_pressure_{c}{suffix}", si or (unit[1] if unit else "")) for c in columns]
-    groups = [m for part in re.split(r"\s{3,}", groups_line.strip()) if (m := _GROUP.fullmatch(part))]
+        stated = (re.findall(r"\(([^()]*)\)\s*$", rest) or [""])[0]
+        si = si_unit(stated)
+        return [_Named(f"center_of_pressure_{c}", f"_{si}" if si else "", si or stated) for c in columns]
+    groups = [(m[1], m[2] or "") for m in map(_GROUP.fullmatch, re.split(r"\s{3,}", groups_line.strip())) if m]
     if not columns or not groups or len(columns) % len(groups):
         return f"{number_of(len(columns), 'column')} under {len(groups)} groups"
     each = len(columns) // len(groups)
-    if any(columns[k * each : (k + 1) * each] != columns[:each] for k in range(len(groups))):
+    if columns != columns[:each] * len(groups):
         return f"groups of unlike columns ({' '.join(columns)})"
     along = re.search(r"(?:Direction Vector|Moment Axis)\s*(\([^()]*\))", rest)
-    out: list[tuple[str, str]] = []
-    for k, column in enumerate(columns):
-        group = groups[k // each]
-        word = group[1].split()[0].lower()
-        base = _BASE.get(word, slug(group[1]))
-        if base == "coefficient":
-            base = "moment_coefficient" if title == "Moments" else "force_coefficient"
-        si = si_unit(group[2]) if group[2] else None
-        if si is not None and _SI.get(base, si) != si:
-            si = None
-        tail = f" along {along[1]} " if along else ""
-        out.append((f"{base}_{column.lower()}" + (f"_{si}" if si else "") + tail, si or group[2] or ""))
+    tail, coefficient = f" along {along[1]} " if along else "", f"{_BASE.get(title.lower(), 'force')}_coefficient"
+    out = []
+    for words, unit in groups:
+        base = _BASE.get(words.split()[0].lower(), slug(words))
+        si = si_unit(unit)
+        end = f"_{si}" if si and _SI.get(base, si) == si else ""
+        base = coefficient if base == "coefficient" else base
+        out += [_Named(f"{base}_{c.lower()}", end + tail, end[1:] or unit) for c in columns[:each]]
     return out
 
 
 def blocks(source: SourceText) -> Iterator[tuple[int, list[ForceEntry], list[str], list[Fault]]]:
     """Find the force tables of a text."""
-    lines = source.lines
-    k = 0
-    while k < len(lines):
-        match = _TITLE.fullmatch(lines[k].strip())
-        ahead = [i for i in range(k + 1, min(k + 3, len(lines))) if lines[i].startswith("Zone ")]
-        if not match or not ahead:
-            k += 1
+    lines, end = source.lines, 0
+    for k, text in enumerate(lines):
+        match = _TITLE.fullmatch(text.strip())
+        top = next((i for i in range(k + 1, min(k + 3, len(lines))) if lines[i].startswith("Zone ")), 0)
+        if k < end or not match or not top:
             continue
-        names = _names(match[1], match[2], lines[ahead[0] - 1] if ahead[0] - 1 > k else "", lines[ahead[0]])
+        names = _names(match[1], match[2], lines[k + 1] if top > k + 1 else "", lines[top])
         if isinstance(names, str):
-            yield k + 1, [], [], [source.fault(ahead[0] + 1, names, "a header of a force report")]
-            k = ahead[0] + 1
+            yield k + 1, [], [], [source.fault(top + 1, names, "a header of a force report")]
+            end = top + 1
             continue
-        start, k = k, ahead[0] + 1
-        entries: list[ForceEntry] = []
-        notes: list[str] = []
-        faults: list[Fault] = []
-        shape: set[int] = set()
-        while k < len(lines) and lines[k].strip() and not lines[k].startswith("("):
-            if not re.fullmatch(r"[-\s]+", lines[k]):
-                cells = _CELL.findall(lines[k])
-                vectors = [_vector(cell) for cell in cells[1:]]
-                sizes = {len(v) for v in vectors if v is not None}
-                cut = k == len(lines) - 1 and not source.text.endswith(("\n", "\r")) and lines[k][-1] not in " )"
-                # along a direction there are no vectors
-                right = ({1},) if " along " in names[0][0] else ({1}, {2}, {3})
-                shape = shape or (sizes if sizes in right else set())
-                if len(vectors) != len(names) or None in vectors or sizes not in right or sizes != shape or cut:
-                    got = f"{number_of(len(vectors), 'column')}, or text among them" + (
-                        " (no line end: cut?)" if cut else ""
-                    )
-                    faults.append(source.fault(k + 1, got, f"a zone and {len(names)} numbers or vectors"))
-                else:
-                    entries += _entries(cells[0], names, [v for v in vectors if v is not None])
-            k += 1
-        notes += _sums(entries, bool(faults), start + 1)
-        yield start + 1, entries, notes, faults
+        end = next((i for i in range(top + 1, len(lines)) if not lines[i].strip() or lines[i][0] == "("), len(lines))
+        entries, faults = _rows(source, names, [i for i in range(top + 1, end) if not _RULES.fullmatch(lines[i])])
+        yield k + 1, entries, _sums(entries, bool(faults), k + 1), faults
 
 
-def _entries(zone: str, names: Sequence[tuple[str, str]], vectors: Sequence[list[float]]) -> Iterator[ForceEntry]:
-    for (name, unit), vector in zip(names, vectors, strict=True):
-        for axis, value in zip("xyz" if len(vector) > 1 else ("",), vector, strict=False):
-            head, along, tail = name.partition(" along ")
-            suffix = f"_{unit}" if unit and head.endswith(f"_{unit}") else ""
-            stem = head.removesuffix(suffix) if suffix else head
-            yield ForceEntry(stem + (f"_{axis}" if axis else "") + suffix + along + tail, unit, zone, value)
+def _rows(source: SourceText, names: Sequence[_Named], at: Iterable[int]) -> tuple[list[ForceEntry], list[Fault]]:
+    """Numbers of the lines of a table, all of them single ones or vectors of one size; along a direction no vectors."""
+    entries: list[ForceEntry] = []
+    faults: list[Fault] = []
+    right, shape = ({1},) if " along " in names[0].end else ({1}, {2}, {3}), set[int]()
+    for k in at:
+        text = source.lines[k]
+        zone, *cells = _CELL.findall(text)
+        vectors = [_vector(cell) for cell in cells]
+        sizes = {len(v) for v in vectors if v}
+        cut = source.may_be_cut(k + 1) and text[-1] not in " )"
+        shape = shape or (sizes if sizes in right else set())
+        if len(vectors) != len(names) or [] in vectors or sizes not in right or sizes != shape or cut:
+            got = f"{number_of(len(vectors), 'column')}, or text among them" + (" (no line end: cut?)" if cut else "")
+            faults.append(source.fault(k + 1, got, f"a zone and {len(names)} numbers or vectors"))
+            continue
+        axes = [f"_{a}" for a in "xyz"] if sizes != {1} else [""]
+        entries += [ForceEntry(n.stem + axis + n.end, n.unit, zone, value) for n, vector in
+                    zip(names, vectors, strict=True) for axis, value in zip(axes, vector, strict=False)]  # fmt: skip
+    return entries, faults
 
 
 def _sums(entries: Sequence[ForceEntry], damaged: bool, line: int) -> list[str]:
     """Check Net against the zones and Total against its parts: a shifted or damaged column shows here."""
-    notes: list[str] = []
-    table = {(e.name, e.zone): e.value for e in entries}
-    if len(table) < len(entries):
-        count = Counter((e.name, e.zone) for e in entries)
-        repeated = {zone for (_, zone), n in count.items() if n > 1}
+    count = Counter((e.name, e.zone) for e in entries)
+    if repeated := {zone for (_, zone), n in count.items() if n > 1}:
         return [f"line {line}: zone {', '.join(sorted(repeated))} is repeated; sums not checked"]
-    zones = list(dict.fromkeys(e.zone for e in entries))
-    names = list(dict.fromkeys(e.name for e in entries))
-    for name in names:
-        if name.startswith("center_of_pressure") or damaged:
-            continue
-        parts = [table[name, zone] for zone in zones if zone != "Net" and (name, zone) in table]
-        net = table.get((name, "Net"))
-        if net is not None and parts and abs(net - sum(parts)) > 1e-4 * max(1e-300, sum(map(abs, parts))):
-            notes.append(f"line {line}: {name}: Net is {net:.6g}, its zones add up to {sum(parts):.6g}")
-    for name in (n for n in names if "_total" in n):
-        for zone in zones:
-            found = [table.get((name.replace("_total", f"_{part}"), zone)) for part in ("pressure", "viscous")]
-            values = [v for v in found if v is not None]
-            total = table.get((name, zone))
-            if total is None or len(values) < 2:
-                continue
-            if abs(total - sum(values)) > 1e-4 * max(1e-300, sum(map(abs, values))):
-                notes.append(f"line {line}: {name}({zone}) is {total:.6g}, its parts add up to {sum(values):.6g}")
+    table: dict[str, dict[str, float]] = defaultdict(dict)
+    for e in entries:
+        table[e.name][e.zone] = e.value
+    notes: list[str] = []
+    for name, own in [] if damaged else table.items():
+        if "Net" in own and not name.startswith("center_of_pressure"):
+            notes += _off(line, f"{name}: Net", own["Net"], "zones", [v for zone, v in own.items() if zone != "Net"])
+    for name in [name for name in table if "_total" in name]:
+        pressure, viscous = (table.get(name.replace("_total", f"_{part}"), {}) for part in ("pressure", "viscous"))
+        for zone in [zone for zone in table[name] if zone in pressure and zone in viscous]:
+            notes += _off(line, f"{name}({zone})", table[name][zone], "parts", [pressure[zone], viscous[zone]])
     return notes
+
+
+def _off(line: int, what: str, whole: float, of: str, parts: Sequence[float]) -> list[str]:
+    """Note on a sum that is not that of its parts."""
+    if not parts or abs(whole - sum(parts)) <= 1e-4 * max(1e-300, sum(map(abs, parts))):
+        return []
+    return [f"line {line}: {what} is {whole:.6g}, its {of} add up to {sum(parts):.6g}"]
 
 
 def _channels(entries: Sequence[ForceEntry]) -> dict[str, Channel]:
@@ -238,6 +228,10 @@ _LOUD = (
     ("turbulent viscosity limited", "turbulent viscosity was limited"),
     ("reversed flow", "reversed flow at an outlet"),
 )
+_ABOUT = {
+    "solver": re.compile(r"Welcome to (ANSYS Fluent[^\r\n]*)"),
+    "cells": re.compile(r"^\s*(\d+)\s+(?:\w+ )?cells,", re.MULTILINE),
+}
 _AVERAGE = re.compile(r"\(Average Over\)\"?\s+(\d+)")
 
 
@@ -272,11 +266,11 @@ def _computed(source: SourceText, notes: list[str]) -> Iterator[tuple[str, str, 
             text = lines[at]
             if not text.strip() or text.startswith("("):
                 break
-            if re.fullmatch(r"[-\s]+", text):
+            if _RULES.fullmatch(text):
                 continue
             cells = text.rsplit(None, 1)
             value = number(cells[1]) if len(cells) == 2 else None
-            last = at == len(lines) - 1 and not source.text.endswith(("\n", "\r"))
+            last = source.may_be_cut(at + 1)
             if value is None or len(cells[0].split()) != 1 or last:
                 why = "no line end, may be cut" if last else repr(text.strip()[:40])
                 notes.append(f"line {at + 1}: computed {head[1]}: {why}; left out")
@@ -287,28 +281,23 @@ def _computed(source: SourceText, notes: list[str]) -> Iterator[tuple[str, str, 
 def _residuals(source: SourceText) -> tuple[dict[str, list[float]], list[float], int]:
     """Columns of the residual tables, their iterations, and the number of damaged rows."""
     names: list[str] = []
-    columns: dict[str, list[float]] = {}
+    known: dict[str, None] = {}
+    rows: list[dict[str, float]] = []
     steps: list[float] = []
     damaged = 0
     for text in source.lines:
         match = _ITER.fullmatch(text)
         if match and "time/iter" in match[1]:
             names = match[1].split()[:-1]
-            for name in names:
-                columns.setdefault(name, [float("nan")] * len(steps))
+            known |= dict.fromkeys(names)
         elif names and _ROW.fullmatch(text):
-            cells = text.split()
-            values = [number(cell) for cell in cells[:-2]]
-            step = values[0]
-            if len(values) != len(names) + 1 or step is None:
+            step, *values = (number(cell) for cell in text.split()[:-2])
+            if len(values) != len(names) or step is None:
                 damaged += 1
                 continue
             steps.append(step)
-            row = dict(zip(names, values[1:], strict=True))
-            for name, column in columns.items():
-                value = row.get(name)
-                column.append(float("nan") if value is None else value)
-    return columns, steps, damaged
+            rows.append({n: v for n, v in zip(names, values, strict=True) if v is not None})
+    return {name: [row.get(name, float("nan")) for row in rows] for name in known}, steps, damaged
 
 
 def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str, Channel]:
@@ -316,34 +305,28 @@ def _history(columns: Mapping[str, list[float]], steps: list[float]) -> dict[str
     channels = {"Iteration": Channel(np.array(steps)[keep])}
     for name, column in columns.items():
         values = np.array(column)[keep]
-        last = float(values[-1]) if np.isfinite(values[-1]) else None
-        channels[name] = Channel(values, "", None if last is None else Mean(last, "last iteration"))
+        last = Mean(float(values[-1]), "last iteration") if np.isfinite(values[-1]) else None
+        channels[name] = Channel(values, "", last)
     return channels
 
 
 def read_fluent_transcript(path: str | os.PathLike[str]) -> Dataset:
     """Read a transcript."""
     source = load_text(path)
-    notes: list[str] = []
-    channels: dict[str, Channel] = {}
     columns, steps, damaged = _residuals(source)
-    if steps:
-        channels |= _history(columns, steps)
-    if damaged:
-        notes.append(f"{damaged} damaged rows of residuals left out")
+    channels = _history(columns, steps) if steps else {}
+    notes = [f"{damaged} damaged rows of residuals left out"] if damaged else []
     flow = [(number(m[1]), float(m[2])) for line in source.lines if (m := _FLOW.fullmatch(line))]
-    times = [(t, s) for t, s in flow if t is not None]
-    if times:
+    if times := [(t, s) for t, s in flow if t is not None]:
         keep, dropped = keep_last([t for t, _ in times], "time_s")
         notes += dropped
-        channels["time_s"] = Channel(np.array([t for t, _ in times])[keep], "s")
-        channels["Time Step"] = Channel(np.array([s for _, s in times])[keep])
+        time, step = np.array(times)[keep].T
+        channels |= {"time_s": Channel(time, "s"), "Time Step": Channel(step)}
     found: dict[tuple[str, str], list[float]] = defaultdict(list)
     for name, unit, value in _computed(source, notes):
         found[name, unit].append(value)
     for line, entries, more, faults in blocks(source):
-        notes += more
-        notes += [f"line {f.where}: force report of line {line}: got {f.got}; left out" for f in faults]
+        notes += [*more, *(f"line {f.where}: force report of line {line}: got {f.got}; left out" for f in faults)]
         for entry in entries:
             found[f"{entry.name}({entry.zone})", entry.unit].append(entry.value)
     for (name, unit), values in found.items():
@@ -353,15 +336,9 @@ def read_fluent_transcript(path: str | os.PathLike[str]) -> Dataset:
             notes.append(f"{name}: computed {len(values)} times with different values; the last one holds")
     if not channels:
         source.refuse("", "no residuals, flow times or computed values", "a Fluent transcript")
-    notes += _remarks(source)
-    about = {**source.about, "clock": "none"}
-    version = re.search(r"Welcome to (ANSYS Fluent[^\r\n]*)", source.text)
-    cells = re.findall(r"^\s*(\d+)\s+(?:\w+ )?cells,", source.text, re.MULTILINE)
-    if version:
-        about["solver"] = version[1].strip()
-    if cells:
-        about["cells"] = cells[0]
-    return dataset(FLUENT_TRANSCRIPT, "cfd", channels, notes, about)
+    told = {key: m[1].strip() for key, mark in _ABOUT.items() if (m := mark.search(source.text))}
+    return dataset(FLUENT_TRANSCRIPT, "cfd", channels, [*notes, *_remarks(source)],
+                   {**source.about, "clock": "none", **told})  # fmt: skip
 
 
 def _remarks(source: SourceText) -> list[str]:

@@ -72,7 +72,7 @@ def sniff(head: bytes | str) -> bool:
         return False
     alike = sum(abs(len(cells) - width) <= 1 for cells in split[1:])
     numbers = sum(any(number(c) is not None or re.fullmatch(r"[+-]?\d+,\d+", c) for c in row) for row in split[1:])
-    return alike >= 0.5 * (len(split) - 1) and numbers >= 0.5 * (len(split) - 1)
+    return min(alike, numbers) >= 0.5 * (len(split) - 1)
 
 
 def _blank_numbers(line: str) -> bool:

@@ -8,13 +8,22 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from bemt.base import units
 from bemt.data.readers._words import english, plain, quantities
-from bemt.data.readers.unit_text import FORCES, TWO_MEANINGS, WEIGHTS, si_name, unit_for, unit_of, weight_of
+from bemt.data.readers.unit_text import (
+    FORCES,
+    TWO_MEANINGS,
+    WEIGHTS,
+    either,
+    si_name,
+    splits,
+    unit_for,
+    unit_of,
+    weight_of,
+)
 
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
@@ -313,19 +322,6 @@ def channel_of(text: str, unit: str = "") -> str:
     return USUAL.get(name, name)
 
 
-def splits(text: str) -> Iterator[tuple[str, str]]:
-    """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
-    for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
-        yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
-    if not re.search(r"[(\[]", text):
-        for mark in (r"\s+(?:in|en|em)\s+", r"\s+[-\u2013\u2014:]\s+", r"\s*[,;:]\s*", r"\s*/\s*", r"[\s_-]+"):
-            for found in re.finditer(mark, text):
-                unit = text[found.end() :]
-                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
-                    yield text[: found.start()], unit
-    yield text, ""
-
-
 _COEFFICIENT = re.compile(r"(thrust|power|torque) coeff(?:icient)?(?: c ?[tpq]| c[tpq])?|(adv(?:ance)? ratio)(?: j)?")
 _LETTER = {"thrust": "CT", "power": "CP", "torque": "CQ"}
 
@@ -360,27 +356,6 @@ def _by_words(text: str) -> Heading | None:
                 return Heading(text, "rpm", _in_rpm(made))
             return Heading(text, _channel(slug(name), made), made, told=f"{text!r} is read as {told}" if told else "")
     return None
-
-
-def _unit_at_end(text: str) -> str:
-    """Longest end of a text that is a unit, or a mass or the like that stands for one; "" without one."""
-    parts = re.split(r"[_ (\[]+", text.strip(" )]"))
-    ends = ("_".join(parts[k:]) for k in range(len(parts)))
-    return next((end for end in ends if unit_of(end) != ""), "")
-
-
-def _either(text: str) -> str:
-    """Doubt about a heading that names two units with an "or" between them; "" for any other.
-
-    >>> _either("value_N_or_Nm")
-    'N or Nm: one column holds one unit; give each quantity a column of its own'
-    >>> _either("CT_or_CP")
-    ''
-    """
-    first, *rest = (_unit_at_end(part) for part in re.split(r"[_ ]or[_ ]", text, flags=re.IGNORECASE))
-    if not rest or not first or not all(rest):
-        return ""
-    return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"
 
 
 def _of_the_air(base: str, unit: units.Unit) -> str:
@@ -449,8 +424,8 @@ def _small(first: str, text: str) -> str:
 
 
 def _heading(text: str) -> Heading:
-    if either := _either(text):
-        return Heading(text, slug(text), None, either)
+    if doubt := either(text):
+        return Heading(text, slug(text), None, doubt)
     if _ELECTRICAL.fullmatch(text):
         return Heading(text, "electrical_rpm", units.UNITS["rpm"])
     base, unit, doubt = _name_and_unit(text)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,6 +42,8 @@ _PROPELLER: dict[str, tuple[str, str, float]] = {
     "10*KQ": ("CQ", "-", 0.1), "eta0": ("eta", "-", 1.0),
 }  # fmt: skip
 """Columns of ``propellerInfo``: channel, unit, factor."""
+_PARTS = ("total", "pressure", "viscous", "porous", "internal")
+_DAMAGED = "damaged parentheses"
 _VECTOR = re.compile(r"\(\s*((?:\w+_[xyz]\s*){3})\)")
 
 
@@ -55,92 +57,95 @@ def sniff(head: bytes | str) -> bool:
     return any(_PROBE.match(line) or ((m := _TIME.fullmatch(line)) and m[1].strip()) for line in lines)
 
 
-def _columns(header: str, title: str) -> tuple[list[Column], str, list[tuple[str, list[str]]]]:
-    """Columns of a header, the layout, and in the old layout its groups with their parts."""
-    nested = _NESTED.findall(header)
+@dataclass
+class _Head:
+    """Comment lines: title, settings, probes and their places, the line of columns."""
+
+    source: SourceText
+    title: str = ""
+    columns: str = ""
+    repeated: int = 0
+    settings: dict[str, str] = field(default_factory=dict)
+    probes: dict[str, str] = field(default_factory=dict)
+
+    def take(self, line: int, text: str) -> None:
+        """Read one of them."""
+        if probe := _PROBE.match(text):
+            self.probes[probe[1]] = probe[2]
+        elif (time := _TIME.fullmatch(text)) and (time[1].strip() or self.probes):
+            found = " ".join(time[1].split())
+            if found and self.columns not in ("", found):
+                self.source.refuse(line, "another header", "the first one", "Split the file there")
+            self.repeated += bool(found and self.columns)
+            self.columns = found or f"probes {' '.join(self.probes)}"
+        elif setting := _SETTING.fullmatch(text):
+            self.settings[setting[1]] = setting[2].strip()
+        elif not self.title:
+            self.title = text.strip("# \t")
+
+
+def _columns(header: str, title: str) -> tuple[list[Column], list[tuple[str, list[str]]]]:
+    """Columns of a header, and in the old layout its groups with their parts."""
+    time, nested = Column("Time", "", "time"), _NESTED.findall(header)
     if nested and all(re.fullmatch(r"(local)?(forces?|moments?)", name, re.IGNORECASE) for name, _ in nested):
         groups = [(name.lower().removesuffix("s"), re.split(r"[,\s]+", parts.strip())) for name, parts in nested]
-        unit = {True: "Nm", False: "N"}
-        columns = [
-            Column(f"{name}_{part}_{axis}_{unit['moment' in name]}", unit["moment" in name])
-            for name, parts in groups
-            for part in parts
-            for axis in "xyz"
-        ]
-        return [Column("Time", "", "time"), *columns], "nested", groups
+        names = [f"{name}_{part}_{axis}" for name, parts in groups for part in parts for axis in "xyz"]
+        return [time, *map(_load, names)], groups
     names = _VECTOR.sub(r"\1", header).split()
     kind = title.strip().lower().removesuffix("s")
     if kind in ("force", "moment") and all(re.fullmatch(r"\w+_[xyz]", name) for name in names):
-        unit_text = "N" if kind == "force" else "Nm"
-        return [Column("Time", "", "time"), *(Column(f"{kind}_{n}_{unit_text}", unit_text) for n in names)], "flat", []
-    return [Column("Time", "", "time"), *(Column(name) for name in names)], "flat", []
+        return [time, *(_load(f"{kind}_{name}") for name in names)], []
+    return [time, *map(Column, names)], []
+
+
+def _load(name: str) -> Column:
+    unit = "Nm" if name.partition("_")[0].endswith("moment") else "N"
+    return Column(f"{name}_{unit}", unit)
 
 
 def read(path: str | os.PathLike[str]) -> Dataset:
     """Read a table of ``postProcessing``."""
     source = load_text(path)
-    title = ""
-    about: dict[str, str] = {}
-    header: str | None = None
+    top = _Head(source)
     rows: list[tuple[int, str]] = []
-    probes: dict[str, str] = {}
-    repeated = 0
-    for line, raw in enumerate(source.lines, 1):
-        text = raw.strip()
+    for line, text in ((k, raw.strip()) for k, raw in enumerate(source.lines, 1)):
         if text.startswith("#"):
-            match, setting, probe = _TIME.fullmatch(text), _SETTING.fullmatch(text), _PROBE.match(text)
-            if probe:
-                probes[probe[1]] = probe[2]
-            elif match and not match[1].strip() and probes:
-                header = f"probes {' '.join(probes)}"
-            elif match and match[1].strip():
-                found = " ".join(match[1].split())
-                if header is not None and found != header:
-                    source.refuse(line, "another header", "the first one", "Split the file there")
-                repeated += header is not None
-                header = found
-            elif setting:
-                about[setting[1]] = setting[2].strip()
-            elif not title:
-                title = text.strip("# \t")
-        elif text and header is None:
+            top.take(line, text)
+        elif text and not top.columns:
             expected = "a header such as # Time total_x total_y total_z"
             source.refuse(line, repr(text[:60]), expected, "Is the header damaged?")
         elif text:
             rows.append((line, text))
-    if header is None:
+    header, about, probes = top.columns, {"title": top.title, **top.settings}, top.probes
+    if not header:
         source.refuse("", "no header", "a header such as # Time total_x total_y total_z")
     if "bins" in about or re.search(r"\[\d+\]\(|_\d+_[xyz]\b", header):
         hint = "Their sum is in the forces (or force and moment) file in the same folder"
         source.refuse("", "forces in bins along a direction", "forces of the whole", hint)
-    notes = [f"header repeated {number_of(repeated, 'time')}: the run was restarted"] if repeated else []
+    notes = [f"header repeated {number_of(top.repeated, 'time')}: the run was restarted"] if top.repeated else []
     if header.split()[0] == "patch":
-        return _by_patch(source, header.split(), rows, {"title": title, **about}, notes)
+        return _by_patch(source, header.split(), rows, about, notes)
     if probes:
         return _probes(source, probes, rows, notes)
-    columns, layout, groups = _columns(header, title)
-    table = numeric_table(source, columns, _rows(rows, layout, len(columns), groups), commas=False)
+    columns, groups = _columns(header, top.title)
+    table = numeric_table(source, columns, _rows(rows, len(columns), groups), commas=False)
     if groups:
         columns, table = _totals(columns, table, groups)
     if {"KT", "10*KQ"} <= {c.name for c in columns}:
         own = [_PROPELLER.get(c.name, (c.name, c.unit, 1.0)) for c in columns]
         table = replace(table, values=table.values * np.array([factor for _, _, factor in own]))
         columns = [replace(c, name=name, unit=unit) for c, (name, unit, _) in zip(columns, own, strict=True)]
-    return _record(source, columns, table, {"title": title, **about}, notes)
+    return _record(source, columns, table, about, notes)
 
 
-def _rows(
-    rows: Sequence[tuple[int, str]], layout: str, width: int, groups: list[tuple[str, list[str]]]
-) -> list[ExportRow]:
+def _rows(rows: Sequence[tuple[int, str]], width: int, groups: list[tuple[str, list[str]]]) -> list[ExportRow]:
     """Cells of the rows; a row with other parentheses than its header has gets none, so that it is not shifted."""
     out = []
     wanted = "n" + "".join(f"({'(nnn)' * len(parts)})" for _, parts in groups)
     for line, text in rows:
-        cells = tuple(text.replace("(", " ").replace(")", " ").split())
-        shape = _shape(text)
-        ok = shape == wanted if layout == "nested" else shape.replace("(nnn)", "nnn") == "n" * len(cells)
-        if not ok and len(cells) == width:
-            cells = (*cells[:-1], "damaged parentheses")
+        cells, shape = _cells(text)
+        if (shape != wanted if groups else shape.replace("(nnn)", "nnn") != "n" * len(cells)) and len(cells) == width:
+            cells = (*cells[:-1], _DAMAGED)
         out.append(ExportRow(line, cells))
     return out
 
@@ -190,18 +195,15 @@ def _balance(columns: list[Column], table: ExportTable, axis: str) -> list[str]:
     notes = []
     by_name = {c.name: table.values[:, k] for k, c in enumerate(columns)}
     for base, unit in (("force", "N"), ("moment", "Nm")):
-        total = by_name.get(f"{base}_total_{axis}_{unit}")
-        parts = [by_name.get(f"{base}_{part}_{axis}_{unit}") for part in ("pressure", "viscous")]
-        porous = by_name.get(f"{base}_porous_{axis}_{unit}", by_name.get(f"{base}_internal_{axis}_{unit}"))
-        if total is None or parts[0] is None or parts[1] is None:
+        total, pressure, viscous, porous, internal = (by_name.get(f"{base}_{part}_{axis}_{unit}") for part in _PARTS)
+        if total is None or pressure is None or viscous is None:
             continue
+        third = internal if porous is None else porous
         with np.errstate(over="ignore", invalid="ignore"):
-            sums = parts[0] + parts[1] + (0.0 if porous is None else porous)
-            off = np.abs(total - sums) > 1e-4 * (np.abs(parts[0]) + np.abs(parts[1]))
-        if np.any(off):
-            rows = int(np.count_nonzero(off))
-            line = table.lines[int(np.flatnonzero(off)[0])]
-            where = f"{number_of(rows, 'row')} (first: line {line})"
+            sums = pressure + viscous + (0.0 if third is None else third)
+            off = np.flatnonzero(np.abs(total - sums) > 1e-4 * (np.abs(pressure) + np.abs(viscous)))
+        if off.size:
+            where = f"{number_of(off.size, 'row')} (first: line {table.lines[off[0]]})"
             notes.append(f"{base}_total_{axis}_{unit} is not the sum of its parts in {where}")
     return notes
 
@@ -238,13 +240,14 @@ def _probes(source: SourceText, probes: dict[str, str], rows: Sequence[tuple[int
     wanted = "n" + ("(nnn)" if vector else "n") * len(probes)
     cells = []
     for line, text in rows:
-        row = tuple(text.replace("(", " ").replace(")", " ").split())
-        cells.append(ExportRow(line, row if _shape(text) == wanted else (*row[:-1], "damaged parentheses")))
+        row, shape = _cells(text)
+        cells.append(ExportRow(line, row if shape == wanted else (*row[:-1], _DAMAGED)))
     table = numeric_table(source, columns, cells, commas=False)
     where = "; ".join(f"probe {k} at ({at})" for k, at in probes.items())
     return _record(source, columns, table, {"title": "probes", "probes": where}, [*notes, "the file states no unit"])
 
 
-def _shape(text: str) -> str:
-    """Parentheses of a row with one mark for each number."""
-    return "".join("n" if cell not in "()" else cell for cell in re.findall(r"[()]|[^()\s]+", text))
+def _cells(text: str) -> tuple[tuple[str, ...], str]:
+    """Cells of a row, and its parentheses with one mark for each cell."""
+    parts = re.findall(r"[()]|[^()\s]+", text)
+    return tuple(p for p in parts if p not in "()"), "".join(p if p in "()" else "n" for p in parts)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bemt.base.errors import Fault, InputError
 from bemt.data.readers import Reader, SourceText, head_text, load_text, number
@@ -132,6 +131,21 @@ def _header(source: SourceText, line: int, text: str) -> tuple[dict[str, int], l
     return columns, ignored
 
 
+def _by_condition(
+    source: SourceText, rows: Sequence[PolarRow], said: list[str]
+) -> dict[tuple[float, float], dict[float, PolarRow]]:
+    """Rows by Reynolds and Mach number and by angle; an angle that comes again is told, or a fault."""
+    groups: dict[tuple[float, float], dict[float, PolarRow]] = {}
+    for row in rows:
+        old = groups.setdefault((NO_RE if row.Re is None else row.Re, row.M), {}).setdefault(round(row.alpha, 9), row)
+        if (old.cl, old.cd) != (row.cl, row.cd):
+            got = f"another row at {math.degrees(row.alpha):.6g} deg (line {old.line} has other values)"
+            source.add(row.line, got, "each angle once per Reynolds and Mach number")
+        elif old is not row:
+            said.append(f"line {row.line} repeats line {old.line}")
+    return groups
+
+
 def assemble(
     source: SourceText, rows: Sequence[PolarRow], *, name: str = "", kind: str = "CSV", radians: bool = False,
     notes: Sequence[str] = (),
@@ -139,26 +153,19 @@ def assemble(
     """Check rows of any polar format and make the Polar."""
     said = list(notes)
     _doubts(source, rows, radians)
-    groups: dict[tuple[float, float], dict[float, PolarRow]] = {}
-    for row in rows:
-        group = groups.setdefault((NO_RE if row.Re is None else row.Re, row.M), {})
-        old = group.setdefault(round(row.alpha, 9), row)
-        if old is not row and (old.cl, old.cd) != (row.cl, row.cd):
-            got = f"another row at {math.degrees(row.alpha):.6g} deg (line {old.line} has other values)"
-            source.add(row.line, got, "each angle once per Reynolds and Mach number")
-        elif old is not row:
-            said.append(f"line {row.line} repeats line {old.line}")
+    groups = _by_condition(source, rows, said)
     tables = []
     for (reynolds, mach), group in sorted(groups.items()):
         used = [group[a] for a in sorted(group)]
         lo, hi = (math.degrees(used[k].alpha) for k in (0, -1))
         label = f" at Re {reynolds:.4g}, Mach {mach:g}" if len(groups) > 1 else ""
-        if not rows or lo > 0.0 or hi < MIN_SPAN_DEG or len(used) < 3:
+        if lo > 0.0 or hi < MIN_SPAN_DEG or len(used) < 3:
             got = f"{len(used)} angles from {lo:.4g} to {hi:.4g} deg{label}"
             source.add("", got, f"three or more that hold 0 and reach {MIN_SPAN_DEG:g} deg")
-        columns = np.array([(r.alpha, r.cl, r.cd) for r in used])
-        columns[0, 0], columns[-1, 0] = (_snap(columns[k, 0]) for k in (0, -1))
-        tables.append(ExtrapolatedTable(columns[:, 0], columns[:, 1], columns[:, 2], reynolds, mach))
+        alpha, cl, cd = np.array([(r.alpha, r.cl, r.cd) for r in used]).T
+        # 180 deg that lost its last digits is exactly +-pi
+        alpha[[0, -1]] = [math.copysign(math.pi, a) if abs(abs(a) - math.pi) < 1e-4 else a for a in alpha[[0, -1]]]
+        tables.append(ExtrapolatedTable(alpha, cl, cd, reynolds, mach))
     if not rows and not source.faults:
         source.add("", "no rows", "rows of alpha, cl and cd")
     sizes = len({r for r, _ in groups}), len({m for _, m in groups})
@@ -172,23 +179,23 @@ def assemble(
     return from_tables(tables, name=name or Path(source.name).stem, source=label, notes=said)
 
 
-def _snap(alpha: float) -> float:
-    """Exactly +-pi for 180 deg that lost its last digits."""
-    return math.copysign(math.pi, alpha) if abs(abs(alpha) - math.pi) < 1e-4 else alpha
+_EACH: tuple[tuple[str, str, float, float, str, str], ...] = (
+    ("cd", "cd", 5e-324, math.inf, "a drag coefficient above 0", ""),
+    ("cl", "cl", -5.0, 5.0, "a lift coefficient within +-5", "Are columns swapped?"),
+    ("Re", "Re", 1e3, 1e9, "a Reynolds number from 1e3 to 1e9", "Millions? Write 0.1 million as 1e5"),
+    ("M", "Mach", 0.0, 1.5, "a Mach number from 0 to 1.5", ""),
+)
+"""Of each row: attribute, its name, least and largest value, words, hint (of Re: below 1000)."""
 
 
 def _doubts(source: SourceText, rows: Sequence[PolarRow], radians: bool) -> None:
     """Faults of magnitude: units are never converted on suspicion, but refused with a hint."""
     for row in rows:
-        if row.cd <= 0.0:
-            source.add(row.line, f"cd = {row.cd:g}", "a drag coefficient above 0")
-        if abs(row.cl) > 5.0:
-            source.add(row.line, f"cl = {row.cl:g}", "a lift coefficient within +-5", "Are columns swapped?")
-        if row.Re is not None and not 1e3 <= row.Re <= 1e9:
-            hint = "Millions? Write 0.1 million as 1e5" if 0.0 < row.Re < 1e3 else ""
-            source.add(row.line, f"Re = {row.Re:g}", "a Reynolds number from 1e3 to 1e9", hint)
-        if not 0.0 <= row.M <= 1.5:
-            source.add(row.line, f"Mach = {row.M:g}", "a Mach number from 0 to 1.5")
+        for attribute, word, low, high, expected, hint in _EACH:
+            value = getattr(row, attribute)
+            if value is not None and not low <= value <= high:
+                why = hint if word != "Re" or 0.0 < value < low else ""
+                source.add(row.line, f"{word} = {value:g}", expected, why)
     if not rows:
         return
     alpha = np.array([r.alpha for r in rows])
@@ -295,35 +302,36 @@ def _rewritten(text: str) -> str:
     )
 
 
-def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
-    """Name, rows and notes of one file."""
-    text = _rewritten(source.text)
-    title, state, kind, trip = (p.search(text) for p in (_TITLE, _STATE, _TYPE, _TRIP))
-    notes = []
-    if title is None:
-        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
-    if kind and (kind.group(1).lower() != "fixed" or kind.group(2).lower() != "fixed"):
-        got = f"Reynolds number {kind.group(1)}, Mach number {kind.group(2)}"
-        line = str(text.count("\n", 0, kind.end()) + 1)
-        source.add(line, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
-    reynolds, mach = None, 0.0
+def _state(source: SourceText, text: str) -> tuple[float | None, float, list[str]]:
+    """Reynolds and Mach number of the run, and a note."""
+    state = _STATE.search(text)
     if state is None:
         got, hint = "no line 'Mach = ... Re = ... e 6 Ncrit = ...'", "Save the polar with viscous mode on"
         source.add("", got, "the state of the run", hint)
-    else:
-        values = [number(state.group(k)) for k in (1, 2, 4)]
-        line = str(text.count("\n", 0, state.start()) + 1)
-        if any(v is None for v in values):
-            source.add(line, repr(state.group(0)), "numbers for Mach, Re and Ncrit")
-        else:
-            mach, reynolds = float(values[0] or 0.0), float(values[1] or 0.0) * 10.0 ** int(state.group(3))
-            notes.append(f"Ncrit {values[2]:g}")
-            if reynolds == 0.0:
-                reynolds = None
-                hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
-                source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
-    if trip and (trip.group(1), trip.group(2)) != ("1.000", "1.000"):
-        notes.append(f"forced transition at x/c {trip.group(1)} (top), {trip.group(2)} (bottom)")
+        return None, 0.0, []
+    mach, millions, ncrit = (number(state[k]) for k in (1, 2, 4))
+    line = text.count("\n", 0, state.start()) + 1
+    if mach is None or millions is None or ncrit is None:
+        source.add(line, repr(state[0]), "numbers for Mach, Re and Ncrit")
+        return None, 0.0, []
+    if millions == 0.0:
+        hint = "XFOIL prints three decimals of millions: set Re by hand if it is below 500"
+        source.add(line, "Re = 0", "a Reynolds number above 0 (viscous run)", hint)
+    return millions * 10.0 ** int(state[3]) or None, mach, [f"Ncrit {ncrit:g}"]
+
+
+def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
+    """Name, rows and notes of one file."""
+    text = _rewritten(source.text)
+    title, kind, trip = (p.search(text) for p in (_TITLE, _TYPE, _TRIP))
+    if title is None:
+        source.add("", "no line 'Calculated polar for:'", "an XFOIL polar save file")
+    if kind and {kind[1].lower(), kind[2].lower()} != {"fixed"}:
+        got = f"Reynolds number {kind[1]}, Mach number {kind[2]}"
+        source.add(text.count("\n", 0, kind.end()) + 1, got, "a polar of type 1 (both fixed)", "Run XFOIL with TYPE 1")
+    reynolds, mach, notes = _state(source, text)
+    if trip and trip.groups() != ("1.000", "1.000"):
+        notes.append(f"forced transition at x/c {trip[1]} (top), {trip[2]} (bottom)")
     rows: list[PolarRow] = []
     lines = text.splitlines()
     start = next((i for i, line in enumerate(lines) if _HEADER.match(line)), len(lines))
@@ -334,149 +342,10 @@ def _parse(source: SourceText) -> tuple[str, list[PolarRow], list[str]]:
             rows += row_of(source, i, cells, reynolds, mach, ("alpha", "CL", "CD"))
     if not rows:
         source.add("", "no rows", "rows under the header 'alpha CL CD ...'", "Empty polar?")
-    return (title.group(1) if title else ""), rows, notes
-
-
-# C81 airfoil tables: lift and drag over angle of attack and Mach number, fixed width.
-#
-# Layout, as written in the format notes of its users (Fortran edit descriptors)::
-#
-#     name, NML NAL NMD NAD NMM NAM           A30, 6I2
-#     Mach numbers of the lift table          7X, 9F7.0   (more than nine continue on lines of the same form)
-#     alpha, cl at each Mach number           10F7.0 / (7X, 9F7.0)
-#     ... the same for drag and for the pitching moment
-#
-# NM is the count of Mach numbers and NA that of angles [deg]. The pitching moment is not used.
-
-POLAR_C81 = "polar_c81"
-
-WIDTH = 7
-_PER_LINE = 9
-_HINT = "C81 fields are 7 characters wide, nine values after the first field"
-
-
-def sniff_polar_c81(head: bytes | str) -> bool:
-    r"""Tell whether a file begins with a name, six counts of two digits and a line of Mach numbers.
-
-    >>> sniff_polar_c81("NACA 0012".ljust(30) + " 2 3 2 3 0 0\n" + 7 * " " + "   0.00   0.50\n")
-    True
-    >>> sniff_polar_c81("alpha,cl,cd")
-    False
-    """
-    lines = head_text(head).splitlines()
-    if len(lines) < 2 or _counts(lines[0]) is None or lines[1][:WIDTH].strip():
-        return False
-    mach = [number(lines[1][k : k + WIDTH]) for k in range(WIDTH, len(lines[1].rstrip()), WIDTH)]
-    return bool(mach) and all(m is not None and 0.0 <= m <= 2.0 for m in mach)
-
-
-def resembles(text: str) -> bool:
-    """Whether a text begins as a C81 table does and goes on in columns of another width."""
-    lines = text.splitlines()
-    mach = [number(cell) for cell in lines[1].split()] if len(lines) > 1 else []
-    return bool(lines) and _counts(lines[0]) is not None and len(mach) > 1 and None not in mach
-
-
-def read_polar_c81(path: str | os.PathLike[str]) -> Polar:
-    """Read a C81 table."""
-    source = load_text(path)
-    lines = source.lines
-    counts = _counts(lines[0]) if lines else None
-    if counts is None:
-        got = repr(lines[0][30:42]) if lines else "an empty file"
-        source.refuse("1:31", got, "six counts of two digits in columns 31 to 42", _HINT)
-    at = 1
-    tables = []
-    for name, n_mach, n_alpha in (("lift", counts[0], counts[1]), ("drag", counts[2], counts[3])):
-        table, at = _table(source, name, at, n_mach, n_alpha)
-        tables.append(table)
-    source.check()
-    (a_l, m_l, cl, rows_l), (a_d, m_d, cd, _) = tables
-    mach = np.union1d(m_l, m_d)
-    alpha = np.union1d(a_l, a_d)
-    alpha = alpha[(alpha >= max(a_l[0], a_d[0])) & (alpha <= min(a_l[-1], a_d[-1]))]
-    cl, cd = _spread(a_l, m_l, cl, alpha, mach), _spread(a_d, m_d, cd, alpha, mach)
-    line = {a: n for a, n in zip(a_l.tolist(), rows_l, strict=True)}
-    rows = [
-        PolarRow(line.get(a, rows_l[0]), math.radians(a), float(cl[i, j]), float(cd[i, j]), None, float(m))
-        for j, m in enumerate(mach.tolist())
-        for i, a in enumerate(alpha.tolist())
-    ]
-    notes = [] if np.array_equal(a_l, a_d) and np.array_equal(m_l, m_d) else ["lift and drag interpolated to one grid"]
-    return assemble(source, rows, name=lines[0][:30].strip(), kind="C81", notes=notes)
-
-
-def _counts(line: str) -> tuple[int, ...] | None:
-    """Six counts of the first line, or None."""
-    fields = [line[30 + 2 * k : 32 + 2 * k].strip() for k in range(6)]
-    if len(line) < 38 or any(f and not f.isdigit() for f in fields) or line[42:].strip():
-        return None
-    counts = tuple(int(f or "0") for f in fields)
-    return counts if min(counts[:4]) >= 1 else None
-
-
-_Table = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[int]]
-
-
-def _table(source: SourceText, name: str, at: int, n_mach: int, n_alpha: int) -> tuple[_Table, int]:
-    """Angles, Mach numbers, values (Na, Nm) and line numbers of one table, and the index of the line behind it."""
-    mach, _, at = _record(source, name, at, n_mach, False)
-    alpha, values, numbers = [], [], []
-    for _ in range(n_alpha):
-        numbers.append(at + 1)
-        row, first, at = _record(source, name, at, n_mach, True)
-        alpha.append(first)
-        values.append(row)
-    for axis, label in ((mach, "Mach numbers"), (alpha, "angles")):
-        fresh = np.diff(axis)
-        if not np.any(np.isnan(axis)) and np.any(fresh <= 0.0):
-            k = int(np.flatnonzero(fresh <= 0.0)[0])
-            got = f"{label} {axis[k]:g}, {axis[k + 1]:g}"
-            where = str(numbers[k + 1] if label == "angles" else numbers[0] - 1)
-            source.add(where, got, f"ascending {label} in the {name} table")
-    return (np.array(alpha), np.array(mach), np.array(values).reshape(n_alpha, n_mach), numbers), at
-
-
-def _record(source: SourceText, name: str, at: int, count: int, leading: bool) -> tuple[list[float], float, int]:
-    """Values of one record with its continuation lines, its first field, and the index of the next line."""
-    values: list[float] = []
-    first = math.nan
-    lines = source.lines
-    while len(values) < count:
-        if at >= len(lines):
-            end = source.fault(len(lines), f"the end of the file in the {name} table", "more lines", _HINT)
-            source.faults += [end] if end not in source.faults else []
-            return values + [math.nan] * (count - len(values)), first, at
-        line = lines[at]
-        if leading and not values:
-            first = _field(source, at, line, 0, "an angle in degrees")
-        for k in range(1, min(_PER_LINE, count - len(values)) + 1):
-            values.append(_field(source, at, line, k, "a number"))
-        at += 1
-    return values, first, at
-
-
-def _field(source: SourceText, at: int, line: str, k: int, expected: str) -> float:
-    """One fixed-width number; NaN and a fault when it is none."""
-    text = line[k * WIDTH : (k + 1) * WIDTH]
-    value = number(text)
-    if value is None:
-        source.add(f"{at + 1}:{k * WIDTH + 1}", repr(text), expected, _HINT)
-        return math.nan
-    return value
-
-
-def _spread(
-    a0: NDArray[np.float64], m0: NDArray[np.float64], table: NDArray[np.float64], alpha: NDArray[np.float64],
-    mach: NDArray[np.float64],
-) -> NDArray[np.float64]:  # fmt: skip
-    """Table (Na0, Nm0) on other axes, linear, held at the ends."""
-    on_alpha = np.stack([np.interp(alpha, a0, table[:, j]) for j in range(m0.size)], axis=1)
-    return np.stack([np.interp(mach, m0, on_alpha[i]) for i in range(alpha.size)], axis=0)
+    return (title[1] if title else ""), rows, notes
 
 
 READERS = (
     Reader(POLAR_CSV, sniff_polar_csv, read_polar_csv),
     Reader(POLAR_XFOIL, sniff_polar_xfoil, read_polar_xfoil),
-    Reader(POLAR_C81, sniff_polar_c81, read_polar_c81),
 )

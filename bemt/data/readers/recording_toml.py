@@ -20,7 +20,7 @@ from bemt.base.errors import Fault, InputError, gathered, refuse
 from bemt.base.toml import Table, entry, shown, validated
 from bemt.base.toml_text import Collector, load_toml
 from bemt.data.readers import head_text, load_text
-from bemt.data.readers._large import large_table
+from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers.generic_csv import electrical, heads_of, only_ones
 from bemt.data.readers.headings import Heading, known
 from bemt.data.readers.recording import Builder
@@ -276,13 +276,9 @@ def _heading(name: str, unit: str, text: str) -> Heading:
     return known(text, name, unit)
 
 
-def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
-    """One table with the map applied."""
-    head, columns = made.recording, made.columns.given()
-    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.model_fields_set else None
-    told = (head.delimiter, head.header)
-    table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
-    source, width = table.source, table.width
+def _places(file: str, table: SplitTable | NumberTable, columns: Mapping[str, ColumnTable]) -> dict[int, str]:
+    """Quantity of each column that is named, by its heading or its number."""
+    width = table.width
     places: dict[int, str] = {}
     faults = []
     for name, column in columns.items():
@@ -294,11 +290,23 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
             index = hits[0] if len(hits) == 1 else None
         if index is None or index in places:
             known = some((repr(h) for h in table.headings if h), 12) or f"columns 1 to {width}"
-            got = f"{place!r} again" if index is not None else f"{place!r}, which {source.name} has not (or twice)"
+            got = (
+                f"{place!r} again" if index is not None else f"{place!r}, which {table.source.name} has not (or twice)"
+            )
             faults.append(Fault(file, f"columns.{name}.column", got, f"one of {known}"))
         else:
             places[index] = name
     refuse(faults)
+    return places
+
+
+def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
+    """One table with the map applied."""
+    head, columns = made.recording, made.columns.given()
+    large = large_table(path) if not {"delimiter", "header", "decimal"} & head.model_fields_set else None
+    told = (head.delimiter, head.header)
+    table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
+    width, places = table.width, _places(file, table, columns)
     build = Builder(table, KIND)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal

@@ -33,12 +33,11 @@ def dataset(
     form: str, kind: str, channels: Mapping[str, Channel], notes: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None, *, flags: Sequence[tuple[str, ...]] = (), lines: Sequence[int] = (),
     texts: Mapping[str, Sequence[str]] | None = None, headings: Mapping[str, str] | None = None,
-    constants: Mapping[str, float] | None = None, instrument: Mapping[str, Mapping[str, float]] | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Dataset:  # fmt: skip
     """Make the dataset of a file: columns of another length than the longest end in NaN.
 
-    `headings` are those of the file by channel, `constants` numbers that hold for all of it (``density_kg_m3``),
-    `instrument` the standard uncertainty by channel: ``gain`` [1], ``zero`` and ``sample`` in the channel's unit.
+    `headings` are those of the file by channel, `constants` numbers that hold for all of it (``density_kg_m3``).
 
     >>> d = dataset("table", "bench", {"rpm": Channel(np.array([4e3, 5e3]), "rpm"), "x": Channel(np.array([1.0]))})
     >>> d.unit("rpm"), d.unit("x"), d["x"]
@@ -52,7 +51,7 @@ def dataset(
             own[name] = channel.unit
     about = {**(provenance or {}), "format": form}
     means = {name: channel.mean for name, channel in channels.items() if channel.mean is not None}
-    more = {"headings": headings, "constants": constants, "instrument": instrument, "means": means}
+    more = {"headings": headings, "constants": constants, "means": means}
     about |= {key: dict(given) for key, given in more.items() if given}
     name = PureWindowsPath(str(about.get("file", ""))).name or form
     return Dataset(kind, name, values, flags=tuple(flags), provenance=about, notes=tuple(notes), units=own,

@@ -273,16 +273,6 @@ _KNOWN = {
 }  # fmt: skip
 
 
-def sniff_drivecalc(head: bytes | str) -> bool:
-    r"""Tell whether the first line has the headings of one of the two tables.
-
-    >>> sniff_drivecalc("myid,tbs,Name,Dia,Pitch,a,b,c,d,n10N,n100W\n"), sniff_drivecalc("Name,Dia,Pitch\n")
-    (True, False)
-    """
-    cells = first_cells(head)
-    return cells >= _PROPELLERS or cells >= _POINTS
-
-
 def read_drivecalc(path: str | os.PathLike[str]) -> Dataset:
     """Read one of the two tables."""
     build = Builder(split_table(load_text(path), header=True), DRIVECALC, kind="table")
@@ -319,5 +309,5 @@ def _check(build: Builder, law: str, exponent: str, at: str, target: float) -> N
 READERS = (
     Reader(JMAJEW, sniff_jmajew, read_jmajew),
     Reader(COAXIAL_STAND, sniff_coaxial_stand, read_coaxial_stand),
-    Reader(DRIVECALC, sniff_drivecalc, read_drivecalc),
+    Reader(DRIVECALC, lambda head: first_cells(head) >= _PROPELLERS or first_cells(head) >= _POINTS, read_drivecalc),
 )

@@ -15,9 +15,8 @@ from bemt.base.arrays import Array
 from bemt.base.tables import number_of
 from bemt.data.readers import SourceText, load_text, number
 from bemt.data.readers._words import english, plain
-from bemt.data.readers.headings import splits
 from bemt.data.readers.split import SplitTable, decimal_mark, split_table
-from bemt.data.readers.unit_text import unit_for
+from bemt.data.readers.unit_text import splits, unit_for
 
 EXPECTED = "r_over_R, chord_over_R and beta_deg; r and chord may be lengths, such as r_mm"
 WIDEST = 0.8
@@ -82,21 +81,25 @@ def _share(text: str) -> tuple[str, float] | None:
     return name, _TIPS[plain(found[3])] * (0.5 if found[1] else 1.0)
 
 
+def _of_hundred(unit: str) -> float:
+    return 0.01 if "%" in unit else 1.0
+
+
 def _column(at: int, text: str, R: float) -> _Column | None:
     """What a heading stands for; None for another. An angle without a unit is in degrees, or refused as too small."""
     bare = re.sub(r"[ _]over[ _]", "/", " ".join(text.split()))
     ways = [*splits(bare), *([(tail[1], "in")] if (tail := re.fullmatch(r"(.+) in", bare)) else [])]
     for base, unit in ways:
         if unit in ("", "-", "1", "%") and (share := _share(base)):
-            return _Column(at, share[0], share[1] * (0.01 if unit == "%" else 1.0), True, text)
+            return _Column(at, share[0], share[1] * _of_hundred(unit), True, text)
         name = _meaning(base)
         if name == "thickness" and (of_chord := re.fullmatch(r"(%?) ?(?:of )?(?:c|chord)|%|-|", unit)):
-            return _Column(at, name, 0.01 if "%" in of_chord[0] else 1.0, True, text)
+            return _Column(at, name, _of_hundred(of_chord[0]), True, text)
         if (share := _share(unit)) and share[0] == name:  # radius [r/R]
             return _Column(at, name, share[1], True, text)
         of_tip = re.fullmatch(r"(%?) ?(?:of )?R|-", unit)
-        if name == "r" and of_tip or name == "chord" and of_tip and unit != "-":
-            return _Column(at, name, 0.01 if of_tip[1] else 1.0, True, text)
+        if of_tip and (name == "r" or (name == "chord" and unit != "-")):
+            return _Column(at, name, _of_hundred(unit), True, text)
         if name in ("beta", "pitch") and (angle := unit_for("angle", unit)):
             return _Column(at, "beta", angle[0].factor / units.DEG, False, text)
         if name in ("r", "chord", "pitch", "thickness") and (length := unit_for("length", unit)):

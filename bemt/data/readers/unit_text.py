@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterator
 
 from bemt.base import units
 
@@ -142,3 +143,37 @@ def weight_of(text: str) -> str:
     lengths = [w for w in words if w in ("cm", "m", "in", "ft", "mm")]
     unit = f"{WEIGHTS[masses[0]]} {lengths[0]}" if len(masses) == 1 == len(lengths) else ""
     return unit if isinstance(unit_of(unit), units.Unit) else ""
+
+
+def splits(text: str) -> Iterator[tuple[str, str]]:
+    """Ways to take a heading for words and a unit: in brackets, else at its end, else all words."""
+    for found in re.finditer(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", text):
+        yield text[: found.start()] + " " + text[found.end() :], found[1].strip()
+    if not re.search(r"[(\[]", text):
+        for mark in (r"\s+(?:in|en|em)\s+", r"\s+[-\u2013\u2014:]\s+", r"\s*[,;:]\s*", r"\s*/\s*", r"[\s_-]+"):
+            for found in re.finditer(mark, text):
+                unit = text[found.end() :]
+                if not (mark.startswith("[") and found[0] != "_" and unit in ("A", "C", "F", "in", "a", "c", "f")):
+                    yield text[: found.start()], unit
+    yield text, ""
+
+
+def _unit_at_end(text: str) -> str:
+    """Longest end of a text that is a unit, or a mass or the like that stands for one; "" without one."""
+    parts = re.split(r"[_ (\[]+", text.strip(" )]"))
+    ends = ("_".join(parts[k:]) for k in range(len(parts)))
+    return next((end for end in ends if unit_of(end) != ""), "")
+
+
+def either(text: str) -> str:
+    """Doubt about a heading that names two units with an "or" between them; "" for any other.
+
+    >>> either("value_N_or_Nm")
+    'N or Nm: one column holds one unit; give each quantity a column of its own'
+    >>> either("CT_or_CP")
+    ''
+    """
+    first, *rest = (_unit_at_end(part) for part in re.split(r"[_ ]or[_ ]", text, flags=re.IGNORECASE))
+    if not rest or not first or not all(rest):
+        return ""
+    return f"{' or '.join([first, *rest])}: one column holds one unit; give each quantity a column of its own"

@@ -5,37 +5,29 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bemt.base import tables
 from bemt.base.averaging import Average, Mean, keep_last, revolution_average
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.packed import packed, unpacked
 from bemt.base.tables import number_of
-from bemt.data.readers import load_bytes, polars, uiuc
+from bemt.data.readers import load_bytes, polars_c81, uiuc
 from bemt.data.readers.apc import ApcPerformance
 from bemt.data.readers.references import Reference
 from bemt.data.readers.samples import Channel, dataset
 from bemt.data.recordings.cfd_files import EXPORT
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.check import Finding, check
-from bemt.data.recordings.reduce import reduce, reduction
+from bemt.data.recordings.reduce import reduce
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import unit_in
 from bemt.physics.sections.polars import Polar
-
-# What ``import`` shows of a recording beyond its columns: findings of the sanity checks, and its steady points.
-
-SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
-         "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
-"""Channels of the table of points, as far as they are there."""
-MOST = 40
-"""Points shown; JSON has all."""
 
 
 def is_recording(record: Dataset, adapted: bool) -> bool:
@@ -63,97 +55,43 @@ def reduction_of(record: Dataset) -> Dataset | str:
         )
 
 
-def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
-    """The part of the JSON document that holds the steady points."""
-    if reduced is None:
-        return None
-    if isinstance(reduced, str):
-        return {"mode": None, "points": [], "correlated": {}, "dropped": [], "notes": [], "error": reduced}
-    how = reduction(reduced)
-    rows = [{**row, "direction": way} for row, way in zip(reduced.to_rows(), how.directions, strict=True)]
-    return {
-        "mode": how.mode, "points": rows, "correlated": {k: dict(v) for k, v in how.correlated.items()},
-        "dropped": [asdict(lost) for lost in how.dropped], "notes": list(reduced.notes), "error": None,
-    }  # fmt: skip
-
-
-def ranges(lines: Iterable[tuple[int, int]]) -> str:
-    """First and last lines as ranges.
-
-    >>> ranges([(5, 5), (2, 3), (4, 4), (9, 9)])
-    '2-5, 9'
-    """
-    out: list[list[int]] = []
-    for first, last in sorted(set(lines)):
-        if out and first <= out[-1][1] + 1:
-            out[-1][1] = max(last, out[-1][1])
-        else:
-            out.append([first, last])
-    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
-
-
-def points_text(reduced: Dataset | str) -> list[str]:
-    """Steady points, what was dropped and the notes, as lines of text."""
-    if isinstance(reduced, str):
-        return [f"  not reduced: {reduced}"]
-    how, n = reduction(reduced), len(reduced)
-    values, none = reduced.values, np.full(n, np.nan)
-    names = [k for k in SHOWN if k in values and np.isfinite(values[k]).any()]
-    names = [k for k in names if k != "pwm_s" or "throttle" not in names]  # one command
-    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
-    for name in names:
-        columns[name] = [
-            tables.speed_text(float(f"{x:.5g}")) if name == "rpm" else tables.number_text(_finite(x), 5)
-            for x in values[name][:MOST]
-        ]
-        if np.isfinite(u := reduced.u.get(name, none)).any():
-            columns[f"u({name})"] = [tables.number_text(_finite(x), 2) for x in u[:MOST]]
-    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
-    many = "" if n <= MOST else f", the first {MOST} of them"
-    what = "one per row" if how.mode == "points" else "means of plateaus"
-    out = [f"  {tables.number_of(n, 'steady point')}, {what}{many}:"]
-    rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
-    out.append(tables.text_table(list(columns), rows, (len(columns) - 1,), "    "))
-    reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
-    for lost in how.dropped:
-        what = "rows" if not lost.channel else f"values of {lost.channel}"
-        reasons.setdefault((what, lost.reason), []).append((lost.line, lost.last))
-    for (what, reason), lines in reasons.items():
-        text = ranges(lines)
-        text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
-        out.append(f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}")
-    for channel, parts in how.correlated.items():
-        words = ", ".join(f"{part} {value:.3g}" for part, value in parts.items())
-        out.append(f"  shared by all points, {channel}: {words}")
-    return out + [f"  . {note}" for note in reduced.notes]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
 _KIND = {"apc": "vendor", "uiuc": "bench", "references": "table"}
 _GEOMETRY = ("ApcBlade", "BladeFile", "UiucGeometry", "UiucThickness")
 _EXPORT = f"Fields and meshes hold no loads. {EXPORT}"
-_MARKS: tuple[tuple[bytes, str, str], ...] = (
-    (b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
-    (b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),
-    (b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
-    (b"\x89PNG", "a picture", ""),
-    (b"\xff\xd8\xff", "a picture", ""),
-    (b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
-    (b"FoamFile", "an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat"),
-    (b"$MeshFormat", "a mesh", _EXPORT),
-    (b"C Binary", "an EnSight file", _EXPORT),
-    (b"#!TDV", "a Tecplot binary file", _EXPORT),
-    (b"<?xml", "XML", "Export as CSV"),
-    (b"# vtk", "a VTK file", _EXPORT),
-    (b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
-    (b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
-    (b"<!DOCTYPE", "a web page", "Download the file that it shows, or save its table as CSV"),
-    (b"<html", "a web page", "Download the file that it shows, or save its table as CSV"),
+_Mark = tuple[re.Pattern[bytes], str, str]
+_PAGE = ("a web page", "Download the file that it shows, or save its table as CSV")
+_FOAM = ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
+_FLUENT = "file (mesh, fields and settings)"
+
+
+def _begins(mark: bytes, got: str, hint: str) -> _Mark:
+    return re.compile(rb"\A\s*" + re.escape(mark)), got, hint
+
+
+_MARKS: tuple[_Mark, ...] = (
+    (re.compile(rb"\A\s*\Z"), "an empty file", "Did the export finish?"),
+    (re.compile(rb"(?s)\A.{0,1991}<VTKFile "), "a VTK file", _EXPORT),
+    _begins(b"\x89HDF", "HDF5 data (a case, mesh or field file)", _EXPORT),
+    _begins(b"PK\x03\x04", "a damaged zip archive or workbook", "Copy it again, or save the sheet as CSV"),
+    _begins(b"%PDF", "a PDF document", "Copy the numbers into a CSV"),
+    _begins(b"\x89PNG", "a picture", ""),
+    _begins(b"\xff\xd8\xff", "a picture", ""),
+    _begins(b"(rp (", "solver settings of Fluent (no results)", "Settings hold no results; export the report files"),
+    _begins(b"FoamFile", *_FOAM),
+    _begins(b"$MeshFormat", "a mesh", _EXPORT),
+    _begins(b"C Binary", "an EnSight file", _EXPORT),
+    _begins(b"#!TDV", "a Tecplot binary file", _EXPORT),
+    _begins(b"<?xml", "XML", "Export as CSV"),
+    _begins(b"# vtk", "a VTK file", _EXPORT),
+    _begins(b"version https://git-lfs", "a Git LFS pointer instead of the file", "Fetch it: git lfs pull"),
+    _begins(b"{", "JSON, or a program's settings", "Save the numbers as CSV with a line of headings"),
+    _begins(b"<!DOCTYPE", *_PAGE),
+    _begins(b"<html", *_PAGE),
+    (re.compile(rb'(?s)\A(?=.*Grid size).{0,390}\(0 "(?i:fluent)'), f"a Fluent data {_FLUENT}", _EXPORT),
+    (re.compile(rb'(?s)\A.{0,390}\(0 "(?i:fluent)'), f"a Fluent case {_FLUENT}", _EXPORT),
+    (re.compile(rb"(?s)\A.{0,1992}FoamFile"), *_FOAM),
 )
-_INSIDE: tuple[tuple[re.Pattern[bytes], str, str], ...] = (
+_IN_TEXT: tuple[_Mark, ...] = (
     (re.compile(rb"^\s*(#[^\n]*\n\s*)*FORMAT\s+type:\s*ensight", re.IGNORECASE), "an EnSight case file", _EXPORT),
     (re.compile(rb"APC Propeller .*(Predictions|RPM Range)"), "a summary of APC over many propellers (PER2)",
      "Import the propeller's own file, PER3_*.dat"),
@@ -171,39 +109,29 @@ def recognised(path: str | os.PathLike[str]) -> tuple[str, str] | None:
             head = unpacked(load_bytes(path), os.fspath(path), 16384)
     except (OSError, InputError):
         return None
-    if not head.strip():
-        return ("an empty file", "Did the export finish?")
-    if b"<VTKFile " in head[:2000]:
-        return ("a VTK file", _EXPORT)
-    for mark, got, hint in _MARKS:
-        if head.lstrip()[: len(mark)] == mark:
-            return (got, hint)
-    if b'(0 "fluent' in head.lower()[:400]:
-        what = "data" if b"Grid size" in head else "case"
-        return (f"a Fluent {what} file (mesh, fields and settings)", _EXPORT)
-    if b"FoamFile" in head[:2000]:
-        return ("an OpenFOAM dictionary or field", "Import postProcessing/*/*/*.dat")
-    if b"\0" in head:
-        zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
-        if zeros > 0.8 * len(head[:400]) / 2 and bytes(16) not in head:
-            return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
-        return None
-    for pattern, got, hint in _INSIDE:
-        if pattern.search(head):
-            return (got, hint)
-    if polars.resembles(head.decode("latin-1")):
+    marks = _MARKS if b"\0" in head else (*_MARKS, *_IN_TEXT)
+    if found := next(((got, hint) for mark, got, hint in marks if mark.search(head)), None):
+        return found
+    if b"\0" not in head:
+        return _as_text(head.decode("latin-1"))
+    zeros = max(head[0:400:2].count(0), head[1:400:2].count(0))
+    if zeros > 0.8 * len(head[:400]) / 2 and bytes(16) not in head:
+        return ("what looks like UTF-16 without its mark", "Save the file as UTF-8")
+    return None
+
+
+def _as_text(head: str) -> tuple[str, str] | None:
+    """What a text looks like that is no table of numbers."""
+    lines, words = [line for line in head.splitlines() if line.strip()], head.split()
+    if polars_c81.resembles(head):
         hint = "Fields are 7 characters wide, nine values after the first; or write alpha_deg, cl, cd, mach as CSV"
         return ("a C81 table with a different column width", hint)
-    lines = [line for line in head.decode("latin-1").splitlines() if line.strip()]
-    if len(lines) == 1 and len(re.split(r"[,;\t]", lines[0])) > 1:
+    if len(lines) == 1 and re.search(r"[,;\t]", lines[0]):
         return ("one line and no rows", "Did the logger write any?")
     if len(lines) > 2 and not any(re.search(r"[\s,;|]", line.strip()) for line in lines):
         return ("a single column", "One column alone is not enough: also export time, speed or setting")
-    words = head.decode("latin-1").split()
     numbers = sum(word.strip("(),;").lstrip("+-").replace(".", "", 1)[:1].isdigit() for word in words)
-    if len(words) > 20 and numbers < 0.2 * len(words):
-        return ("a text without a table of numbers", "")
-    return None
+    return ("a text without a table of numbers", "") if len(words) > 20 and numbers < 0.2 * len(words) else None
 
 
 _DAMAGED = (
@@ -249,34 +177,48 @@ def adapt(found: Any, form: str, name: str) -> Dataset:
     >>> adapt(Dataset("bench", "stand", {"rpm": [6000.0, 7000.0], "thrust_N": [10.0, 13.5]}), "csv", "a.csv")
     Dataset('bench', 'stand', 2 points: rpm, thrust_N)
     """
-    if isinstance(found, Dataset):
-        if "format" in found.provenance:
-            return found
-        flags = sorted({flag for row in found.flags for flag in row})
-        about = {**_texts(found.provenance, name), "format": form}
-        return replace(found, provenance=about, notes=(*found.notes, *flags))
-    if isinstance(found, Polar):
-        at = np.meshgrid(found.alpha, found.Re, found.M, indexing="ij")
-        axes = {"alpha_rad": found.alpha, "Re": found.Re, "M": found.M}
-        channels = _channels({k: v.ravel() if axes[k].size > 1 else axes[k] for k, v in zip(axes, at, strict=True)})
-        channels |= {key: Channel(getattr(found, key).ravel()) for key in ("cl", "cd")}
-        return dataset(form, "polar", channels, found.notes, {"file": name, "source": found.source})
-    if isinstance(found, (list, tuple)) and found and all(isinstance(item, Reference) for item in found):
-        return _references(list(found), form, name)
-    if isinstance(found, (list, tuple)) and found and all(isinstance(item, uiuc.UiucPropeller) for item in found):
-        return _propellers(list(found), form, name)
-    if isinstance(found, ApcPerformance):
-        told = f"{found.name}: {found.blades} blades, D {found.diameter_m:.4g} m, pitch {found.pitch_m:.4g} m"
-        table = adapt(found.series, form, name)
-        remark = str(found.series.provenance.get("remark", ""))
-        return replace(table, notes=(told, *([remark] if remark else []), *table.notes))
-    if is_dataclass(found) and not isinstance(found, type):
-        columns = dict(_columns(found))
-        if any(len(values) for values in columns.values()):
-            kind = "geometry" if type(found).__name__ in _GEOMETRY else _KIND.get(form, "table")
-            notes = tuple(str(note) for note in getattr(found, "notes", ()) or ())
-            return dataset(form, kind, _channels(columns), notes, _texts(getattr(found, "provenance", {}), name))
-    raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
+    made = _dataclass(found, form, name) if is_dataclass(found) and not isinstance(found, type) else None
+    if isinstance(found, (list, tuple)) and found:
+        make = next((make for kind, make in _LISTS.items() if all(isinstance(item, kind) for item in found)), None)
+        made = make(list(found), form, name) if make else None
+    if made is None:
+        raise InputError(Fault(name, "", f"a {type(found).__name__} without numbers", "something that can be shown"))
+    return made
+
+
+@singledispatch
+def _dataclass(found: Any, form: str, name: str) -> Dataset | None:
+    columns = dict(_columns(found))
+    if not any(len(values) for values in columns.values()):
+        return None
+    kind = "geometry" if type(found).__name__ in _GEOMETRY else _KIND.get(form, "table")
+    notes = tuple(str(note) for note in getattr(found, "notes", ()) or ())
+    return dataset(form, kind, _channels(columns), notes, _texts(getattr(found, "provenance", {}), name))
+
+
+@_dataclass.register
+def _series(found: Dataset, form: str, name: str) -> Dataset:
+    if "format" in found.provenance:
+        return found
+    flags = sorted({flag for row in found.flags for flag in row})
+    about = {**_texts(found.provenance, name), "format": form}
+    return replace(found, provenance=about, notes=(*found.notes, *flags))
+
+
+@_dataclass.register
+def _polar(found: Polar, form: str, name: str) -> Dataset:
+    axes = {"alpha_rad": found.alpha, "Re": found.Re, "M": found.M}
+    at = dict(zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True))
+    channels = _channels({k: at[k].ravel() if axis.size > 1 else axis for k, axis in axes.items()})
+    channels |= {key: Channel(getattr(found, key).ravel()) for key in ("cl", "cd")}
+    return dataset(form, "polar", channels, found.notes, {"file": name, "source": found.source})
+
+
+@_dataclass.register
+def _performance(found: ApcPerformance, form: str, name: str) -> Dataset:
+    told = f"{found.name}: {found.blades} blades, D {found.diameter_m:.4g} m, pitch {found.pitch_m:.4g} m"
+    table, remark = _series(found.series, form, name), str(found.series.provenance.get("remark", ""))
+    return replace(table, notes=(told, *filter(None, [remark]), *table.notes))
 
 
 def _texts(provenance: Mapping[str, Any], name: str) -> dict[str, str]:
@@ -300,6 +242,9 @@ def _propellers(found: list[uiuc.UiucPropeller], form: str, name: str) -> Datase
     if not columns:
         columns = {"diameter_in": np.array([item.diameter_in for item in found])}
     return dataset(form, "bench", _channels(columns), notes, {"file": name})
+
+
+_LISTS: Mapping[type, Callable[..., Dataset]] = {Reference: _references, uiuc.UiucPropeller: _propellers}
 
 
 # Averages of one history over whole revolutions, whose duration only the user knows.

@@ -27,7 +27,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from bemt.base.document import Documented
 from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
@@ -280,7 +279,7 @@ class Audit(Documented):
 
 # Audit of the CFD values of a case: what the remarks of their references say of the set-up.
 
-_PHRASES: tuple[tuple[str, dict[str, Any]], ...] = (
+_PHRASES: tuple[tuple[str, Mapping[str, float | bool | str]], ...] = (
     (r"cylinder of the (propeller|rotor|fan)'s (own )?diameter", {"domain_over_D": 1.0}),
     (r"\bincompressible\b", {"compressible": False}),
     (r"(?<!in)\bcompressible\b", {"compressible": True}),
@@ -317,12 +316,11 @@ def facts_from_remark(remark: str, known: CfdFacts | None = None) -> CfdFacts:
     >>> f.steady_mrf, f.wall, f.domain_over_D, f.y_plus, f.u_grid, f.compressible
     (True, 'automatic', 5.0, 51.0, 0.02, None)
     """
-    found: dict[str, Any] = {}
+    found: dict[str, float | bool | str] = {}
     for pattern, values in _PHRASES:
         if re.search(pattern, remark, re.IGNORECASE):
             found |= values
     for pattern, name, factor in _NUMBERS:
-        match = re.search(pattern, remark, re.IGNORECASE)
-        if match:
+        if match := re.search(pattern, remark, re.IGNORECASE):
             found[name] = float(f"{float(match[1]) * factor:.12g}")
-    return replace(known or CfdFacts(), **found)
+    return replace(known or CfdFacts(), **found)  # type: ignore[arg-type]

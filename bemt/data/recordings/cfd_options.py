@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from bemt.base import units
 from bemt.base.errors import Fault, InputError, refuse
@@ -17,7 +17,7 @@ from bemt.base.toml_text import Collector
 from bemt.data import readers
 from bemt.data.readers import load_text, number
 from bemt.data.readers.cfd import unit_of
-from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunToml, SetupTable, toml_text
+from bemt.data.readers.cfd_run import QUANTITIES, ReferenceTable, RunHead, RunToml, SetupTable, toml_text
 from bemt.data.readers.headings import heading, meanings
 from bemt.data.readers.recording_toml import QUANTITIES as CHANNELS
 from bemt.data.readers.recording_toml import RecordingToml
@@ -27,6 +27,8 @@ from bemt.data.recordings.cfd_loads import DUCT
 
 Facts = dict[str, str | int]
 """What options say of one quantity: ``column``, ``unit``, ``sign``."""
+Told = dict[str, str | float | bool | None]
+"""What options say of the set-up, and of what coefficients rest on."""
 _REFERENCE = {re.sub(r"_(m2|m|m_s|kg_m3)$", "", k): k for k in ReferenceTable.model_fields}
 _LOADS = ("thrust", "duct_thrust", "torque", "power")
 _WORDS = {"true": True, "yes": True, "false": False, "no": False}
@@ -139,22 +141,19 @@ def run_from(
             "revolutions": revolutions, "sector": sector, "axis": axis,
             "zones": tuple(_split(zones)) or None}  # fmt: skip
     told = _setup(setup, faults)
-    document: dict[str, Any] = {
-        "run": {k: v for k, v in head.items() if v is not None}, "columns": columns,
-        "reference": _numbers(reference, faults), "setup": told,
-    }  # fmt: skip
     if grids := _grids(files, told, faults):
-        document["grids"] = grids
-        del document["run"]["files"], told["cells"]
+        del head["files"], told["cells"]
+    document = {"run": {k: v for k, v in head.items() if v is not None}, "columns": columns, "grids": grids,
+                "reference": _numbers(reference, faults), "setup": told}  # fmt: skip
     out = Collector("")
-    made = validated(RunToml, document, out)
+    made = validated(RunToml, {k: v for k, v in document.items() if k != "grids" or v}, out)
     faults += [Fault("", _option(f.where), f.got, f.expected, f.hint) for f in out.faults]
     if faults or made is None:
         raise InputError(faults)
     return made
 
 
-def _grids(files: Sequence[str], told: dict[str, Any], faults: list[Fault]) -> list[dict[str, Any]]:
+def _grids(files: Sequence[str], told: Told, faults: list[Fault]) -> list[Mapping[str, object]]:
     """Grids of a study, one file each: every run.toml of several, or files whose cells are listed; [] for one run."""
     cells = told.get("cells")
     if isinstance(cells, str) and "," in cells:
@@ -180,8 +179,8 @@ def _split(texts: Sequence[str]) -> list[str]:
     return [part.strip() for text in texts for part in text.split(",") if part.strip()]
 
 
-def _numbers(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
-    out: dict[str, Any] = {}
+def _numbers(texts: Sequence[str], faults: list[Fault]) -> Told:
+    out: Told = {}
     for name, text in pairs("--reference", _split(texts), faults).items():
         key = _REFERENCE.get(name, name)
         try:
@@ -191,17 +190,14 @@ def _numbers(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
     return out
 
 
-def _setup(texts: Sequence[str], faults: list[Fault]) -> dict[str, Any]:
-    out: dict[str, Any] = {}
+def _setup(texts: Sequence[str], faults: list[Fault]) -> Told:
+    out: Told = {}
     for name, text in pairs("--setup", texts, faults).items():
         kind = SetupTable.model_fields.get(name)
-        value: Any = text
+        out[name] = text
         if kind is not None and "str" not in str(kind.annotation) and "Literal" not in str(kind.annotation):
-            try:
-                value = _WORDS[text.lower()] if text.lower() in _WORDS else float(text)
-            except ValueError:
-                value = text
-        out[name] = value
+            with suppress(ValueError):
+                out[name] = _WORDS[text.lower()] if text.lower() in _WORDS else float(text)
     return out
 
 
@@ -224,14 +220,11 @@ def write_run(run: RunToml, out: str) -> Path:
     def near(files: Sequence[str]) -> tuple[str, ...]:
         return tuple(Path(os.path.relpath(f, path.parent)).as_posix() for f in files)
 
-    document: dict[str, Any] = run.model_dump(exclude_unset=True, exclude_none=True)
-    if run.grids:
-        document["run"].pop("files", None)
-        document["grids"] = [g | {"files": near(g["files"])} for g in document["grids"]]
-    else:
-        document["run"]["files"] = near(run.run.files)
+    grids = tuple(g.model_copy(update={"files": near(g.files)}) for g in run.grids)
+    head = run.run.model_dump(exclude_unset=True, exclude={"files"}) | ({} if grids else {"files": near(run.run.files)})
+    own = {"run": RunHead.model_validate(head)} | ({"grids": grids} if grids else {})
     text = toml_text(
-        RunToml.model_validate(document),
+        run.model_copy(update=own),
         f"{'One condition on several grids' if run.grids else 'One CFD run'}, written by bemt import. "
         "Give this file in place of the exports.",
     )

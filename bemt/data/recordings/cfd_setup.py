@@ -66,7 +66,7 @@ def with_grid_floor(
 ) -> Dataset:
     """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say."""
     random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
-    numerics: dict[str, Any] = {}
+    numerics: dict[str, NDArray[np.float64]] = {}
     flies = _flies(d)
     bare = np.zeros(len(d), dtype=bool)
     for name in ("thrust_N", "duct_thrust_N", "torque_Nm", "power_W", "CT", "CQ", "CP"):

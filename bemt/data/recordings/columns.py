@@ -14,7 +14,16 @@ from bemt.base.tables import number_of
 from bemt.base.units import ZERO_CELSIUS
 from bemt.data.readers.samples import lone
 from bemt.data.recordings.channels import shaft_power
-from bemt.data.recordings.findings import MANY, Facts, Finding, check_for, zero_thrust_speed
+from bemt.data.recordings.findings import (
+    Facts,
+    Finding,
+    check_for,
+    contradicts,
+    enough,
+    rows_of,
+    where_of,
+    zero_thrust_speed,
+)
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, LIQUID
 
@@ -204,13 +213,12 @@ def slow_rotor(facts: Facts) -> Iterator[Finding]:
     Rows far apart alone say nothing, since points written down by hand are. But one that took the new speed is there
     by the next row; none needs more than `SLOWEST_S`, whatever its size.
     """
-    t, response = facts.get("time_s"), next((k for k in ("rpm", "thrust_N") if facts.get(k) is not None), None)
-    command = next((v for k in ("pwm_s", "throttle") if (v := facts.get(k)) is not None), None)
-    if t is None or command is None or response is None:
+    t, told, command = facts.get("time_s"), facts.first("rpm", "thrust_N"), facts.first("pwm_s", "throttle")
+    if t is None or command is None or told is None:
         return
-    y = facts.values[response]
-    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(command) & np.isfinite(y))
-    t, c, y = t[rows], command[rows], np.abs(y[rows])
+    response, (_, c), y = told[0], command, told[1]
+    rows = np.flatnonzero(np.isfinite(t) & np.isfinite(c) & np.isfinite(y))
+    t, c, y = t[rows], c[rows], np.abs(y[rows])
     if rows.size < 2 * HELD or float(np.ptp(c)) == 0.0 or float(np.ptp(y)) == 0.0:
         return
     level = (c - c.min()) / np.ptp(c)
@@ -287,31 +295,6 @@ def air_units(facts: Facts) -> Iterator[Finding]:
 # Signs, and quantities beyond their physical bounds, row by row.
 
 
-def _where(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
-    lines = [str(facts.lines[int(r)]) for r in rows[:6]]
-    more = f" and {len(rows) - 6} more" if len(rows) > 6 else ""
-    return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
-
-
-# Rows from which a recording is a log, and share of those under load that are misread in one.
-_LOG, _FEW_ROWS = 100, 0.2
-
-
-def _enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:
-    """Whether rows are more than the transients and spikes of a log: one in a table, 1 % of many."""
-    return bool(np.any(odd)) and float(odd.sum()) > 0.01 * (float(among.sum()) if len(odd) >= MANY else 0.0)
-
-
-def _contradicts(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> str:
-    """Severity of what cannot be so: a few rows of a log are misread, a table or much of a log contradicts itself."""
-    few = len(odd) >= _LOG and float(odd.sum()) < _FEW_ROWS * float(among.sum())
-    return "warning" if few else "error"
-
-
-def _rows(mask: NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(i) for i in np.flatnonzero(mask))
-
-
 @check_for("signs")
 def flipped(facts: Facts) -> Iterator[Finding]:
     """A whole channel, or some of its rows, with the other sign."""
@@ -337,9 +320,9 @@ def flipped(facts: Facts) -> Iterator[Finding]:
         odd = _mirrored(facts, name, v, loaded, -1.0 if share > 0.5 else 1.0)
         if np.any(odd):
             rows = np.flatnonzero(odd)
-            where = f"{number_of(len(rows), 'row')} ({_where(facts, rows)})"
+            where = f"{number_of(len(rows), 'row')} ({where_of(facts, rows)})"
             text = f"the sign changes in {where} whose magnitude fits the others"
-            yield Finding("sign_flipped", facts.named(name), text, "multiply those rows by -1", _rows(odd), "error")
+            yield Finding("sign_flipped", facts.named(name), text, "multiply those rows by -1", rows_of(odd), "error")
 
 
 def _wind(facts: Facts) -> float | None:
@@ -382,13 +365,13 @@ def negative_thrust(facts: Facts) -> Iterator[Finding]:
         return
     turning = np.ones(len(v), dtype=bool) if rpm is None else np.nan_to_num(rpm) > 0.3 * np.nanpercentile(rpm, 95)
     odd = (v < -0.03 * top) & turning & facts.still
-    if _enough(odd, turning):
+    if enough(odd, turning):
         rows = np.flatnonzero(odd)
-        where = f"{_where(facts, rows)}; lowest {np.nanmin(v[odd]):.4g} N, largest thrust {top:.4g} N"
+        where = f"{where_of(facts, rows)}; lowest {np.nanmin(v[odd]):.4g} N, largest thrust {top:.4g} N"
         fix = "a propeller in still air pushes one way: zero of the load cell, sign, or a misreading; leave them out"
         turns = "while the rotor turns" if rpm is not None else "beside positive ones"
         text = f"negative thrust {turns} in {number_of(len(rows), 'row')} ({where})"
-        yield Finding("negative_thrust", facts.named("thrust_N"), text, fix, _rows(odd), "warning")
+        yield Finding("negative_thrust", facts.named("thrust_N"), text, fix, rows_of(odd), "warning")
 
 
 @check_for("power_above_input")
@@ -405,12 +388,12 @@ def power_above_input(facts: Facts) -> Iterator[Finding]:
     with np.errstate(all="ignore"):
         ratio = np.abs(shaft) / electric
     odd = facts.loaded & (ratio > 1.02) & np.isfinite(ratio)
-    if _enough(odd, facts.loaded):
+    if enough(odd, facts.loaded):
         rows = np.flatnonzero(odd)
         text = f"{words} exceeds the electrical power in {len(rows)} of {int(facts.loaded.sum())} rows under load "
-        text += f"({_where(facts, rows)}), {np.max(ratio[odd]):.4g} times at most"
+        text += f"({where_of(facts, rows)}), {np.max(ratio[odd]):.4g} times at most"
         fix = "unit or gain of the torque, electrical revolutions taken for mechanical, or unit of voltage or current"
-        yield Finding("power_above_input", words, text, fix, _rows(odd), _contradicts(odd, facts.loaded))
+        yield Finding("power_above_input", words, text, fix, rows_of(odd), contradicts(odd, facts.loaded))
 
 
 @check_for("merit")
@@ -434,15 +417,13 @@ def merit_above_one(facts: Facts) -> Iterator[Finding]:
         else:
             return
     odd = facts.loaded & facts.still & (fm > limit * 1.02)
-    if _enough(odd, facts.loaded):
+    if enough(odd, facts.loaded):
         rows = np.flatnonzero(odd)
-        text = (
-            f"figure of merit {np.max(fm[odd]):.4g} at most in {number_of(len(rows), 'row')} ({_where(facts, rows)}); "
-        )
-        text += f"{words} stays below {limit:.3g}"
+        text = f"figure of merit {np.max(fm[odd]):.4g} at most in {number_of(len(rows), 'row')} "
+        text += f"({where_of(facts, rows)}); {words} stays below {limit:.3g}"
         fix = "unit or gain of thrust or torque, diameter, or a zero that was not subtracted"
-        named, severity = facts.named("thrust_N" if T is not None else "CT"), _contradicts(odd, facts.loaded)
-        yield Finding("fm_above_1", named, text, fix, _rows(odd), severity)
+        named, severity = facts.named("thrust_N" if T is not None else "CT"), contradicts(odd, facts.loaded)
+        yield Finding("fm_above_1", named, text, fix, rows_of(odd), severity)
 
 
 @check_for("tip_mach")
@@ -456,4 +437,4 @@ def tip_mach(facts: Facts) -> Iterator[Finding]:
     if np.mean(odd) > 0.05:
         text = f"tip Mach number {np.max(mach):.3g} in {number_of(odd.sum(), 'row')} with the diameter of {D:g} m"
         fix = "electrical revolutions taken for mechanical (divide by the pole pairs), or the unit of the diameter"
-        yield Finding("tip_mach", facts.named("rpm"), text, fix, _rows(odd), "error")
+        yield Finding("tip_mach", facts.named("rpm"), text, fix, rows_of(odd), "error")

@@ -281,8 +281,10 @@ def get(
     """Put a database into a folder."""
     from bemt.data.readers.uiuc import scan_folder
 
-    if source is not None and url is not None:
-        raise InputError(Fault("", "--url", url, "none with --source, which downloads nothing", "Give one of the two"))
+    if None not in (source, url):
+        raise InputError(
+            Fault("", "--url", str(url), "none with --source, which downloads nothing", "Give one of the two")
+        )
     known = _record(folder)
     if known is None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         hint = "Name an empty or new folder with --out"

@@ -65,6 +65,10 @@ class Facts:
         v = self.values.get(name)
         return v if v is not None and bool(np.any(np.isfinite(v))) else None
 
+    def first(self, *names: str) -> tuple[str, Array] | None:
+        """First channel of these with a finite value."""
+        return next(((name, v) for name in names if (v := self.get(name)) is not None), None)
+
     def named(self, name: str) -> str:
         """Name in the file."""
         return self.names.get(name, name)
@@ -169,6 +173,33 @@ def facts_of(
         ducted or about.get("rotor_ducted") == "yes" or about.get("duct") == "yes", about.get("propeller") == "none",
         source.kind == "cfd",
     )  # fmt: skip
+
+
+def where_of(facts: Facts, rows: Array | NDArray[np.intp]) -> str:
+    """Lines of the first of some rows."""
+    lines = [str(facts.lines[int(r)]) for r in rows[:6]]
+    more = f" and {len(rows) - 6} more" if len(rows) > 6 else ""
+    return f"line{'s' if len(rows) > 1 else ''} {', '.join(lines)}{more}"
+
+
+# Rows from which a recording is a log, and share of those under load that are misread in one.
+_LOG, _FEW_ROWS = 100, 0.2
+
+
+def enough(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> bool:
+    """Whether rows are more than the transients and spikes of a log: one in a table, 1 % of many."""
+    return bool(np.any(odd)) and float(odd.sum()) > 0.01 * (float(among.sum()) if len(odd) >= MANY else 0.0)
+
+
+def contradicts(odd: NDArray[np.bool_], among: NDArray[np.bool_]) -> str:
+    """Severity of what cannot be so: a few rows of a log are misread, a table or much of a log contradicts itself."""
+    few = len(odd) >= _LOG and float(odd.sum()) < _FEW_ROWS * float(among.sum())
+    return "warning" if few else "error"
+
+
+def rows_of(mask: NDArray[np.bool_]) -> tuple[int, ...]:
+    """Rows of a mask."""
+    return tuple(int(i) for i in np.flatnonzero(mask))
 
 
 # Wind that a recording does not state: below some speed of rotation the propeller is a windmill.

@@ -36,7 +36,7 @@ from bemt.base.tables import number_text
 from bemt.data.readers.headings import CELLS
 from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
 from bemt.data.recordings.channels import named
-from bemt.physics.dataset import Dataset
+from bemt.physics.dataset import Dataset, concat
 
 FS_THREE = 1.25
 """Safety factor with three grids."""
@@ -118,25 +118,16 @@ class LoadStudy(Documented):
         return f"{lead}; order {self.order:.2f}, {best} at cell size 0, GCI {100 * self.gci_fine:.2f} %, {end}"
 
 
-def cell_size(cells: float, volume: float = 1.0, dimensions: int = 3) -> float:
-    """Give the representative cell size (V/N)^(1/d). [m]
-
-    >>> round(cell_size(1e6) / cell_size(8e6), 3)
-    2.0
-    """
-    if not (cells > 0 and volume > 0 and dimensions in (2, 3)):
-        got = f"{cells:g} cells, volume {volume:g}, {dimensions} dimensions"
-        raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
-    return float((volume / cells) ** (1.0 / dimensions))
-
-
 def ratios(cells: Sequence[float], dimensions: int = 3) -> tuple[float, ...]:
     """Give refinement ratios from cell counts, finest grid first. [1]
 
     >>> [round(r, 3) for r in ratios([8e6, 1e6, 125e3])]
     [2.0, 2.0]
     """
-    sizes = [cell_size(n, 1.0, dimensions) for n in cells]
+    if not (min(cells) > 0 and dimensions in (2, 3)):
+        got = f"{', '.join(f'{n:g}' for n in cells)} cells, {dimensions} dimensions"
+        raise InputError(Fault("", "grid", got, "positive numbers and 2 or 3 dimensions"))
+    sizes = [float((1.0 / n) ** (1.0 / dimensions)) for n in cells]
     return tuple(b / a for a, b in zip(sizes, sizes[1:], strict=False))
 
 
@@ -160,6 +151,21 @@ def _order(e21: float, e32: float, r21: float, r32: float) -> float | None:
     return 0.5 * (low + high)
 
 
+def _asked(f: tuple[float, ...], r: tuple[float, ...], formal_order: float, safety: float | None) -> list[Fault]:
+    """What is wrong with the numbers of a study."""
+    shown, shown_r = (", ".join(f"{v:g}" for v in x) for x in (f, r))
+    several, hint = len(f) in (2, 3), "List the finest grid first; a ratio is coarse over fine cell size"
+    asked: tuple[tuple[bool, str, str, str, str], ...] = (
+        (several, "values", f"{len(f)} grids", "two or three grids, finest first", ""),
+        (not several or len(r) == len(f) - 1, "ratios", f"{len(r)} ratios for {len(f)} grids", f"{len(f) - 1}", ""),
+        (bool(np.all(np.isfinite(f)) and np.all(f[:2])), "values", shown, "finite values other than zero", ""),
+        (all(1.0 < v < math.inf for v in r), "ratios", shown_r, "numbers above 1", hint),
+        (0.0 < formal_order <= 10.0, "formal_order", f"{formal_order:g}", "a number from 0 to 10", ""),
+        (safety is None or 1.0 <= safety < math.inf, "safety", f"{safety or 0:g}", "a factor of 1 or more", ""),
+    )
+    return [Fault("", *told) for right, *told in asked if not right]
+
+
 def grid_study(
     values: Sequence[float], ratios: Sequence[float], formal_order: float = 2.0, safety: float | None = None
 ) -> GridStudy:
@@ -172,62 +178,44 @@ def grid_study(
     0.24
     """
     f, r = tuple(float(v) for v in values), tuple(float(v) for v in ratios)
-    faults = []
-    if len(f) not in (2, 3):
-        faults.append(Fault("", "values", f"{len(f)} grids", "two or three grids, finest first"))
-    elif len(r) != len(f) - 1:
-        faults.append(Fault("", "ratios", f"{len(r)} ratios for {len(f)} grids", f"{len(f) - 1}"))
-    if not all(math.isfinite(v) for v in f) or any(v == 0.0 for v in f[:2]):
-        faults.append(Fault("", "values", ", ".join(f"{v:g}" for v in f), "finite values other than zero"))
-    if not all(math.isfinite(v) and v > 1.0 for v in r):
-        hint = "List the finest grid first; a ratio is coarse over fine cell size"
-        faults.append(Fault("", "ratios", ", ".join(f"{v:g}" for v in r), "numbers above 1", hint))
-    if not (math.isfinite(formal_order) and 0.0 < formal_order <= 10.0):
-        faults.append(Fault("", "formal_order", f"{formal_order:g}", "a number from 0 to 10"))
-    if safety is not None and not (math.isfinite(safety) and safety >= 1.0):
-        faults.append(Fault("", "safety", f"{safety:g}", "a factor of 1 or more"))
-    refuse(faults)
+    refuse(_asked(f, r, formal_order, safety))
     flags = [f"ratio {v:.3g} below {MIN_RATIO}: the index is uncertain" for v in r if v < MIN_RATIO - 1e-9]
-    fs = (FS_THREE if len(f) == 3 else FS_TWO) if safety is None else float(safety)
-    e21 = f[1] - f[0]
-    spread = (max(f) - min(f)) / abs(f[0])
+    fs = float(safety or {3: FS_THREE, 2: FS_TWO}[len(f)])
+    e21, spread = f[1] - f[0], (max(f) - min(f)) / abs(f[0])
     p: float | None = formal_order
-    bad = False
-    if len(f) == 2:
-        flags.append(f"two grids: order {formal_order:g} is assumed")
-    else:
-        e32 = f[2] - f[1]
-        p, flag, bad = _three(e21, e32, r, formal_order)
-        flags += flag
+    flag, e32 = f"two grids: order {formal_order:g} is assumed", f[-1] - f[-2]
+    if len(f) == 3:
+        p, flag = _three(e21, e32, r, formal_order)
+    flags += [flag] * bool(flag)
     if p is None:
         return GridStudy(f, r, None, None, None, None, None, fs, 3.0 * spread / COVERAGE, tuple(flags))
     factor = r[0] ** p - 1.0
     fine = fs * abs(e21 / f[0]) / factor
-    coarse = fs * abs((f[2] - f[1]) / f[1]) / (r[1] ** p - 1.0) if len(f) == 3 else None
+    coarse = fs * abs(e32 / f[1]) / (r[1] ** p - 1.0) if len(f) == 3 else None
     asymptotic = coarse / (r[0] ** p * fine) if coarse is not None and fine > 0.0 else None
-    u = max(fine, 3.0 * spread if bad else 0.0) / COVERAGE
+    u = max(fine, 3.0 * spread if flag and len(f) == 3 else 0.0) / COVERAGE
     return GridStudy(f, r, p, f[0] - e21 / factor, fine, coarse, asymptotic, fs, u, tuple(flags))
 
 
-def _three(e21: float, e32: float, r: tuple[float, ...], formal_order: float) -> tuple[float | None, list[str], bool]:
-    """Order of three grids with its flags, and whether the index must not be trusted."""
+def _three(e21: float, e32: float, r: tuple[float, ...], formal_order: float) -> tuple[float | None, str]:
+    """Order of three grids, and why the index must not be trusted; "" where it may."""
+    ratio, why = (e32 / e21 if e21 else math.inf), ""
     if e21 == 0.0 or e32 == 0.0:
-        which = "the two finest grids agree exactly" if e21 == 0.0 else "the two coarser grids agree exactly"
-        return None, [f"{which}: no order can be determined"], True
-    if not math.isfinite(e32 / e21) or e32 / e21 == 0.0:
-        return None, ["differences of unlike size: no order can be determined"], True
-    if e32 / e21 < 0.0:
-        return None, ["oscillatory: the values do not converge monotonically; no order can be determined"], True
-    # equal orders on both sides of the threshold: |e32/e21| = (r32^p - 1) r21^p / (r21^p - 1) falls to ln r32/ln r21
-    if abs(e32 / e21) <= math.log(r[1]) / math.log(r[0]):
-        return None, ["divergent: the change grows with refinement; no order can be determined"], True
-    p = _order(e21, e32, *r)
+        why = f"the two {'finest' if e21 == 0.0 else 'coarser'} grids agree exactly:"
+    elif not math.isfinite(ratio) or ratio == 0.0:
+        why = "differences of unlike size:"
+    elif ratio < 0.0:
+        why = "oscillatory: the values do not converge monotonically;"
+    # equal orders at the threshold: |e32/e21| = (r32^p - 1) r21^p / (r21^p - 1) falls to ln r32/ln r21
+    elif ratio <= math.log(r[1]) / math.log(r[0]):
+        why = "divergent: the change grows with refinement;"
+    p = None if why else _order(e21, e32, *r)
     if p is None:
-        return None, ["an order above 60: no order can be determined"], True
+        return None, f"{why or 'an order above 60:'} no order can be determined"
     low, high = ORDERS[0], ORDERS[1] * formal_order
-    if not low <= p <= high:
-        return p, [f"implausible order {p:.3g}: expected {low:g} to {high:g} (formal order {formal_order:g})"], True
-    return p, [], False
+    plausible = low <= p <= high
+    told = f"implausible order {p:.3g}: expected {low:g} to {high:g} (formal order {formal_order:g})"
+    return p, "" if plausible else told
 
 
 # CFD of one condition on several grids: one study, of which the finest grid gives the point and the grids its u.
@@ -273,32 +261,29 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
     sizes: dict[str, Array] = {k: np.full(len(d), np.nan) for k in LOADS if k in d}
     for group in groups(d):
         order = sorted(group, key=lambda i: -cells[i] if math.isfinite(cells[i]) else 1.0)
-        if len(group) > 1 and len({float(cells[i]) for i in group if math.isfinite(cells[i])}) < len(group):
+        keep.append(order[0])
+        if len(group) == 1:
+            continue
+        if len(set(cells[group][np.isfinite(cells[group])])) < len(group):
             got = f"{len(group)} runs at {_state(d, group[0])} on " + ", ".join(f"{cells[i]:,.0f}" for i in group)
             hint = "State the cells of each grid: --setup cells=N; runs on one grid are no study"
             raise InputError(Fault(str(d.provenance.get("file", d.name)), "cells", got, "grids of unlike size", hint))
-        keep.append(order[0])
-        if len(group) > 1:
-            found = [s for k in sizes if (s := _study(d, k, order, cells))]
-            studies += found
-            for s in found:
-                sizes[s.channel][order[0]] = s.u_relative
-    for k, u in sizes.items():  # a condition on one grid owes what the grid costs elsewhere
-        most = np.nanmax(u) if np.isfinite(u).any() else math.nan
-        sizes[k] = np.where(np.isfinite(u), u, most)
+        for s in filter(None, (_study(d, k, order, cells) for k in sizes)):
+            studies.append(s)
+            sizes[s.channel][order[0]] = s.u_relative
+    # a condition on one grid owes what the grid costs elsewhere
+    sizes = {k: np.where(np.isfinite(u), u, np.fmax.reduce(u)) for k, u in sizes.items()}
     rows = np.array(sorted(keep), dtype=np.intp)
     told = dict(d.provenance.get("conditions", {}))
     told |= {"cells": float(np.nanmax(cells[rows])), "grids": max((len(s.cells) for s in studies), default=1)}
-    u_thrust = [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]
-    if u_thrust:
+    if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
-    labels = tuple(d.labels[i] for i in rows) if d.labels else ()
-    made = Dataset(
-        "cfd", d.name, {k: v[rows] for k, v in d.values.items()}, {k: v[rows] for k, v in random.items()}, (),
-        {**d.provenance, "conditions": told, "studies": tuple(studies)}, labels, notes=d.notes,
-    )  # fmt: skip
-    return with_grid_floor(made, {k: v[rows] for k, v in sizes.items()}, tuple(s.sentence() for s in studies))
+    about = {**d.provenance, "conditions": told, "studies": tuple(studies)}
+    values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
+    labels = tuple(d.labels[i] for i in rows if d.labels)
+    made = Dataset("cfd", d.name, values, u, (), about, labels, notes=d.notes)
+    return with_grid_floor(made, grid, tuple(s.sentence() for s in studies))
 
 
 def _state(d: Dataset, row: int) -> str:
@@ -323,36 +308,24 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> Load
     )  # fmt: skip
 
 
-def together(parts: Sequence[Dataset], cells: Sequence[float] | None = None, name: str = "") -> Dataset:
-    """Runs on several grids as one run with the uncertainty of its grids; cells [1] as set-ups state, unless given."""
-    own = [d.provenance.get("conditions", {}).get("cells", math.nan) for d in parts] if cells is None else cells
-    known = [math.nan if n is None else float(n) for n in own]
-    bare = [str(d.provenance.get("file", d.name)) for d, n in zip(parts, known, strict=True) if math.isnan(n)]
-    if bare:
+def together(parts: Sequence[Dataset], name: str = "") -> Dataset:
+    """Runs on several grids as one run with the uncertainty of its grids; the cells [1] as their set-ups state."""
+    cells = [float(d.provenance.get("conditions", {}).get("cells") or math.nan) for d in parts]
+    if bare := [str(d.provenance.get("file", d.name)) for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
         hint = "`bemt import FILES --setup cells=N` writes them into its run.toml"
         raise InputError([Fault(f, "cells", "not stated", "the cells of the grid", hint) for f in bare])
-    names = list(dict.fromkeys(k for d in parts for k in d.values))
-    size = sum(map(len, parts))
-    n = np.concatenate([np.full(len(d), c) for d, c in zip(parts, known, strict=True)]) if size else np.empty(0)
-
-    def join(of: str) -> dict[str, Array]:
-        every = [d.values if of == "values" else d.u_by.get("random", d.u) for d in parts]
-        empty = [np.full(len(d), math.nan if of == "values" else 0.0) for d in parts]
-        keys = [k for k in names if any(k in e for e in every)]
-        return {k: np.concatenate([e.get(k, z) for e, z in zip(every, empty, strict=True)]) for k in keys}
-
-    first = max(range(len(parts)), key=lambda i: known[i])
-    about = parts[first].provenance
-    files = tuple(f for d in parts for f in d.provenance.get("files", (d.provenance.get("file", d.name),)))
-    sha256 = "+".join(str(d.provenance.get("sha256", "")) for d in parts)
-    about = {**about, "file": name or " + ".join(d.name for d in parts), "files": files, "sha256": sha256}
-    about.pop("means", None)
+    finest = parts[int(np.argmax(cells))]
+    about = {
+        **{k: v for k, v in finest.provenance.items() if k != "means"},
+        "file": name or " + ".join(d.name for d in parts),
+        "files": tuple(f for d in parts for f in d.provenance.get("files", (d.provenance.get("file", d.name),))),
+        "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
+    }  # fmt: skip
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
-    whole = Dataset(
-        "cfd", name or f"{parts[first].name} and {len(parts) - 1} coarser", join("values"), join("u"), (), about,
-        notes=notes,
-    )  # fmt: skip
-    return by_grid(whole, n)
+    joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
+    name = name or f"{finest.name} and {len(parts) - 1} coarser"
+    whole = Dataset("cfd", name, joined.values, joined.u, (), about, notes=notes)
+    return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
 
 
 def are_grids(parts: Sequence[Dataset]) -> bool:
@@ -395,19 +368,19 @@ def of_table(record: Dataset) -> Dataset:
     Rows of one condition on several grids are no repeats. A table that states its uncertainties keeps its rows.
     """
     cells = next((record[k] for k in record.values if CELLS.search(k)), np.empty(0))
+    size = "" if cells.size else next((k for k in record.values if CELL_SIZE.fullmatch(k)), "")
     d = named(record)
-    loads = [k for k in LOADS if k in d]
-    size = next((k for k in record.values if not cells.size and CELL_SIZE.fullmatch(k)), None)
-    if size and loads and np.unique(record[size]).size > 1 and any(len(g) > 1 for g in groups(d)):
+    loads, counts = [k for k in LOADS if k in d], record[size] if size else cells
+    if not loads or np.unique(counts[np.isfinite(counts)]).size < 2 or len(groups(d)) == len(d):
+        return record
+    if size:
         note = f"{size}: a size of cells? A grid study takes their count, in a column headed cells (it goes with h^-3)"
         return replace(record, notes=(*record.notes, note))
-    if not loads or np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
+    if any(np.isfinite(d.u[k]).any() for k in loads):
         return record
-    if all(len(g) == 1 for g in groups(d)):
-        return record
-    told = {k: v for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
+    told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
     about = {"format": "cfd_run", "files": (record.provenance["file"],), "averaged": {}, "drift": {}}
-    about["conditions"] = {k.lower(): v[0] for k, v in told.items()}
+    about["conditions"] = told
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     return by_grid(Dataset("cfd", record.name, values, provenance={**record.provenance, **about}, notes=record.notes),
                    cells)  # fmt: skip

@@ -3,34 +3,22 @@ r"""What is in a file of results, with honest means.
 Nothing is guessed. A mean over revolutions needs the speed (``--rpm`` or ``--period-s``). The files of one CFD run are
 shown as they are, and then as one run (`bemt.data.recordings.cfd_run`): joined, with the units, sign, sector and zones
 that the user states.
-
-Schema ``bemt.import/1``: ``runs`` is a list of CFD runs (``name``, ``files``, ``points``, ``averaged``, ``drift``,
-``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is
-a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to ``unit``, ``mean``, ``averaged_over``,
-``drift``), ``warnings``, ``error`` (null when the file was read), ``findings`` (``id``, ``channel``, ``evidence``,
-``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction`` (null unless it is a recording:
-``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``, ``channel`` and ``reason``,
-``notes``, ``error``). A channel of a recording has a mean only where the recording is one steady point.
 """
 
 from __future__ import annotations
 
-import math
 import os
 import re
-import shlex
-import textwrap
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bemt.base import tables
 from bemt.base.averaging import Mean, relation
-from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK, Fault, InputError, system_fault
+from bemt.base.errors import Fault, InputError, system_fault
 from bemt.data import readers as importers
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.readers.cfd_run import RunHead, RunToml
@@ -44,28 +32,21 @@ from bemt.data.recordings.adapt import (
     damaged_export,
     findings,
     is_recording,
-    points_text,
     recognised,
-    reduction_document,
     reduction_of,
 )
 from bemt.data.recordings.cfd_files import EXPORT, FIELDS, PROGRAMS, cfd_files, clock_of
 from bemt.data.recordings.cfd_loads import other_than_loads
-from bemt.data.recordings.channels import named
-from bemt.data.recordings.findings import Finding
 from bemt.data.recordings.grid_study import merged, of_table
 from bemt.data.recordings.reduce import reduction
+from bemt.data.recordings.shown import INTERNAL, Imported, ImportedFile
 from bemt.physics.dataset import Dataset
 from bemt.physics.dataset.channels import channel_fault
 
-__all__ = ["SCHEMA", "Choice", "as_dataset", "averaged", "import_file", "import_files"]
+__all__ = ["Choice", "as_dataset", "averaged", "import_file", "import_files"]
 
-SCHEMA = "bemt.import/1"
-INTERNAL = "internal error of this program"
-"""Start of the error of a file on which a reader failed."""
 SETTLED = 0.01
 """Drift above which a mean is called unsettled."""
-_LOADS = {"thrust_N", "torque_Nm", "CT", "CP"}
 _RESTART = re.compile(r"(.+?)((?:_\d+)+)(\.[^.]*)?(?:\.gz)?")
 
 
@@ -206,7 +187,7 @@ def import_files(
         except Exception as error:  # the other files are read all the same
             errors[name] = _refusal(error)
     exports = {n: other_than_loads(r.values) for n, r in records.items() if r.kind == "cfd" and not cfd_run.is_run(r)}
-    if exports and all(exports.values()) and not runs:
+    if exports and all((*exports.values(), not runs)):
         for name, what in exports.items():
             errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
         to_do = None
@@ -296,125 +277,6 @@ def _refusal(error: Exception) -> str:
     return f"{INTERNAL} ({words}). The file may be damaged; please report it with the file"
 
 
-@dataclass(frozen=True, eq=False)
-class ImportedFile:
-    """One file as it was read, or why it was not."""
-
-    path: str
-    format: str | None
-    record: Dataset | None = None
-    reduced: Dataset | str | None = None  # Steady points of a recording, or why there are none
-    means: Mapping[str, Mean] = field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
-    warnings: tuple[str, ...] = ()
-    error: str | None = None
-
-    @property
-    def title(self) -> str:
-        """The file in a line."""
-        kind, rows = (self.record.kind, len(self.record)) if self.record else (None, 0)
-        return f"{self.path}: {self.format} ({kind}), {rows} rows"
-
-    def document(self) -> dict[str, Any]:
-        """Plain values."""
-        record = self.record
-        return {
-            "path": self.path, "format": self.format, "kind": record.kind if record else None,
-            "rows": len(record) if record else 0,
-            "channels": {k: _shown(record.unit(k), self.means.get(k)) for k in record.values} if record else {},
-            "warnings": list(self.warnings), "error": self.error,
-            "findings": [asdict(finding) for finding in self.findings], "reduction": reduction_document(self.reduced),
-        }  # fmt: skip
-
-    @property
-    def text(self) -> str:
-        """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
-        if self.record is None:
-            return ""
-        told = [
-            f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
-        ]
-        errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
-        lines, rows, plain = [self.title, *errors], [], []
-        for name in self.record.values:
-            unit, found = self.record.unit(name), self.means.get(name)
-            if found is None or not math.isfinite(found.value):
-                plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
-                continue
-            drift = "-" if found.drift is None else f"{found.drift:+.2%}"
-            rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
-        if rows:
-            lines.append(
-                tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")
-            )
-        if plain:
-            lead = "  not averaged: " if rows else "  channels: "
-            lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
-        lines += points_text(self.reduced) if self.reduced is not None else []
-        lines += [f"  ! {text}" for text in self.warnings]
-        lines += [text for text in told if text not in errors]
-        return "\n".join(lines)
-
-
-@dataclass(frozen=True, eq=False)
-class Imported:
-    """Files as they were read, the CFD runs among them, and what would make the files one run."""
-
-    files: tuple[ImportedFile, ...]
-    runs: tuple[Dataset, ...]
-    to_do: str | None
-
-    def document(self) -> dict[str, Any]:
-        """Plain values, ``bemt.import/1``."""
-        return {"schema": SCHEMA, "files": [f.document() for f in self.files],
-                "runs": [cfd_run.document(d) for d in self.runs], "to_do": self.to_do}  # fmt: skip
-
-    @property
-    def complaints(self) -> tuple[str, ...]:
-        """What could not be read and why, for the error stream."""
-        nothing = () if self.files or not self.to_do else (self.to_do,)
-        return (*(f.error for f in self.files if f.error is not None), *nothing)
-
-    @property
-    def exit_code(self) -> int:
-        """Worst of all files: 3 when a reader failed, 2 when a file was refused or nothing was read, else 0."""
-        told = self.complaints
-        return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
-
-    def text(self, wrote: str = "") -> str:
-        """For a terminal, with what to do next with recordings of a rotor."""
-        own = {name for run in self.runs for name in run.provenance["files"]}
-        shown = [f for f in self.files if f.format != RUN and f.error is None]
-        lines = [f.title if f.path in own else f.text + "\n" for f in shown]
-        lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
-        if self.to_do and self.files:
-            steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
-            lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
-        if wrote or self.runs:
-            return "\n".join([*lines, self._next_with_a_run(wrote)])
-        return "\n".join([*lines, *self._next_with_recordings()])
-
-    def _next_with_a_run(self, wrote: str) -> str:
-        """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
-        name = "" if wrote else str(self.runs[0].provenance["file"])
-        usable = Path(name).is_file() and name.endswith(".toml")
-        usable = usable or any(f.path == name and f.format == RUN for f in self.files)
-        file = wrote or (name if usable else "study.toml" if self.runs[0].provenance.get("studies") else "run.toml")
-        lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
-        return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
-
-    def _next_with_recordings(self) -> list[str]:
-        """What to do with recordings of loads, if they have the speed."""
-        read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
-        loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
-        if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
-            return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
-        if not loaded:
-            return []
-        step = f"Next: bemt diagnose {loaded[0]} --case CASE   (a case: bemt new 10x5)\n"
-        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}\n" if len(loaded) == 2 else "")]
-
-
 def _file(
     name: str, format: str | None, record: Dataset | None, notes: Sequence[str], error: str | None  # noqa: A002
 ) -> ImportedFile:  # fmt: skip
@@ -444,12 +306,6 @@ def _means(record: Dataset, reduced: Dataset | str | None) -> Mapping[str, Mean]
         over = f"the steady rows ({len(reduction(reduced).rows[0])} of {len(record)})"
         means = {name: Mean(float(reduced[name][0]), over) for name in record.values if name in reduced} | means
     return means
-
-
-def _shown(unit: str, found: Mean | None) -> dict[str, Any]:
-    mean = found.value if found is not None and math.isfinite(found.value) else None
-    over = found.over if found is not None and mean is not None else ""
-    return {"unit": unit, "mean": mean, "averaged_over": over, "drift": found.drift if found is not None else None}
 
 
 def check_format(name: str | None) -> None:

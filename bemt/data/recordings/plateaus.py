@@ -89,14 +89,6 @@ class Plateaus:
     rows: int
     notes: tuple[str, ...] = field(default=())
 
-    def channel(self, name: str) -> Array:
-        """Means of one channel, (N,), NaN where a plateau has no samples of it."""
-        return np.array([p.mean.get(name, math.nan) for p in self.plateaus])
-
-    def direction(self, which: str) -> tuple[Plateau, ...]:
-        """Plateaus reached in one direction (``up`` takes the first one too)."""
-        return tuple(p for p in self.plateaus if p.direction == which or (which == "up" and p.direction == "first"))
-
 
 def standard_error(values: ArrayLike) -> float:
     """Standard error of the mean of samples that may follow each other closely. [unit of the samples]

@@ -35,15 +35,21 @@ from bemt.data.recordings.channels import (
     shaft_power,
     stated,
 )
-from bemt.data.recordings.points import Found, Point, Rest, command_of, from_rows, from_samples, is_samples
+from bemt.data.recordings.points import (
+    TARED,
+    Found,
+    Point,
+    TareZero,
+    command_of,
+    from_rest,
+    from_rows,
+    from_samples,
+    is_samples,
+)
 from bemt.data.recordings.scatter import Hysteresis, hysteresis, repeats, session
 from bemt.physics import coefficients as co
 from bemt.physics.air import AIR_C, GAMMA, R_DRY, Air
 from bemt.physics.dataset import Dataset, concat
-
-TARED = ("thrust_N", "duct_thrust_N", "torque_Nm")
-"""Channels of load cells."""
-_SCATTERED = ("thrust_N", "duct_thrust_N", "torque_Nm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +203,7 @@ def _outliers(rec: Dataset, found: Found) -> None:
         return
     group = np.array([p.run for p in found.points])
     out: dict[int, str] = {}
-    for name in _SCATTERED:
+    for name in TARED:
         if name in values:
             for i, far, n in repeats(values[name], values["rpm"], group, _flow(values)).outliers:
                 words = f"outlier: {name} is {far:.3g} robust standard deviations from the median of its {n} repeats"
@@ -209,7 +215,7 @@ def _outliers(rec: Dataset, found: Found) -> None:
 def _shared(values: Mapping[str, Array], u: Mapping[str, Array]) -> list[str]:
     """Note stated errors that are the same at any load: they look like a zero that all rows share."""
     out = []
-    for name in set(_SCATTERED) & u.keys() & values.keys():
+    for name in set(TARED) & u.keys() & values.keys():
         e, v = u[name][np.isfinite(u[name])], np.abs(values[name])
         if len(e) >= 5 and e.min() > 0.8 * e.max() > 0.0 and np.nanmax(v) > 3.0 * np.nanmin(v):
             unit = name.rsplit("_", 1)[1]
@@ -277,7 +283,7 @@ def _fill_scatter(
     if "rpm" not in values:
         return
     run = np.array([p.run for p in found.points])
-    for name in _SCATTERED:
+    for name in TARED:
         if name not in values:
             continue
         again = repeats(values[name], values["rpm"], run, _flow(values))
@@ -364,7 +370,7 @@ def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: 
     down = np.array([w == "down" for w in ways])
     top = int(np.nanargmax(np.where(np.isfinite(values[key]), values[key], -np.inf)))
     out = {}
-    for name in _SCATTERED:
+    for name in TARED:
         if name in values:
             loop = hysteresis(values[name], values[key], ~down | (np.arange(len(ways)) == top), down, power)
             if loop is not None:
@@ -375,54 +381,6 @@ def _hysteresis(found: Found, values: Mapping[str, Array], rec: Dataset, notes: 
                     f"({loop.share:+.2%} of the largest, {loop.points} points)"
                 )
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class TareZero:
-    """What to subtract: (N,) by channel; its uncertainty, shared by the points; drift over the rests; notes."""
-
-    value: Mapping[str, Array]
-    u: Mapping[str, float]
-    drift: Mapping[str, float]
-    notes: tuple[str, ...]
-
-
-def from_rest(when: Array, rests: Sequence[Rest], full_scale: Mapping[str, float]) -> TareZero:
-    """Zero of every point from the stretches at rest, linear in time between them and held outside.
-
-    >>> rests = [Rest(0.0, {"thrust_N": 0.1}, {}), Rest(10.0, {"thrust_N": 0.3}, {})]
-    >>> zero = from_rest(np.array([5.0, 20.0]), rests, {"thrust_N": 10.0})
-    >>> zero.value["thrust_N"].round(3).tolist(), round(zero.drift["thrust_N"], 3)
-    ([0.2, 0.3], 0.2)
-    """
-    value: dict[str, Array] = {}
-    u: dict[str, float] = {}
-    drift: dict[str, float] = {}
-    notes = []
-    order = sorted(rests, key=lambda r: r.when)
-    for name in TARED:
-        known = [r for r in order if math.isfinite(r.mean.get(name, math.nan))]
-        if not known:
-            continue
-        times, means = [r.when for r in known], [r.mean[name] for r in known]
-        value[name] = np.interp(when, times, means)
-        errors = [r.u.get(name, math.nan) for r in known]
-        good = [e for e in errors if math.isfinite(e)]
-        u[name] = math.sqrt(sum(e * e for e in good) / len(good)) if good else 0.0
-        top = full_scale.get(name, math.nan)
-        unit = name.rsplit("_", 1)[1]
-        share = f" ({abs(means[-1]) / top:.2%} of the largest)" if top > 0.0 else ""
-        if len(known) > 1:
-            drift[name] = means[-1] - means[0]
-            u[name] = math.hypot(u[name], (max(means) - min(means)) / math.sqrt(12.0))
-            part = f", {drift[name] / top:+.2%} of the largest" if top > 0.0 else ""
-            notes.append(
-                f"{name}: zero {means[0]:.4g} {unit} at first and {means[-1]:.4g} {unit} at last rest "
-                f"({len(known)} stretches): drift {drift[name]:+.3g} {unit}{part}; subtracted, linear in time"
-            )
-        else:
-            notes.append(f"{name}: zero {means[0]:.4g} {unit} at rest{share} subtracted; drift unknown (one rest only)")
-    return TareZero(value, u, drift, tuple(notes))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
-from bemt.data.recordings.between import Level, outlier_runs
+from bemt.data.recordings.slips import Level, outlier_runs
 from bemt.judge.diagnose import repeats
 from bemt.judge.diagnose.noise import in_time
 from bemt.judge.diagnose.nuisance import nuisances

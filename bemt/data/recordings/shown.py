@@ -1,0 +1,241 @@
+"""What ``import`` shows of files and CFD runs: as text, and as plain values.
+
+Schema ``bemt.import/1``: ``runs`` is a list of CFD runs (``name``, ``files``, ``points``, ``averaged``, ``drift``,
+``conditions``, ``notes``), ``to_do`` what would make the files one run (null: nothing, or they are none). ``files`` is
+a list of ``path``, ``format``, ``kind``, ``rows``, ``channels`` (name to ``unit``, ``mean``, ``averaged_over``,
+``drift``), ``warnings``, ``error`` (null when the file was read), ``findings`` (``id``, ``channel``, ``evidence``,
+``correction``, ``rows``, ``severity``; nothing is corrected) and ``reduction`` (null unless it is a recording:
+``mode``, ``points``, ``correlated``, ``dropped`` with first ``line`` and ``last``, ``channel`` and ``reason``,
+``notes``, ``error``). A channel of a recording has a mean only where the recording is one steady point.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bemt.base import tables
+from bemt.base.averaging import Mean
+from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
+from bemt.data.readers.cfd_run import KIND as RUN
+from bemt.data.recordings import cfd_run
+from bemt.data.recordings.channels import named
+from bemt.data.recordings.findings import Finding
+from bemt.data.recordings.reduce import Reduction, reduction
+from bemt.physics.dataset import Dataset
+
+SCHEMA = "bemt.import/1"
+INTERNAL = "internal error of this program"
+"""Start of the error of a file on which a reader failed."""
+_LOADS = {"thrust_N", "torque_Nm", "CT", "CP"}
+SHOWN = ("run", "pwm_s", "throttle", "rpm", "airspeed_m_s", "J", "thrust_N", "torque_Nm", "power_W",
+         "electrical_power_W", "CT", "CP", "eta", "FM")  # fmt: skip
+"""Channels of the table of points, as far as they are there."""
+MOST = 40
+"""Points shown; JSON has all."""
+
+
+def reduction_document(reduced: Dataset | str | None) -> dict[str, Any] | None:
+    """The part of the JSON document that holds the steady points."""
+    if reduced is None:
+        return None
+    if isinstance(reduced, str):
+        return {"mode": None, "points": [], "correlated": {}, "dropped": [], "notes": [], "error": reduced}
+    how = reduction(reduced)
+    rows = [{**row, "direction": way} for row, way in zip(reduced.to_rows(), how.directions, strict=True)]
+    return {
+        "mode": how.mode, "points": rows, "correlated": {k: dict(v) for k, v in how.correlated.items()},
+        "dropped": [asdict(lost) for lost in how.dropped], "notes": list(reduced.notes), "error": None,
+    }  # fmt: skip
+
+
+def ranges(lines: Iterable[tuple[int, int]]) -> str:
+    """First and last lines as ranges.
+
+    >>> ranges([(5, 5), (2, 3), (4, 4), (9, 9)])
+    '2-5, 9'
+    """
+    out: list[list[int]] = []
+    for first, last in sorted(set(lines)):
+        if out and first <= out[-1][1] + 1:
+            out[-1][1] = max(last, out[-1][1])
+        else:
+            out.append([first, last])
+    return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in out)
+
+
+def points_text(reduced: Dataset | str) -> list[str]:
+    """Steady points, what was dropped and the notes, as lines of text."""
+    if isinstance(reduced, str):
+        return [f"  not reduced: {reduced}"]
+    how, n = reduction(reduced), len(reduced)
+    values, stated_u = ({k: v for k, v in d.items() if np.isfinite(v).any()} for d in (reduced.values, reduced.u))
+    if "throttle" in values:  # one command
+        values.pop("pwm_s", None)
+    columns = {"from": [label.rsplit(":", 1)[-1] for label in reduced.labels or ("",) * n]}
+    for name in (k for k in SHOWN if k in values):
+        columns[name] = [_cell(name, x, 5) for x in values[name][:MOST]]
+        if name in stated_u:
+            columns[f"u({name})"] = [_cell("", x, 2) for x in stated_u[name][:MOST]]
+    columns["flags"] = [", ".join(flags) or "-" for flags in reduced.flags]
+    many = "" if n <= MOST else f", the first {MOST} of them"
+    what = "one per row" if how.mode == "points" else "means of plateaus"
+    rows = list(zip(*(column[:MOST] for column in columns.values()), strict=True))
+    shared = (f"{channel}: {', '.join(f'{k} {v:.3g}' for k, v in parts.items())}"
+              for channel, parts in how.correlated.items())  # fmt: skip
+    return [
+        f"  {tables.number_of(n, 'steady point')}, {what}{many}:",
+        tables.text_table(list(columns), rows, (len(columns) - 1,), "    "),
+        *_dropped(how), *(f"  shared by all points, {text}" for text in shared), *(f"  . {t}" for t in reduced.notes),
+    ]  # fmt: skip
+
+
+def _cell(name: str, value: float, digits: int) -> str:
+    if name == "rpm":
+        return tables.speed_text(float(f"{value:.5g}"))
+    return tables.number_text(float(value) if math.isfinite(value) else None, digits)
+
+
+def _dropped(how: Reduction) -> Iterator[str]:
+    """What was left out, with its lines, a reason a line."""
+    reasons: dict[tuple[str, str], list[tuple[int, int]]] = {}
+    for lost in how.dropped:
+        what = f"values of {lost.channel}" if lost.channel else "rows"
+        reasons.setdefault((what, lost.reason), []).append((lost.line, lost.last))
+    for (what, reason), lines in reasons.items():
+        text = ranges(lines)
+        text = text if len(text) <= 90 else text[:90].rsplit(",", 1)[0] + ", ..."
+        yield f"  dropped {sum(b - a + 1 for a, b in lines)} {what} (lines {text}): {reason}"
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedFile:
+    """One file as it was read, or why it was not."""
+
+    path: str
+    format: str | None
+    record: Dataset | None = None
+    reduced: Dataset | str | None = None  # Steady points of a recording, or why there are none
+    means: Mapping[str, Mean] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    warnings: tuple[str, ...] = ()
+    error: str | None = None
+
+    @property
+    def title(self) -> str:
+        """The file in a line."""
+        kind, rows = (self.record.kind, len(self.record)) if self.record else (None, 0)
+        return f"{self.path}: {self.format} ({kind}), {rows} rows"
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        record = self.record
+        return {
+            "path": self.path, "format": self.format, "kind": record.kind if record else None,
+            "rows": len(record) if record else 0,
+            "channels": {k: self._channel(k) for k in record.values} if record else {},
+            "warnings": list(self.warnings), "error": self.error,
+            "findings": [asdict(finding) for finding in self.findings], "reduction": reduction_document(self.reduced),
+        }  # fmt: skip
+
+    def _channel(self, name: str) -> Mapping[str, str | float | None]:
+        found = self.means.get(name)
+        known = found is not None and math.isfinite(found.value)
+        mean, over = (found.value, found.over) if found is not None and known else (None, "")
+        unit = self.record.unit(name) if self.record else ""
+        return {"unit": unit, "mean": mean, "averaged_over": over, "drift": found.drift if found else None}
+
+    @property
+    def text(self) -> str:
+        """What is in it, for a terminal; what was refused is in `Imported.complaints`."""
+        if self.record is None:
+            return ""
+        told = [
+            f"  ! {f.severity}: {f.id} in {f.channel}: {f.evidence}. Suggestion: {f.correction}" for f in self.findings
+        ]
+        errors = [text for f, text in zip(self.findings, told, strict=True) if f.severity == "error"]
+        lines, rows, plain = [self.title, *errors], [], []
+        for name in self.record.values:
+            unit, found = self.record.unit(name), self.means.get(name)
+            if found is None or not math.isfinite(found.value):
+                plain.append(f"{name} [{unit}]" if unit not in ("", "-", "1") else name)
+                continue
+            drift = "-" if found.drift is None else f"{found.drift:+.2%}"
+            rows.append([name, unit or "-", tables.number_text(found.value, 6), drift, found.over])
+        if rows:
+            lines.append(
+                tables.text_table(["channel", "unit", "mean", "drift", "averaged over"], rows, (0, 1, 4), "  ")
+            )
+        if plain:
+            lead = "  not averaged: " if rows else "  channels: "
+            lines.append(textwrap.fill(", ".join(plain), 110, initial_indent=lead, subsequent_indent="    "))
+        lines += points_text(self.reduced) if self.reduced is not None else []
+        lines += [f"  ! {text}" for text in self.warnings]
+        lines += [text for text in told if text not in errors]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """Files as they were read, the CFD runs among them, and what would make the files one run."""
+
+    files: tuple[ImportedFile, ...]
+    runs: tuple[Dataset, ...]
+    to_do: str | None
+
+    def document(self) -> dict[str, Any]:
+        """Plain values, ``bemt.import/1``."""
+        return {"schema": SCHEMA, "files": [f.document() for f in self.files],
+                "runs": [cfd_run.document(d) for d in self.runs], "to_do": self.to_do}  # fmt: skip
+
+    @property
+    def complaints(self) -> tuple[str, ...]:
+        """What could not be read and why, for the error stream."""
+        nothing = () if self.files or not self.to_do else (self.to_do,)
+        return (*(f.error for f in self.files if f.error is not None), *nothing)
+
+    @property
+    def exit_code(self) -> int:
+        """Worst of all files: 3 when a reader failed, 2 when a file was refused or nothing was read, else 0."""
+        told = self.complaints
+        return EXIT_INTERNAL if any(text.startswith(INTERNAL) for text in told) else EXIT_INPUT if told else EXIT_OK
+
+    def text(self, wrote: str = "") -> str:
+        """For a terminal, with what to do next with recordings of a rotor."""
+        own = {name for run in self.runs for name in run.provenance["files"]}
+        shown = [f for f in self.files if f.format != RUN and f.error is None]
+        lines = [f.title if f.path in own else f.text + "\n" for f in shown]
+        lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
+        if self.to_do and self.files:
+            steps = "\n".join(f"  ! {line}" for line in self.to_do.splitlines())
+            lines.append(f"To use it as a CFD run, and --out run.toml to keep it:\n{steps}\n")
+        if wrote or self.runs:
+            return "\n".join([*lines, self._next_with_a_run(wrote)])
+        return "\n".join([*lines, *self._next_with_recordings()])
+
+    def _next_with_a_run(self, wrote: str) -> str:
+        """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
+        name = "" if wrote else str(self.runs[0].provenance["file"])
+        usable = Path(name).is_file() and name.endswith(".toml")
+        usable = usable or any(f.path == name and f.format == RUN for f in self.files)
+        file = wrote or (name if usable else "study.toml" if self.runs[0].provenance.get("studies") else "run.toml")
+        lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
+        return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
+
+    def _next_with_recordings(self) -> list[str]:
+        """What to do with recordings of loads, if they have the speed."""
+        read = [(f.path, f.record.kind, set(named(f.record).values)) for f in self.files if f.record]
+        loaded = [shlex.quote(path) for path, _, channels in read if "rpm" in channels and _LOADS & channels]
+        if not loaded and any(_LOADS & channels for _, kind, channels in read if kind == "bench"):
+            return ["Next: a column headed rpm, the speed of every row; no model can be set beside loads without it\n"]
+        if not loaded:
+            return []
+        step = f"Next: bemt diagnose {loaded[0]} --case CASE   (a case: bemt new 10x5)\n"
+        return [step + (f"      bemt compare {loaded[0]} {loaded[1]}\n" if len(loaded) == 2 else "")]
