@@ -175,11 +175,6 @@ def _k1k2_low(d: Any) -> list[float]:
     return [100.0 * (1.0 - bands[k]["models"]["thesis"]["median"]) for k in (0, 3)]
 
 
-def _now(text: str) -> list[float]:
-    """Claims of this version that are right, and all."""
-    return [float(x) for x in re.findall(r"right when it claims\n(\d+) of (\d+)", text)[0]]
-
-
 FIGURES = (
     Figure(README, "on # measured propellers, each family predicted without itself, the median error is # % of static "
            "thrust and # % of static power. One in ten is off by more than # %", LEFT_OUT,
@@ -190,8 +185,6 @@ FIGURES = (
     Figure(README, "the 68 % band holds # to # % of those points", LEFT_OUT, _coverage("unseen", "68")),
     Figure(README, "# of # claims were right (# %)", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1]]),
-    Figure(README, "with this version, # of # (# %)", PROOF,
-           lambda t: [*_now(t), 100.0 * _now(t)[0] / _now(t)[1]]),
     Figure(README, "runs of # concealed tests", "reports/proof/proof.json", lambda d: [d["items"]]),
     Figure(README, "# to # % low in flight", CALIBRATION, _k1k2_low),
     Figure(README, "a factor of # low on the ducted fan", FAN, lambda d: [_fan(d)["cfd"] / _fan(d)["k1k2"]]),
@@ -232,9 +225,6 @@ FIGURES = (
            lambda t: [min(c for c, _ in runs(t, "ds30_spinner"))]),
     Figure(BELIEVE, "In flight it is # to # % low", CALIBRATION, _k1k2_low),
     Figure(BELIEVE, "on the ducted fan it gives # N for # N", FAN, lambda d: [_fan(d)["k1k2"], _fan(d)["cfd"]]),
-    Figure(BELIEVE, "With this version # of # claims are right", PROOF, _now),
-    Figure(BELIEVE, "in one run, and # of # recordings without a cause were given one", PROOF,
-           lambda t: [float(v) for v in re.findall(r"claims on recordings without a cause (\d+) of (\d+)", t)[0]]),
     Figure(BELIEVE, "two runs of # items", "reports/proof/proof.json", lambda d: [d["items"]]),
     Figure(BELIEVE, "# of # claims were right: # %, 95 % interval # to # %", PROOF,
            lambda t: [*claims(t)[:2], 100.0 * claims(t)[0] / claims(t)[1], *wilson(*claims(t)[:2])]),
@@ -244,7 +234,7 @@ FIGURES = (
            "reports/proof/proof.json",
            lambda d: [100.0 * _score(f"claims on visible, {w} a reference")(d)[0] for w in ("with", "without")]),
     Figure(BELIEVE, "# of # items without a cause got a name", PROOF,
-           lambda t: [float(v) for v in re.findall(r"\*\*Claims without a cause\*\*: (\d+) of (\d+)", t)[0]]),
+           lambda t: [float(v) for v in re.findall(r"claims on recordings without a cause (\d+) of (\d+)", t)[0]]),
     Figure(BELIEVE, "# of # UIUC propellers without a cause got a name", PROOF,
            lambda t: [float(v) for v in re.findall(r"no cause, no reference (\d+) of (\d+) named", t)[0]]),
 )  # fmt: skip

@@ -320,6 +320,8 @@ def test_recorded_thrust_constants_repeat(shared_data: Path) -> None:
     calm = [read_log(p) for p in folder.glob("cf21_brushless_37g_*.usdlog")]
     got = answered(folder, "cf21_brushless_payload_44.4g_eckart07.usdlog", healthy=calm, healthy_mass_kg=0.037)
     assert got.mass is not None and abs(got.mass.value - 0.0444) < min(got.mass.half, 0.04 * 0.0444)
+    assert got.judged.said.verdict == "none" and got.judged.total_moved
+    assert f"{100 * got.judged.total:.0f} %" in text(got).splitlines()[0]  # not below the line that nothing is wrong
     brushed = [read_log(p) for p in sorted(folder.glob("cf21_brushed_34.7g_*.usdlog"))]
     for k, log in enumerate(brushed):
         mass = answer_on(log, [*brushed[:k], *brushed[k + 1 :]], healthy_mass_kg=0.0347).mass

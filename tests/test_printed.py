@@ -217,6 +217,7 @@ def test_the_command_writes_both_hands_and_a_3mf_of_the_same_body(tmp_path: Path
     faces = np.array(re.findall(r'triangle v1="(\d+)" v2="(\d+)" v3="(\d+)"', text), dtype=int)
     packed = Mesh(points, faces, np.zeros(len(faces), np.int64), ("x",))
     check_closed(packed, "3mf", bodies=1)
+    assert (out / "prop_8x5_left.stl").read_text().count("endsolid") == 1  # slicers take each for a part
     vertices, triangles, unit = read_solid(out / "prop_8x5_left.stl")
     other = Mesh(vertices, triangles, np.zeros(len(triangles), np.int64), ("x",))
     assert unit == "mm" and packed.volume == pytest.approx(other.volume, rel=1e-5)

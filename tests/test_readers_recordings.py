@@ -1320,3 +1320,26 @@ def test_the_letters_of_a_drive_are_its_volts_amperes_and_watts(tmp_path: Path) 
     assert {"voltage_V", "current_A", "electrical_power_W"} <= importers.read(file).values.keys()
     file.write_text("rpm,thrust_g,V\n5000,300,0\n6000,440,5\n")
     assert "voltage_V" not in importers.read(file)
+
+
+def test_a_stand_file_with_decimal_commas_is_read(tmp_path: Path) -> None:
+    head = "Time (s);ESC signal (µs);Torque (N·m);Thrust (gf);Voltage (V);Current (A);Motor Optical Speed (RPM)"
+    rows = [f"{k / 4:.3f};1000;-0.00039;{100 + k}.09;11.399;0.050;{3000 + k}" for k in range(20)]
+    points, commas = tmp_path / "points.csv", tmp_path / "commas.csv"
+    points.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    commas.write_text("\n".join([head, *(row.replace(".", ",") for row in rows)]) + "\n", encoding="utf-8")
+    a, b = importers.read(points), importers.read(commas)
+    assert a.provenance["format"] == b.provenance["format"] == "rcbenchmark"
+    assert all(np.array_equal(a[k], b[k]) for k in ("thrust_N", "torque_Nm", "optical_rpm"))
+
+
+@pytest.mark.parametrize(
+    "air", [("Luftdruck [hPa];985", "Temperatur [°C];18"), ("Pressure: 985 hPa", "Temperature;18 °C")]
+)
+def test_air_above_the_headings_is_that_of_all_rows(tmp_path: Path, air: tuple[str, ...]) -> None:
+    file = tmp_path / "stand.csv"
+    rows = ("U/min;Schub in N", "3344;1,44", "4176;2,27", "5025;3,34", "")
+    file.write_text("\n".join(["Specimen;10x5", *air, "", *rows]), encoding="utf-8")
+    found = importers.read(file)
+    assert found["pressure_Pa"] == pytest.approx([98500.0] * 3)
+    assert found["temperature_K"] == pytest.approx([291.15] * 3)

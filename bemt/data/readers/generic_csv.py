@@ -22,7 +22,8 @@ from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
 from bemt.data.readers.headings import Heading, heading, slug
-from bemt.data.readers.recording import Builder
+from bemt.data.readers.recording import COMMAS_READ, Builder
+from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
     SplitTable,
     decimal_mark,
@@ -31,6 +32,7 @@ from bemt.data.readers.split import (
     is_comment,
     split_line,
     split_table,
+    with_unit,
 )
 from bemt.physics.dataset import Dataset
 
@@ -95,17 +97,39 @@ def read(path: str | os.PathLike[str]) -> Dataset:
     return imported
 
 
+_AIR = ("temperature_K", "pressure_Pa", "density_kg_m3")
+
+
+def _air_above(build: Builder) -> None:
+    """Air that a line above the headings states, as ``Pressure [hPa];985`` or ``Pressure: 985 hPa``."""
+    if isinstance(build.table, NumberTable):
+        return
+    for line, text in build.table.above:
+        cells = [c for part in split_line(text, build.table.delimiter) for c in part.strip().split(": ") if c.strip()]
+        if len(cells) != 2:
+            continue
+        value, unit = with_unit(cells[1].strip()) or (cells[1].strip(), "")
+        head = heading(f"{cells[0].strip(' :')} ({unit})" if unit else cells[0].strip())
+        known = number(value.replace(",", "."))
+        if head.unit is None or known is None or head.name not in _AIR or head.name in build.channels:
+            continue
+        filled = np.full(len(build.table), known * head.unit.factor + head.unit.offset)
+        build.channels[head.name], build.headings[head.name] = Channel(filled, head.unit_name), head.text
+        build.warnings.append(f"{head.text} {value} of all rows, as line {line} says")
+
+
 def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     """Make channels of a split table."""
     build = Builder(table, KIND, kind="table")
     for k, head in enumerate(heads_of(table)):
         build.add(k, head, decimal)
+    _air_above(build)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
     if decimal == ".,":
         build.warnings.append("commas between thousands left out")
     if decimal == ",":
-        build.warnings.append("decimal commas read as decimal points")
+        build.warnings.append(COMMAS_READ)
     build.flag_time()
     speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
     build.flag_speeds(*speeds)

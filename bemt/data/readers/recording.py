@@ -42,6 +42,7 @@ from bemt.data.readers.split import (
     SHEET_ERRORS,
     SplitTable,
     column_numbers,
+    decimal_mark,
     some,
     split_table,
     with_unit,
@@ -56,6 +57,9 @@ _WITH_UNIT = re.compile(r"[+-]?[\d.]+\s*([^\W\d][\w/·]{0,6}|%)")
 SLIP = 0.02
 """Share that a ratio is near a unit error by. [1]"""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
+
+
+COMMAS_READ = "decimal commas read as decimal points"
 
 
 @dataclass
@@ -77,6 +81,7 @@ class Builder:
     clocks: list[str] = field(default_factory=list)
     units_stated: set[str] = field(default_factory=set)
     asks: list[str] = field(default_factory=list)
+    decimal: str = "."  # As `decimal_mark` gives it
 
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
@@ -87,7 +92,10 @@ class Builder:
     @classmethod
     def of_stand(cls, path: str | os.PathLike[str], format: str) -> Builder:  # noqa: A002
         """Begin with the table of a stand, whose headings are known and stand once each."""
-        build = cls(split_table(load_text(path), header=True), format)
+        table = split_table(load_text(path), header=True)
+        build = cls(table, format, decimal=decimal_mark(table))
+        if build.decimal == ",":
+            build.warnings.append(COMMAS_READ)
         names = build.table.headings
         for name in sorted(h for h, times in Counter(names).items() if h and times > 1):
             build.fault("1", f"a second column {name!r}", "each column once")
@@ -160,8 +168,9 @@ class Builder:
             out, k = f"{name}_{k}", k + 1
         return out
 
-    def add(self, index: int, head: Heading, decimal: str = ".", sign: float = 1.0) -> str:
+    def add(self, index: int, head: Heading, decimal: str = "", sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
+        decimal = decimal or self.decimal
         values, bad, empty = self.table.numbers(index, decimal)
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):

@@ -60,6 +60,7 @@ class SplitTable:
     cut: int | None = None  # index of a row that the end of the file cut off
     headings_line: int = 1
     misfits: tuple[int, ...] = ()  # rows of another number of cells: kept, without values
+    above: tuple[tuple[int, str], ...] = ()  # lines above the headings, with their numbers
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -342,7 +343,7 @@ def split_table(
     if start and not _EXCEL.fullmatch(used[0][1]):
         above = some((repr(t.strip()[:60]) for _, t in used[:start]), 3)
         notes.append(f"{number_of(start, 'line')} above the headings left out: {above}")
-    used = used[start:]
+    above_headings, used = tuple(used[:start]), used[start:]
     split = [(i, split_line(t, mark)) for i, t in used]
     if header is None and (said := _in_a_comment(lines, split, mark)):
         split.insert(0, said)
@@ -359,7 +360,8 @@ def split_table(
     names, body = _below(first, split, closed, notes) if header else ([], split)
     width = len(names) or max((len(c) for _, c in split[:2]), default=len(first))
     rows, cut, misfits = _rows(source, body, width, top, closed, most_misfits)
-    return SplitTable(source, mark, tuple(names), rows, tuple(i for i, _ in body), tuple(notes), cut, top, misfits)
+    return SplitTable(source, mark, tuple(names), rows, tuple(i for i, _ in body), tuple(notes), cut, top, misfits,
+                      above_headings)  # fmt: skip
 
 
 def _with_units(names: Sequence[str], units_: Sequence[str]) -> list[str]:

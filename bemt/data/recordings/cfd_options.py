@@ -222,6 +222,8 @@ def write_run(run: RunToml, out: str) -> Path:
 
     grids = tuple(g.model_copy(update={"files": near(g.files)}) for g in run.grids)
     head = run.run.model_dump(exclude_unset=True, exclude={"files"}) | ({} if grids else {"files": near(run.run.files)})
+    if head.get("rpm") is not None:
+        head["rpm"] = float(f"{head['rpm']:.12g}")
     own = {"run": RunHead.model_validate(head)} | ({"grids": grids} if grids else {})
     text = toml_text(
         run.model_copy(update=own),

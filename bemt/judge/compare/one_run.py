@@ -171,6 +171,9 @@ def compare_run(
         stand = {k: np.where(np.isnan(full.u[k]), STAND_U[k] * np.abs(full[k]), full.u[k]) for k in open_u}
         full = replace(full, u={**full.u, **stand})
     out = tuple(_point(full, solved, int(i), k) for k, i in enumerate(rows))
+    if made.ducted and computed and "thrust_N" in full and "duct_thrust_N" not in full:
+        notes.append(f"thrust: no part of the duct stated; taken for the whole. The rotor's alone is "
+                     f"{float(solved['rotor_thrust_N'][0]):.4g} N by BEMT; --zones says what counts")  # fmt: skip
     lines: list[AuditLine] = []
     if computed:
         at = int(rows[0])

@@ -99,7 +99,8 @@ def _factored(found: posterior.Evidence, pair: RunChange) -> dict[Explanation, f
         P = {**P, UNKNOWN: 0.0, DOUBT: P[UNKNOWN]}
     if pair.turned:  # nothing but the cell or the sense of rotation turns thrust round
         kept = {k: p for k, p in P.items() if "unit_slip" in k.ids}
-        return {k: p / sum(kept.values()) for k, p in kept.items()} if kept else P
+        total = sum(kept.values())
+        return {k: p / total for k, p in kept.items()} if total > 0.0 else P
     if not (pair.wind or pair.apart or pair.far_off):
         return P
     slips = set() if pair.wind else {"rpm_scale", "unit_slip"}

@@ -220,7 +220,7 @@ def explanation(d: Diagnosis) -> list[str]:
         lines.append(f"Your rotor is far from the case ({off}). Check diameter, pitch and blades "
                      f"first. Nearest: {other_rotor.nearest_rotors(d.problem)}.")  # fmt: skip
     if decision.verdict == "none":
-        lines.append(f"Why: {decision.why} (p = {d.p_value:.2g}).")
+        lines.append(f"Why: {decision.why}.")
         if max((abs(v) for v in level.values()), default=0.0) > _WORTH_SAYING:
             lines.append(f"The level is off ({off}), within what gain, blade angle and solver allow; no cause shows.")
         return [*lines, _gain(d), *_next(d), *_not_tried(d)]
@@ -243,7 +243,7 @@ def explanation(d: Diagnosis) -> list[str]:
         kernel = d.found.states[0].best_rival
         lines.append(f"The cause is not in the library: {decision.why}. It shows in {kernel}.")
     else:
-        lines.append(f"No name is given (p = {d.p_value:.2g}): {decision.why}.")
+        lines.append(f"No name is given: {decision.why}.")
     lines.append(_gain(d))
     if d.loads is not None and d.loads.decision.verdict != "none":
         lines.append(f"Thrust and torque at the measured speed, judged separately: {headline(d.loads)}")
@@ -293,7 +293,8 @@ def headline(d: Diagnosis) -> str:
         return f"{file} cannot be right: {wrong}. Mend that before any cause is looked for."
     if said.verdict == "none" and not d.problem.free.all():
         apart = _from_reference(d) or "the recording differs from the reference"
-        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model, {off}."
+        return f"No cause above {100.0 * LEAST:g} %: {apart}, no more than runs do; from the model fitted to the " \
+               f"reference, {off}."  # fmt: skip
     if said.verdict == "none" and max((abs(v) for v in d.problem.level.values()), default=0.0) > LEVEL:
         return f"Recording and model differ ({off}), within the uncertainty of calibration, blade and solver; no cause."
     if said.verdict == "none":
