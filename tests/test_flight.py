@@ -27,6 +27,7 @@ from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of, mass_fau
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
+from bemt.tools.flight.text import text
 from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
 from bemt.tools.flight.wind import wind
 

@@ -211,6 +211,11 @@ def explanation(d: Diagnosis) -> list[str]:
         lines[-1] += f" And {len(d.problem.findings) - _FINDINGS} more; `import` shows all."
     lines += [f"Before any physics: {note}." for note in d.problem.notes if DROPPED in note]
     lines += [f"Model: {words}." for words in d.problem.validity]
+    stated = d.problem.blade.moved
+    if any(abs(v) > LEVEL for v in stated.values()):
+        off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in stated.items())
+        lines.append(f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, pitch "
+                     "and blades of the case right?")  # fmt: skip
     level = d.problem.level
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()

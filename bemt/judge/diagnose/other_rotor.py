@@ -11,8 +11,8 @@ blades, a unit or the speed is another one.  That question comes before the phys
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -83,6 +83,8 @@ class CalibratedBlade:
     # (K, K) Square root of the prior's covariance: its columns are one standard deviation each, in the units of `NAMES`
     root: Array
     kind: type[AsBuilt] = AsBuilt  # What an angle means: a turn, or another pitch
+    # Median of each load of the reference over that of the case as stated, less 1 [1]
+    moved: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def effect(self) -> AsBuilt:
@@ -170,12 +172,18 @@ def calibrated(problem: Problem, prior: Prior) -> tuple[CalibratedBlade | None, 
             f"the reference fits a blade turned by {found.mean[0]:+.0f} deg: another rotor, or a wrong "
             "diameter, number of blades or unit. The blade of the case was kept"
         )  # fmt: skip
-    rest, start = y - solve(found.mean), y - solve(prior.mean)
-    if not np.isfinite(rest).all() or _misfit(tables[chosen], rest) > _misfit(tables[chosen], start):
+    rest, start = y - solve(found.mean), solve(prior.mean)
+    if not np.isfinite(rest).all() or _misfit(tables[chosen], rest) > _misfit(tables[chosen], y - start):
         return None, "no blade fits the reference better than that of the case, which was kept", ""
     size = float(np.sqrt(found.weights @ found.sizes**2))
     note = f"blade fitted to the reference, starting from its {prior.known_from}: {words or 'no change worth stating'}"
-    return CalibratedBlade(found.mean, prior.mean, size * root, kind), note, ""
+    at_first = [problem.channel[rows] == k for k in range(2)]
+    moved = {
+        name: float(np.median(y[own] / start[own])) - 1.0
+        for name, own in zip(CHANNELS[:2], at_first, strict=True)
+        if own.any() and np.all(start[own] != 0.0)
+    }
+    return CalibratedBlade(found.mean, prior.mean, size * root, kind, moved), note, ""
 
 
 UNREPEATABLE = 0.10
