@@ -214,8 +214,8 @@ def explanation(d: Diagnosis) -> list[str]:
     stated = d.problem.blade.moved
     if any(abs(v) > LEVEL for v in stated.values()):
         off = " and ".join(f"{_CHANNEL[c].lower()} {_share(v)}" for c, v in stated.items())
-        lines.append(f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, pitch "
-                     "and blades of the case right?")  # fmt: skip
+        lines.append(f"The reference is off the case as stated by {off}; the blade was fitted to it. Are diameter, "
+                     "pitch and blades of the case right?")  # fmt: skip
     level = d.problem.level
     off = " and ".join(
         f"{_CHANNEL[c].lower()} by {_share(v) if abs(v) > 1.0 else f'{v:+.0%}'}" for c, v in level.items()
