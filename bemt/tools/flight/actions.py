@@ -211,18 +211,12 @@ def _answers(
     strict = [f for f in refused if not folder or f.file in {p for p, _ in calm}]
     if strict or not any(p in found for p in mine):
         raise InputError(strict or refused)
-    answers = []
-    stated = len({day for _, day in calm}) > 1 or any(day != _LOOSE for _, day in calm)
+    answers: list[FlightAnswer] = []
     for path in (p for p in mine if p in found):
-        here = Path(path).resolve()
-        others = [(p, day) for p, day in calm if Path(p).resolve() != here]
-        inside = str(Path(path).parent)
-        day = healthy_day or (inside if any(d == inside for _, d in others) else "")
-        days = [d for _, d in others] if stated else []
+        others, days, day = _compared_with(path, calm, healthy_day)
         try:
-            answers.append(
-                answer_on(found[path], [found[p] for p, _ in others], mass_kg, layout, healthy_mass_kg, days, day)
-            )
+            healthy = [found[p] for p in others]
+            answers.append(answer_on(found[path], healthy, mass_kg, layout, healthy_mass_kg, days, day))
         except InputError as error:
             if not folder:
                 raise
@@ -230,6 +224,15 @@ def _answers(
     if not answers:
         raise InputError(refused)
     return answers, refused
+
+
+def _compared_with(path: str, calm: Sequence[tuple[str, str]], told: str) -> tuple[list[str], list[str], str]:
+    """Healthy flights for a log, their sessions if they are stated, and that of the log, as `told` or by its folder."""
+    stated = len({day for _, day in calm}) > 1 or any(day != _LOOSE for _, day in calm)
+    here, inside = Path(path).resolve(), str(Path(path).parent)
+    others = [(p, day) for p, day in calm if Path(p).resolve() != here]
+    day = told or (inside if any(d == inside for _, d in others) else "")
+    return [p for p, _ in others], [d for _, d in others] if stated else [], day
 
 
 _LOOSE = "files"  # session of healthy flights that are given one by one

@@ -147,14 +147,7 @@ def answer_on(
     another number of rotors, or the layout (as :func:`bemt.tools.flight.layout.layout_of` takes it) does not fit, or a
     mass cannot have flown.
     """
-    others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
-    if log.rotors and others:
-        expected = f"{log.rotors} rotors and the same channels as {log.file}"
-        raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
-    faults = mass_faults(log, mass_kg, "--mass-kg")
-    for h in healthy:
-        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
-    refuse(faults)
+    _refuse_unlike(log, healthy, mass_kg, healthy_mass_kg)
     log = checked(replace(log, layout=layout or log.layout))
     healthy = [checked(replace(h, layout=layout or h.layout)) for h in healthy]
     placed = layout_of(log.layout, log.rotors) if log.rotors else None
@@ -162,6 +155,7 @@ def answer_on(
     shake, calm = vibration(log), [vibration(h) for h in healthy]
     moved, turned = shaken(shake, calm), speed_changes(log, healthy)
     changed, days = change_in(log, placed), sessions(log, healthy, stated_days, day)
+    balance: tuple[float, ...] = ()
     if mine is None:
         judged = _not_flown(log)
     else:
@@ -174,14 +168,27 @@ def answer_on(
         )  # fmt: skip
         judged = judge(mine, [x for _, x in flown], placed, _windy(log, healthy, air), beside,
                        [days.days[k] for k, _ in flown], days.day)  # fmt: skip
-    balance: tuple[float, ...] = ()
-    if mine is not None and placed is not None:
-        balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
+        if placed is not None:
+            balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))
     return FlightAnswer(
         log, found, judged, air, balance, _limited(log), changed, shake, moved, turned, inflow(log),
         _by_healthy(log, found, healthy, healthy_mass_kg), simulator=simulator_constants(log, found),
         curve=thrust_curve(log), days=days, demand=_demand(log),
     )  # fmt: skip
+
+
+def _refuse_unlike(
+    log: FlightLog, healthy: Sequence[FlightLog], mass_kg: float | None, healthy_mass_kg: float | None
+) -> None:  # fmt: skip
+    """Refuse healthy flights of another vehicle, and masses that cannot have flown."""
+    others = [h for h in healthy if h.rotors != log.rotors or (h.command is None) != (log.command is None)]
+    if log.rotors and others:
+        expected = f"{log.rotors} rotors and the same channels as {log.file}"
+        raise InputError([Fault(h.file, "", f"{h.rotors} rotors", expected) for h in others])
+    faults = mass_faults(log, mass_kg, "--mass-kg")
+    for h in healthy:
+        faults = faults or mass_faults(h, healthy_mass_kg, "--healthy-mass-kg")
+    refuse(faults)
 
 
 def _not_flown(log: FlightLog) -> FlightVerdict:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,9 @@ def read(path: Path) -> FlightLog:
     return from_columns(name, KIND, columns, ends)
 
 
+_STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))
+
+
 def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], ends: str = "") -> FlightLog:
     """Log from the firmware's variables, each with its times [s]."""
 
@@ -57,34 +61,37 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     def one(key: str, factor: float) -> tuple[Array, Array] | None:
         return (columns[key][0], factor * columns[key][1]) if key in columns else None
 
-    motors = "1234"
-    command = many(*(f"motor.m{i}" for i in motors), factor=1 / 65535.0)
-    command = command or many(*(f"pwm.m{i}_pwm" for i in motors), factor=1 / 65535.0)
-    command = command or many(*(f"motor.m{i}req" for i in motors), factor=1 / 65535.0)
-    demand, said = many("controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw", factor=1 / 65535.0), ""
-    thrust = one("controller.cmd_thrust", 1 / 65535.0)
+    def first(*choices: tuple[Sequence[str], float]) -> tuple[Array, Array] | None:
+        return next((found for keys, factor in choices if (found := many(*keys, factor=factor))), None)
+
+    share = 1 / 65535.0
+    command = first(
+        *(([form.format(i) for i in "1234"], share) for form in ("motor.m{}", "pwm.m{}_pwm", "motor.m{}req"))
+    )
+    demand, said = many("controller.cmd_roll", "controller.cmd_pitch", "controller.cmd_yaw", factor=share), ""
+    thrust = one("controller.cmd_thrust", share)
     if command is None and demand is not None and thrust is not None:
         placed = layout_of("crazyflie", 4)
         assert placed is not None
         command, said = (thrust[0], mixed(placed, thrust[1], demand[1], (0.5, 0.5, 1.0))), "controller.cmd_*"
     q = many(*(f"stateEstimate.q{a}" for a in "wxyz"))
-    roll = many("stateEstimate.roll", "stateEstimate.pitch", factor=np.pi / 180.0)
-    roll = roll or many("stabilizer.roll", "stabilizer.pitch", factor=np.pi / 180.0)
-    roll = roll or many("controller.roll", "controller.pitch", factor=np.pi / 180.0)  # what it is held to
-    packed = "stateEstimateZ"  # in millimetres
+    # the controller's is what it is held to
+    groups = ("stateEstimate", "stabilizer", "controller")
+    roll = first(*(([f"{group}.roll", f"{group}.pitch"], np.pi / 180.0) for group in groups))
     axis = (q[0], thrust_axis(q[1])) if q else None
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
     sources = {
         "command": command,
-        "rpm": many(*(f"rpm.m{i}" for i in motors)),
+        "rpm": many(*(f"rpm.m{i}" for i in "1234")),
         "acceleration": many(*(f"acc.{a}" for a in "xyz"), factor=G0),
         "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
         "upright": upright,
         "axis": axis,
-        "velocity": many(*(f"stateEstimate.v{a}" for a in "xyz"))
-        or many(*(f"{packed}.v{a}" for a in "xyz"), factor=1e-3),
-        "position": many(*(f"stateEstimate.{a}" for a in "xyz"))
-        or many(*(f"{packed}.{a}" for a in "xyz"), factor=1e-3),
+        # the packed ones are in millimetres
+        **{
+            what: first(*(([f"{group}.{v}{a}" for a in "xyz"], factor) for group, factor in _STATES))
+            for what, v in (("velocity", "v"), ("position", ""))
+        },
         "voltage": one("pm.vbatMV", 1e-3) or one("pm.vbat", 1.0),
         "thrust": thrust,
         "torque": demand,

@@ -328,15 +328,7 @@ def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decisio
     """The decision in the words of a flight: faults first, and no claim that names none."""
     faults = [i for i in said.effects if i not in ELSEWHERE]
     if said.verdict in CLAIMS:
-        sets = tuple(tuple(sorted(s, key=ELSEWHERE.__contains__)) for s in said.sets)
-        lead = said.leading if any(i in faults for i in said.leading) else Explanation.of(faults[0])
-        weights = [i for i in faults if i.startswith(f"{WEIGHT}between")]
-        why = said.why
-        if said.verdict == "class" and weights and sum(i.startswith(BLADE) for i in faults) > 1:
-            why = "a weight between two rotors and damage to both of them load the body alike"
-        return replace(
-            said, effects=(*faults, *(i for i in said.effects if i in ELSEWHERE)), sets=sets, leading=lead, why=why
-        )
+        return _claimed(said, faults)
     if said.verdict == "unknown":
         return replace(said, why="the balance moved, but not as one or two rotors or one weight move it")
     elsewhere = max((Explanation.of(i) for i in ELSEWHERE), key=lambda e: P.get(e, 0.0))
@@ -353,6 +345,17 @@ def _said(said: Decision, P: Mapping[Explanation, float], given: int) -> Decisio
     return said
 
 
+def _claimed(said: Decision, faults: Sequence[str]) -> Decision:
+    """A claim with its faults before what only says that the flights differ."""
+    sets = tuple(tuple(sorted(s, key=ELSEWHERE.__contains__)) for s in said.sets)
+    lead = said.leading if any(i in faults for i in said.leading) else Explanation.of(faults[0])
+    between = any(i.startswith(f"{WEIGHT}between") for i in faults)
+    alike = said.verdict == "class" and between and sum(i.startswith(BLADE) for i in faults) > 1
+    why = "a weight between two rotors and damage to both of them load the body alike" if alike else said.why
+    effects = (*faults, *(i for i in said.effects if i in ELSEWHERE))
+    return replace(said, effects=effects, sets=sets, leading=lead, why=why)
+
+
 # What to do next with the vehicle: the step that tells the causes apart which a flight leaves open.
 _HOVER = "hover 30 s in still air and judge that flight"
 
@@ -360,38 +363,48 @@ _HOVER = "hover 30 s in still air and judge that flight"
 def next_flight(said: Decision, layout: NDArray[np.float64] | None, given: int) -> Suggestion:
     """Choose the next step after a decision that compared with so many `given` healthy flights."""
     motors = [int(i.removeprefix(BLADE)) for i in said.effects if i.startswith(BLADE) and i[len(BLADE) :].isdigit()]
-    others = [i for i in said.effects if not i.startswith(BLADE)]
     several = "s" if len(motors) > 1 else ""
     looked = f"look at the propeller{several} of motor{several} {' and '.join(map(str, motors))}"
-    text, kind = "no further flight is needed", ""
-    if said.verdict == "none":
-        text = "no further flight is needed; more healthy flights with --healthy would show smaller damage"
-    elif said.effects[:1] == (WIND,):
-        text, kind = _HOVER, "run"
-    elif said.verdict == "insufficient" and said.leading == Explanation.of(DAY):
-        text, kind = "three flights of this day that are known to be healthy, with --healthy and --healthy-day same; " \
-                     "else check propellers and arms by hand", "reference"  # fmt: skip
-    elif given < 3 and said.verdict != "named":
-        text, kind = "three or more healthy flights of this vehicle, in still air, with --healthy", "reference"
-        if motors:
-            text = f"{looked}, and give {text}"
-    elif said.verdict in ("unknown", "insufficient"):
-        text, kind = f"{_HOVER}; check arms, motor tilt and propellers by hand", "run"
-    elif any(i.startswith("imbalance") for i in others):
-        text, kind = "look for tape, dirt and nicks on the blades and balance the propeller", "look"
-    elif len(motors) > 1 and any(i.startswith(WEIGHT) for i in others):
-        text, kind = f"weigh the vehicle, look where battery and payload sit, and {looked}", "look"
-    elif motors and any(i.startswith(WEIGHT) for i in others):
-        swap = _partner(motors[0], layout)
-        text, kind = f"{looked}; if it looks right, exchange it {swap} and fly again: damage moves with it, a weight " \
-                     "stays", "run"  # fmt: skip
-    elif motors:
-        text, kind = f"{looked} and replace what is damaged; the next flight should be within the healthy ones", "look"
-    elif any(i.startswith(WEIGHT) for i in others):
-        text, kind = "look where battery and payload sit", "look"
-    elif others:
-        text, kind = _HOVER, "run"
+    text, kind = _flight_needed(said, given, looked if motors else "") or _look_needed(said, motors, looked, layout)
     return Suggestion(text, (), said.effects[:2], 0.0, 0.0, kind)
+
+
+def _flight_needed(said: Decision, given: int, looked: str) -> tuple[str, str] | None:
+    """Step and its kind where another flight, or none, is what is needed; None where the vehicle is to be looked at."""
+    if said.verdict == "none":
+        return "no further flight is needed; more healthy flights with --healthy would show smaller damage", ""
+    if said.effects[:1] == (WIND,):
+        return _HOVER, "run"
+    if said.verdict == "insufficient" and said.leading == Explanation.of(DAY):
+        return "three flights of this day that are known to be healthy, with --healthy and --healthy-day same; " \
+               "else check propellers and arms by hand", "reference"  # fmt: skip
+    if given < 3 and said.verdict != "named":
+        text = "three or more healthy flights of this vehicle, in still air, with --healthy"
+        return f"{looked}, and give {text}" if looked else text, "reference"
+    if said.verdict in ("unknown", "insufficient"):
+        return f"{_HOVER}; check arms, motor tilt and propellers by hand", "run"
+    return None
+
+
+def _look_needed(
+    said: Decision, motors: Sequence[int], looked: str, layout: NDArray[np.float64] | None
+) -> tuple[str, str]:  # fmt: skip
+    """Step and its kind where something is named, or a few things are."""
+    others = [i for i in said.effects if not i.startswith(BLADE)]
+    weight = any(i.startswith(WEIGHT) for i in others)
+    if any(i.startswith("imbalance") for i in others):
+        return "look for tape, dirt and nicks on the blades and balance the propeller", "look"
+    if weight and len(motors) > 1:
+        return f"weigh the vehicle, look where battery and payload sit, and {looked}", "look"
+    if weight and motors:
+        swap = _partner(motors[0], layout)
+        return f"{looked}; if it looks right, exchange it {swap} and fly again: damage moves with it, a weight " \
+               "stays", "run"  # fmt: skip
+    if motors:
+        return f"{looked} and replace what is damaged; the next flight should be within the healthy ones", "look"
+    if weight:
+        return "look where battery and payload sit", "look"
+    return (_HOVER, "run") if others else ("no further flight is needed", "")
 
 
 def _partner(motor: int, layout: NDArray[np.float64] | None) -> str:

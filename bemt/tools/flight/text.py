@@ -8,7 +8,7 @@ import numpy as np
 
 from bemt.judge.loss import Decision
 from bemt.tools.flight.answer import FlightAnswer
-from bemt.tools.flight.balance import BLADE, DAY, WEIGHT, WIDE, WIND
+from bemt.tools.flight.balance import BLADE, WEIGHT, WIDE
 from bemt.tools.flight.identify import Constant
 from bemt.tools.flight.judge import FlightVerdict
 from bemt.tools.flight.log import SpeedSensor
@@ -95,10 +95,16 @@ def pilot(a: FlightAnswer) -> list[str]:
     return [_look(a), " ".join(second), f"Next: {j.next.text or 'nothing'}."]
 
 
+_SIGNS = {
+    "imbalance": "it shakes more than in the healthy flights. Tape, dirt or a damaged blade would do this.",
+    "weak motor": "it turns slower than its command. A weak motor, bearing or controller would do this.",
+}
+"""What a rotor shows by itself."""
+
+
 def _look(a: FlightAnswer) -> str:
     """What is wrong, in a sentence of a mechanic."""
     j, said = a.judged, a.judged.said
-    others = "in the healthy flights" if j.given else "the others"
     if said.verdict == "none" and j.total_moved:
         return _together(j)
     if said.verdict == "none":
@@ -107,35 +113,38 @@ def _look(a: FlightAnswer) -> str:
         why = said.why[:1].upper() + said.why[1:]
         known = said.verdict != "unknown"
         return f"No verdict: {said.why}." if known else f"{why}: check arms, motor tilt and propellers."
-    first, rest = said.effects[0], [i for i in said.effects[1:]]
-    found = j.found.get(said.leading)
-    motors = sorted({int(i.removeprefix(BLADE)) for i in said.effects if i.removeprefix(BLADE).isdigit()})
-    if first.startswith("imbalance"):
-        return f"Look at {first.rpartition(', ')[2]}: it shakes more than in the healthy flights. Tape, dirt or a " \
-               "damaged blade would do this."  # fmt: skip
-    if first.startswith("weak motor"):
-        return f"Look at {first.rpartition(', ')[2]}: it turns slower than its command. A weak motor, bearing or " \
-               "controller would do this."  # fmt: skip
-    if first == WIND or first == DAY or not (first.startswith((BLADE, WEIGHT))):
+    first, rest = said.effects[0], [*said.effects[1:]]
+    for sign, words in _SIGNS.items():
+        if first.startswith(sign):
+            return f"Look at {first.rpartition(', ')[2]}: {words}"
+    if first.startswith(BLADE):
+        return _blades(a, first, rest)
+    if not first.startswith(WEIGHT):
         return f"No motor stands out: {_alternatives(said.effects)} would do this."
-    size = ""
+    where = first.removeprefix(WEIGHT)
+    more = f"{_alternatives(rest)} would do the same." if rest else ""
+    moved = f"Look where battery and payload sit: the load moved {where.replace('near', 'towards')}."
+    return f"{moved} {more[:1].upper()}{more[1:]}" if more else moved
+
+
+def _blades(a: FlightAnswer, first: str, rest: Sequence[str]) -> str:
+    """One motor or two that work harder, and what would do this."""
+    j, said = a.judged, a.judged.said
+    motors = sorted({int(i.removeprefix(BLADE)) for i in said.effects if i.removeprefix(BLADE).isdigit()})
+    found, size = j.found.get(said.leading), ""
+    others = "in the healthy flights" if j.given else "the others"
     if found is not None and found.size and np.isfinite(found.half) and not j.in_flight:
         size = f"{100 * found.size:.0f} ± {100 * found.half:.0f} % "
     if a.change is not None and j.in_flight:
         size, others = f"{100 * a.change.size:.0f} ± {100 * a.change.half:.0f} % ", "before"
         others += f" {a.change.at_s:.1f} s" if np.isfinite(a.change.at_s) else ""
-    if first.startswith(BLADE) and said.leading.pair and len(motors) > 1:
+    if said.leading.pair and len(motors) > 1:
         names = " and ".join(map(str, motors[:2])) if len(motors) == 2 else ", ".join(map(str, motors))
         return f"Look at motors {names}: they work {size}or more harder than {others}. Damaged blades would do this."
-    if first.startswith(BLADE):
-        k = first.removeprefix(BLADE)
-        same = ["a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
-        what = _alternatives(["a damaged blade", *same])
-        return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
-    where = first.removeprefix(WEIGHT)
-    more = f" {_alternatives(rest)} would do the same." if rest else ""
-    return f"Look where battery and payload sit: the load moved {where.replace('near', 'towards')}." + \
-           (more[:1] + more[1:2].upper() + more[2:] if more else "")  # fmt: skip
+    k = first.removeprefix(BLADE)
+    same = ["a weight near it" if i == f"{WEIGHT}near motor {k}" else i for i in rest]
+    what = _alternatives(["a damaged blade", *same])
+    return f"Look at motor {k}: it works {size}harder than {others}. {what[:1].upper()}{what[1:]} would do this."
 
 
 def _together(j: FlightVerdict) -> str:
@@ -168,62 +177,101 @@ def _level(shake: Vibration) -> str:
     return f"{high}, strongest at {shake.line_hz:.0f} Hz ({what})."
 
 
-def _seen(answer: FlightAnswer) -> list[str]:
+def _seen(a: FlightAnswer) -> list[str]:
     """Lines on what this flight alone shows."""
-    lines, shares = [], answer.found.rotors.get("mean command", answer.found.rotors.get("share of rpm^2", ()))
+    parts = (_drives, _moved, _by_rotor, _demanded, _heard, _level_lines, _blown)
+    return [f"  {line}" for part in parts for line in part(a)]
+
+
+def _drives(a: FlightAnswer) -> list[str]:
+    """Drive of each motor, their balance, and what limits or falsifies it."""
+    lines, shares = [], a.found.rotors.get("mean command", a.found.rotors.get("share of rpm^2", ()))
     if shares:
         mean = sum(shares) / len(shares)
         each = ", ".join(f"{i + 1}: {100 * (v / mean - 1.0):+.0f} %" for i, v in enumerate(shares))
-        lines.append(f"  Drive of each motor against their mean: {each}.")
-    if len(answer.balance) == 3:
+        lines.append(f"Drive of each motor against their mean: {each}.")
+    if len(a.balance) == 3:
         pairs = (("left", "right"), ("front", "rear"), ("left-turning", "right-turning"))
         parts = [
-            f"{a if b > 0 else c} by {100 * abs(b):.0f} %" for (a, c), b in zip(pairs, answer.balance, strict=True)
+            f"{one if b > 0 else two} by {100 * abs(b):.0f} %" for (one, two), b in zip(pairs, a.balance, strict=True)
         ]
-        lines.append(f"  Driven harder: {', '.join(parts)} (centre of mass; trim in yaw).")
-    full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(answer.limited) if v > _OFTEN]
+        lines.append(f"Driven harder: {', '.join(parts)} (centre of mass; trim in yaw).")
+    full = [f"motor {i + 1} {100 * v:.1f} %" for i, v in enumerate(a.limited) if v > _OFTEN]
     if full:
-        lines.append(f"  At full command: {', '.join(full)} of the time.")
-    for s in answer.log.sensors:
-        lines.append(f"  {sensor_text(s)}; repaired to ± {200 * s.u:.1f} % before any constant was fitted.")
-    c, shake = answer.change, answer.vibration
-    if c is not None and not answer.judged.in_flight:
-        when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
-        lines.append(f"  {when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
-                     f"{', '.join(c.causes)}.")  # fmt: skip
-    for k, part in answer.speeds:
+        lines.append(f"At full command: {', '.join(full)} of the time.")
+    return lines + [
+        f"{sensor_text(s)}; repaired to ± {200 * s.u:.1f} % before any constant was fitted." for s in a.log.sensors
+    ]
+
+
+def _moved(a: FlightAnswer) -> list[str]:
+    """A change within the flight that the answer does not say already."""
+    c = a.change
+    if c is None or a.judged.in_flight:
+        return []
+    when = f"At {c.at_s:.1f} s" if c.kind == "step" else "Steadily over the flight"
+    return [f"{when} the balance changed by {100 * c.size:.0f} ± {100 * c.half:.0f} % drive, as by: "
+            f"{', '.join(c.causes)}."]  # fmt: skip
+
+
+def _by_rotor(a: FlightAnswer) -> list[str]:
+    """Rotors that turn or shake otherwise than in healthy flights."""
+    lines = []
+    for k, part in a.speeds:
         what = "a lighter load: a damaged blade" if part > 0.0 else "a weak motor, bearing or controller"
-        lines.append(f"  Motor {k + 1} turns {100 * part:+.0f} % against its drive in healthy flights: {what}.")
-    for k, ratio, known in answer.shaken:
+        lines.append(f"Motor {k + 1} turns {100 * part:+.0f} % against its drive in healthy flights: {what}.")
+    for k, ratio, known in a.shaken:
         against = "in healthy flights" if known else "the other rotors"
         who = f"Motor {k + 1} shakes" if k >= 0 else "The rotors together shake"
-        lines.append(f"  {who} {ratio:.1f} times as much as {against} at the shaft frequency: "
+        lines.append(f"{who} {ratio:.1f} times as much as {against} at the shaft frequency: "
                      "imbalance, tape or a damaged blade.")  # fmt: skip
-    if answer.demand:
-        roll, pitch, yaw, near = (100 * v for v in answer.demand)
-        spin = f"; yaw beyond half of full for {near:.1f} % of the time" if near > 0.5 else ""
-        lines.append(f"  The controller asks for {roll:+.1f} % of full roll, {pitch:+.1f} % pitch, {yaw:+.1f} % yaw "
-                     f"(right, nose up, right; trim){spin}.")  # fmt: skip
-    heard = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.amplitude) if np.isfinite(v)]
-    if heard:
-        lines.append(f"  Vibration once a turn ({shake.shaft_hz:.0f} Hz): {', '.join(heard)} {shake.unit}.")
-        both = [f"{i + 1}: {v:.2g}" for i, v in enumerate(shake.blade) if np.isfinite(v)]
-        lines += [f"  Vibration twice a turn: {', '.join(both)} {shake.unit}."] if both else []
-    elif np.isfinite(shake.line):
-        known = np.isfinite(shake.shaft_hz)
-        seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
-        where = "once a turn" if known else seen
-        lines.append(f"  Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where}).")
-        if np.isfinite(shake.twice):
-            lines.append(f"  At twice that: {shake.twice:.2g} {shake.unit}.")
-    if shake.rms and np.isfinite(shake.rms[0]):
-        said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
-        lines.append(f"  Vibration {said}: {', '.join(f'{v:.2g}' for v in shake.rms)} {shake.unit} in x, y, z.")
-    if np.isfinite(answer.wind.speed):
-        w = answer.wind
-        seen = "Wind" if w.speed > w.half else "No wind seen:"
-        lines.append(f"  {seen} {w.speed:.1f} ± {w.half:.1f} m/s towards {w.heading_deg:.0f} deg from x.")
     return lines
+
+
+def _demanded(a: FlightAnswer) -> list[str]:
+    """What the controller asks for."""
+    if not a.demand:
+        return []
+    roll, pitch, yaw, near = (100 * v for v in a.demand)
+    spin = f"; yaw beyond half of full for {near:.1f} % of the time" if near > 0.5 else ""
+    return [f"The controller asks for {roll:+.1f} % of full roll, {pitch:+.1f} % pitch, {yaw:+.1f} % yaw "
+            f"(right, nose up, right; trim){spin}."]  # fmt: skip
+
+
+def _heard(a: FlightAnswer) -> list[str]:
+    """Vibration of each rotor, else the strongest line."""
+    shake, known = a.vibration, np.isfinite(a.vibration.shaft_hz)
+    once, twice = (
+        ", ".join(f"{i + 1}: {v:.2g}" for i, v in enumerate(row) if np.isfinite(v))
+        for row in (shake.amplitude, shake.blade)
+    )
+    if once:
+        lines = [f"Vibration once a turn ({shake.shaft_hz:.0f} Hz): {once} {shake.unit}."]
+        return lines + ([f"Vibration twice a turn: {twice} {shake.unit}."] if twice else [])
+    if not np.isfinite(shake.line):
+        return []
+    seen = f"found in the spectrum: once a turn at {60 * shake.line_hz:.0f} rev/min, if so"
+    where = "once a turn" if known else seen
+    lines = [f"Strongest vibration: {shake.line:.2g} {shake.unit} at {shake.line_hz:.0f} Hz ({where})."]
+    return lines + ([f"At twice that: {shake.twice:.2g} {shake.unit}."] if np.isfinite(shake.twice) else [])
+
+
+def _level_lines(a: FlightAnswer) -> list[str]:
+    """Vibration in the three axes."""
+    shake = a.vibration
+    if not shake.rms or not np.isfinite(shake.rms[0]):
+        return []
+    said = "as the autopilot states it (VIBE)" if shake.stated else "above 20 Hz"
+    return [f"Vibration {said}: {', '.join(f'{v:.2g}' for v in shake.rms)} {shake.unit} in x, y, z."]
+
+
+def _blown(a: FlightAnswer) -> list[str]:
+    """Wind, or that none is seen."""
+    w = a.wind
+    if not np.isfinite(w.speed):
+        return []
+    seen = "Wind" if w.speed > w.half else "No wind seen:"
+    return [f"{seen} {w.speed:.1f} ± {w.half:.1f} m/s towards {w.heading_deg:.0f} deg from x."]
 
 
 def _flow(a: FlightAnswer) -> list[str]:
