@@ -133,3 +133,10 @@ def test_factors_hold_as_often_as_they_say() -> None:
     found = [Off("untwist.tip_deg", float(v)) for v in scores[:200]]
     factor = calibrate(found, [])["parameters"]["untwist.tip_deg"]["scale"]
     assert np.mean(scores[200:] <= factor) == pytest.approx(0.9, abs=0.06)
+
+
+def test_the_groups_of_an_answer_are_views_of_one_weighing(answer: chain.Diagnosis) -> None:
+    assert answer.readings.values.size == answer.readings.u.size == answer.baseline.values.size
+    assert answer.prior.keys() == answer.posterior.probability.keys()
+    assert sum(answer.prior.values()) == pytest.approx(1.0) == pytest.approx(sum(answer.posterior.probability.values()))
+    assert {c.id for c in answer.explanations} == set(answer.posterior.inclusion)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.judge.diagnose import fit as fitting
+from bemt.judge.diagnose import knowledge
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.loss import Decision, Sizes
+from bemt.judge.loss import UNKNOWN, Decision, Explanation, Sizes
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.fit import Fit
     from bemt.judge.diagnose.posterior import Evidence
     from bemt.judge.diagnose.problem import Problem
+    from bemt.judge.diagnose.signatures import Candidate
 
 _BINS = 12
 # Variables that explain the mismatch this nearly as well as the best one are ties: many of them move together.
@@ -145,8 +147,43 @@ _NEAR_ZERO, _FAR = 0.1, 0.05
 
 
 @dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of all recordings, stacked: (M,) values, with (P,) variables of the points that they belong to."""
+
+    channels: tuple[str, ...]
+    values: Array  # (M,) [units of the channel]
+    u: Array  # (M,) standard uncertainty [units of the channel]
+    channel: NDArray[np.intp]  # (M,) place in CHANNELS
+    point: NDArray[np.intp]  # (M,) place in the variables
+    tested: NDArray[np.bool_]  # (M,) False: of a reference
+    variables: dict[str, Array]  # (P,) each
+    notes: tuple[str, ...]
+    findings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """Model of the case without any cause."""
+
+    effects: tuple[effects.Effect, ...]
+    values: Array  # (M,) [units of the channel]
+    level: dict[str, float]  # Median of each load over what the case gives, less 1 [1]
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the readings say of the explanations."""
+
+    probability: dict[Explanation, float]  # Adds up to 1 [1]
+    log_bayes: dict[Explanation, float]  # Natural logarithm of the odds over nothing, of each effect and the unknown
+    inclusion: dict[str, float]  # That an effect is present, alone or in a pair [1]
+    parameters: Sizes  # Of the leading explanation
+    p_value: float  # Of as large a misfit without a cause [1]
+
+
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What is wrong; text, JSON, figures and report are views of it."""
+    """What is wrong, in named groups; text, JSON, figures and report are views of it."""
 
     found: posterior.Evidence  # Outcome of the weighing, with the problem in it
     decision: Decision  # Verdict of the evidence in the case
@@ -169,6 +206,35 @@ class Diagnosis:
     drive: Diagnosis | None = None
     loads: Diagnosis | None = None  # Of thrust and torque, where they name nothing and the answer is that of the drive
     change: RunChange | None = None  # Change from the references, where there is one recording beside them
+
+    @property
+    def readings(self) -> Readings:
+        """What was measured."""
+        p = self.problem
+        channels = tuple(CHANNELS[c] for c in np.unique(p.channel))
+        return Readings(channels, p.y, p.u, p.channel, p.point, p.free, p.covariates, p.notes, p.findings)
+
+    @property
+    def baseline(self) -> Baseline:
+        """What the case gives there."""
+        return Baseline(self.problem.baseline, self.problem.f0, self.problem.level)
+
+    @property
+    def prior(self) -> dict[Explanation, float]:
+        """Probability of every explanation before a reading was looked at [1]."""
+        weights = knowledge.prior_weights(self.problem, list(self.found.spans))
+        return {k: float(np.exp(v)) for k, v in knowledge.log_priors(weights, of=knowledge.kinds(self.problem)).items()}
+
+    @property
+    def explanations(self) -> tuple[Candidate, ...]:
+        """Effects that were tried, with what each changes in the readings."""
+        return self.found.candidates
+
+    @property
+    def posterior(self) -> Posterior:
+        """What the readings say of them."""
+        odds = {e: self.found.log_bayes(e) for e in (*map(Explanation.of, self.found.spans), UNKNOWN)}
+        return Posterior(self.found.probability, odds, self.found.inclusion, self.parameters, self.p_value)
 
     @property
     def systems(self) -> dict[str, Mapping[str, object]]:
