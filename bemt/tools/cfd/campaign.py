@@ -270,13 +270,6 @@ def _said(point: CampaignPoint) -> str:
     return ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in shown.items())
 
 
-def _ended(row: RunRow) -> str:
-    """How a run ended, in words."""
-    state = "" if row.converged else f"  NOT CONVERGED {row.note}"
-    loads = f"T {number_text(row.thrust_N)} N, Q {number_text(row.torque_Nm)} N m"
-    return f"  {loads}, {row.cells} cells, {row.seconds:.0f} s{state}"
-
-
 def run_campaign(
     campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
     tell: Callable[[str], None] | None = None, keep: bool = True,
@@ -299,8 +292,11 @@ def run_campaign(
         say(f"{campaign.name} {k}/{len(campaign.points)}: {_said(point)}")
         outcome = worker.run(point, key)
         record.add(outcome, order)
-        say(_ended(outcome.row))
-        if not outcome.row.iterations:
+        v = outcome.row
+        state = "" if v.converged else f"  NOT CONVERGED {v.note}"
+        say(f"  T {number_text(v.thrust_N)} N, Q {number_text(v.torque_Nm)} N m, {v.cells} cells, "
+             f"{v.seconds:.0f} s{state}")  # fmt: skip
+        if not v.iterations:
             say(f"  nothing was computed: it will be tried again; logs below {work}")
     record.write(order)
     if not keep and only is None:  # a single point is tried again and again: its grid waits for the whole campaign

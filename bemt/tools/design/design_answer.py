@@ -130,23 +130,6 @@ def _rows(d: Design) -> list[list[str]]:
     return rows
 
 
-def _limits(d: Design) -> list[str]:
-    """What limits the blade: section, stress, the spread of what is built."""
-    lines, limits = [], d.need.limits
-    stress, allowed = float(np.nanmax(d.values.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
-    if d.thickness is not None and d.thickness != FAMILY[0]:
-        note = "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
-        lines.append(note)
-    lines.append(f"limits reached: {'; '.join(d.active) or 'none'}")
-    lines.append(f"largest stress {stress:.3g} MPa; {allowed:.3g} allowed ({limits.material.name}, "
-                 f"{limits.material.strength_MPa:g} MPa over {limits.safety:g})")  # fmt: skip
-    if d.robust is not None:
-        lines.append("over rotors as built, " + "; ".join(
-            f"{name}: {_banded(o.thrust_N, o.sd_thrust_N)} N, {_banded(o.power_W, o.sd_power_W)} W"
-            for name, o in zip(("this blade", "the blade for the drawing alone"), d.robust, strict=True)))  # fmt: skip
-    return lines
-
-
 def text(d: Design) -> str:
     """One screen: the blade next to the best label and the ideal limits, what it buys and what limits it."""
     need, several = d.need, len(d.need.points) > 1
@@ -164,7 +147,18 @@ def text(d: Design) -> str:
                      + f", ideal disk {d.disk_W:.4g} W")  # fmt: skip
     lines += ["± one standard uncertainty: " + ("the label's unknown shape is most of its band" if not d.ducted else
                                                 "duct and gap are most of it"), "", *_bought(d)]  # fmt: skip
-    lines += _limits(d)
+    limits = d.need.limits
+    stress, allowed = float(np.nanmax(d.values.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
+    if d.thickness is not None and d.thickness != FAMILY[0]:
+        note = "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
+        lines.append(note)
+    lines.append(f"limits reached: {'; '.join(d.active) or 'none'}")
+    lines.append(f"largest stress {stress:.3g} MPa; {allowed:.3g} allowed ({limits.material.name}, "
+                 f"{limits.material.strength_MPa:g} MPa over {limits.safety:g})")  # fmt: skip
+    if d.robust is not None:
+        lines.append("over rotors as built, " + "; ".join(
+            f"{name}: {_banded(o.thrust_N, o.sd_thrust_N)} N, {_banded(o.power_W, o.sd_power_W)} W"
+            for name, o in zip(("this blade", "the blade for the drawing alone"), d.robust, strict=True)))  # fmt: skip
     if not d.found.converged:
         lines.append("! the search did not converge: the blade keeps its limits, but less power may be possible")
     return "\n".join(lines) + "\n"

@@ -348,22 +348,6 @@ def _aloft(found: DriveResult) -> str:
     return f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}"
 
 
-def _limits(found: DriveResult) -> list[str]:
-    """What limits full throttle: the ESC's current, the winding's temperature."""
-    drive, lines = found.drive, []
-    if np.any(found.steady.limited):
-        lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts at full throttle")
-    if drive.motor.thermal_K_W > 0.0 and found.steady.converged[-1]:
-        words = f"{found.settled_C:.0f} C" if math.isfinite(found.settled_C) else "no temperature (it runs away)"
-        over = (
-            " above its limit"
-            if not found.settled_C <= (drive_model.drive_table(found.case).motor.max_temperature_C or math.inf)
-            else ""
-        )
-        lines.append(f"at full throttle the winding settles at {words}{over}")
-    return lines
-
-
 def _assumed(found: DriveResult) -> list[str]:
     """What the sheet of the motor would bring, where it is not known."""
     if not {item.key for item in found.case.assumptions} & set(SHEET):
@@ -380,7 +364,7 @@ def _assumed(found: DriveResult) -> list[str]:
 
 def text(found: DriveResult) -> str:
     """Lay a result out: one screen."""
-    t, full, hover = drive_model.drive_table(found.case), found.full, found.hover
+    t, full, hover, drive = drive_model.drive_table(found.case), found.full, found.hover, found.drive
     lines = [f"{found.case.name}, {t.kv:g} rev/min/V, {t.cells}S at {t.soc:.0%} charge, ± one standard deviation"]
     lines += [*(f"! {note}" for note in found.notes), ""]
     mass, rotors = t.vehicle.mass_kg, t.vehicle.rotors
@@ -399,7 +383,13 @@ def text(found: DriveResult) -> str:
     lines += ["", "thrust at   " + ", ".join(f"{5 * i} %: {words}" for i, words in zip(at, curve, strict=True))]
     lines += [f"response    thrust {s.before_N:.2f} to {s.after_N:.2f} N: 63 % after {1e3 * s.time63_s:.0f} ms"
               for s in found.response[:1]]  # fmt: skip
-    lines += [*_limits(found), *_assumed(found)]
+    if np.any(found.steady.limited):
+        lines.append(f"the ESC's limit of {drive.esc.current_limit_A:g} A acts at full throttle")
+    if drive.motor.thermal_K_W > 0.0 and found.steady.converged[-1]:
+        words = f"{found.settled_C:.0f} C" if math.isfinite(found.settled_C) else "no temperature (it runs away)"
+        over = " above its limit" if not found.settled_C <= (t.motor.max_temperature_C or math.inf) else ""
+        lines.append(f"at full throttle the winding settles at {words}{over}")
+    lines += _assumed(found)
     ask = [name for name, v in (("--mass-kg", mass), ("--capacity-Ah", t.battery.capacity_Ah)) if v is None]
     if ask:
         lines.append(f"for more results give {' and '.join(ask)}, or mass_kg and capacity_Ah in [drive]")
