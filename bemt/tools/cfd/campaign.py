@@ -30,7 +30,7 @@ from bemt.rotors.case import Case
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.case.propagate import parted
 from bemt.tools.cfd.record import CampaignRecord, csv_rows, studies_of
-from bemt.tools.cfd.schema import COLUMNS, TEXTS, Campaign, RunRow, Study, load_campaign, run_of
+from bemt.tools.cfd.schema import COLUMNS, TEXTS, Campaign, CampaignPoint, RunRow, Study, load_campaign, run_of
 from bemt.tools.cfd.worker import Worker, point_key
 
 if TYPE_CHECKING:
@@ -244,26 +244,39 @@ def _radial_text(found: Summary) -> list[str]:
     return lines
 
 
-def run_campaign(
-    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
-    tell: Callable[[str], None] | None = None, keep: bool = True,
-) -> CampaignRecord:  # fmt: skip
-    """Run the points of a campaign that are not recorded yet."""
+def _keys(campaign: Campaign, only: int | None) -> list[tuple[str, str, Settings]]:
+    """Run, grid and settings of each point; all faults at once."""
+    file = campaign.path.as_posix()
     keys: list[tuple[str, str, Settings]] = []
     faults: list[Fault] = []
     for k, point in enumerate(campaign.points, 1):
         try:
             keys.append(point_key(point))
         except InputError as error:
-            file = campaign.path.as_posix()
             faults += [Fault(file, f"point {k}: {f.where}", f.got, f.expected, f.hint) for f in error.faults]
     if only is not None and not 1 <= only <= len(campaign.points):
         faults.append(Fault("", "--only", str(only), f"1 to {len(campaign.points)}"))
     order = [name for name, _, _ in keys]
     if not faults and len(set(order)) < len(order):
         twice = sorted({str(order.index(name) + 1) for name in order if order.count(name) > 1})
-        faults.append(Fault(campaign.path.as_posix(), f"points {', '.join(twice)}", "the same run twice", "each once"))
+        faults.append(Fault(file, f"points {', '.join(twice)}", "the same run twice", "each once"))
     refuse(faults)
+    return keys
+
+
+def _said(point: CampaignPoint) -> str:
+    """What a point asks for, in words."""
+    shown = {k: v for k, v in point.values.items() if k not in ("iterations", "average", "start")}
+    return ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in shown.items())
+
+
+def run_campaign(
+    campaign: Campaign, work: Path, only: int | None = None, ranks: int = 2,
+    tell: Callable[[str], None] | None = None, keep: bool = True,
+) -> CampaignRecord:  # fmt: skip
+    """Run the points of a campaign that are not recorded yet."""
+    keys = _keys(campaign, only)
+    order = [name for name, _, _ in keys]
     remove_stale(campaign.path.parent)
     record = CampaignRecord(campaign)
     record.borrow(order if only is None else [])
@@ -276,10 +289,7 @@ def run_campaign(
     for k, (point, key) in enumerate(zip(campaign.points, keys, strict=True), 1):
         if (only is not None and k != only) or (only is None and key[0] in record.done):
             continue
-        said = ", ".join(f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
-                         for name, value in point.values.items()
-                         if name not in ("iterations", "average", "start"))  # fmt: skip
-        say(f"{campaign.name} {k}/{len(campaign.points)}: {said}")
+        say(f"{campaign.name} {k}/{len(campaign.points)}: {_said(point)}")
         outcome = worker.run(point, key)
         record.add(outcome, order)
         v = outcome.row

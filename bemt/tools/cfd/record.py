@@ -187,7 +187,16 @@ class CampaignRecord:
 
     def write(self, order: Sequence[str]) -> None:
         """Write recording and manifest, uncertainties from what is known now."""
-        # a run that did not converge and is no longer asked for says nothing any more
+        self._forget(order)
+        studies = self.studies()
+        self.rows = [_with_u(row, studies) for row in self.rows]
+        write_atomic(self.path, csv_text(COLUMNS, _short([row.document() for row in self.rows])))
+        manifest = self._manifest(order, bool(studies))
+        write_atomic(self.folder / "manifest.json", json.dumps(plain(manifest), indent=1) + "\n")
+
+    def _forget(self, order: Sequence[str]) -> None:
+        """Drop the rows that say nothing any more."""
+        # a run that did not converge and is no longer asked for
         gone = {row.run for row in self.rows if not row.converged and row.run not in order}
         self.rows = [row for row in self.rows if row.run not in gone]
         for run in gone:
@@ -197,12 +206,12 @@ class CampaignRecord:
             # of one point on one grid, whatever the settings, the newer run replaces the other
             row for row in self.rows if row.run in order or not any(_alike(row, other, POINT) for other in asked)
         ]  # fmt: skip
-        studies = self.studies()
-        self.rows = [_with_u(row, studies) for row in self.rows]
-        write_atomic(self.path, csv_text(COLUMNS, _short([row.document() for row in self.rows])))
+
+    def _manifest(self, order: Sequence[str], studied: bool) -> dict[str, object]:
+        """What is recorded of the runs asked for, and by which rule."""
         names = set(order)
         done = [row for row in self.rows if row.run in names]
-        manifest = {
+        return {
             "schema": "bemt.cfd-recording/1", "name": self.campaign.name, "title": self.campaign.title,
             "bemt": __version__, "openfoam": "1912 (Debian package)", "case": self.campaign.case.name,
             "case_sha256": self.campaign.case.content_hash(),
@@ -214,11 +223,10 @@ class CampaignRecord:
             **_balances(done),
             "rule": {"drift_limit": DRIFT_LIMIT, "scatter_limit": SCATTER_LIMIT, "balance_limit": BALANCE_LIMIT,
                      "u": "hypot of standard deviation and drift over the averaged iterations, and the grid study",
-                     "grid_study": bool(studies), **({} if studies else {"grid_floor": GRID_FLOOR_SOURCE})},
+                     "grid_study": studied, **({} if studied else {"grid_floor": GRID_FLOOR_SOURCE})},
             "grid_studies": [study.document() for study in grid_studies(self.rows)],
             "seconds": float(np.nansum([r.seconds for r in self.rows])),
         }  # fmt: skip
-        write_atomic(self.folder / "manifest.json", json.dumps(plain(manifest), indent=1) + "\n")
 
 
 def _with_u(row: RunRow, studies: Sequence[Study]) -> RunRow:

@@ -104,15 +104,9 @@ def _mach(d: Design, rpm: float, V: float, R: float) -> float:
     return math.hypot(rpm * math.pi / 30.0 * R, V) / float(d.need.air.a_sound)
 
 
-def text(d: Design) -> str:
-    """One screen: the blade next to the best label and the ideal limits, what it buys and what limits it."""
+def _rows(d: Design) -> list[list[str]]:
+    """The blade at each point, beside the best label; at one point also beside the ideal limits."""
     need, v, several = d.need, d.values, len(d.need.points) > 1
-    first = need.points[0]
-    lines = [
-        f"{d.name}: {2.0 * need.R / INCH:.4g} in, {need.blades} blades, "
-        + "; ".join(f"{p.thrust_N:g} N {_at(p.airspeed_m_s)}" + ("" if p.weight else " (floor)") for p in need.points),
-        "",
-    ]
     rows = []
     for k, p in enumerate(need.points):
         point = f"{k + 1}: " if several else ""
@@ -129,12 +123,23 @@ def text(d: Design) -> str:
             mach = _mach(d, rpm, V, 0.5 * label.case.diameter_m)
             rows.append(_row(f"{point}{label.name}, {what}", rpm, *shown, T, V, P, mach, d))
     if not several:
-        T, V = first.thrust_N, first.airspeed_m_s
+        T, V = need.points[0].thrust_N, need.points[0].airspeed_m_s
         ideal = [("best without drag (Betz)", d.betz_W), ("ideal disk", d.disk_W)]
         rows += [_row(name, math.nan, number_text(T, 3), number_text(P, 3), T, V, P, math.nan, d)
                  for name, P in ideal if math.isfinite(P)]  # fmt: skip
+    return rows
+
+
+def text(d: Design) -> str:
+    """One screen: the blade next to the best label and the ideal limits, what it buys and what limits it."""
+    need, several = d.need, len(d.need.points) > 1
+    lines = [
+        f"{d.name}: {2.0 * need.R / INCH:.4g} in, {need.blades} blades, "
+        + "; ".join(f"{p.thrust_N:g} N {_at(p.airspeed_m_s)}" + ("" if p.weight else " (floor)") for p in need.points),
+        "",
+    ]
     quality = "eta" if all(p.airspeed_m_s for p in need.points) else "eta, FM" if several else "FM"
-    lines.append(text_table(["", "rpm", "thrust N", "power W", quality, "g/W", "tip Mach"], rows))
+    lines.append(text_table(["", "rpm", "thrust N", "power W", quality, "g/W", "tip Mach"], _rows(d)))
     if several:
         other = "" if d.label is None else f", {d.label.name} {d.label.mean_W:.4g} W"
         lines.append(f"mean power: design {d.mean_W:.4g} W{other}"
@@ -142,8 +147,8 @@ def text(d: Design) -> str:
                      + f", ideal disk {d.disk_W:.4g} W")  # fmt: skip
     lines += ["± one standard uncertainty: " + ("the label's unknown shape is most of its band" if not d.ducted else
                                                 "duct and gap are most of it"), "", *_bought(d)]  # fmt: skip
-    limits = need.limits
-    stress, allowed = float(np.nanmax(v.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
+    limits = d.need.limits
+    stress, allowed = float(np.nanmax(d.values.stress_Pa)) / 1e6, limits.material.strength_MPa / limits.safety
     if d.thickness is not None and d.thickness != FAMILY[0]:
         note = "section {:.0%} thick at the hub and {:.0%} from half the radius, for the stress".format(*d.thickness)
         lines.append(note)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +116,36 @@ class KnownMotor:
     no_load_A: float = math.nan  # [A]
 
 
+HEAD_HINT = f"The first line is {','.join(COLUMNS)}"
+
+
+def _lines(file: Path) -> list[tuple[int, str]]:
+    """Lines that are not blank, with their numbers from 1."""
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise InputError(system_fault(error)) from error
+    except UnicodeDecodeError:
+        raise InputError(Fault(file.as_posix(), "", "bytes that are no UTF-8", "a CSV in UTF-8")) from None
+    rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip()]
+    if not rows:
+        raise InputError(Fault(file.as_posix(), "", "an empty file", "a CSV of motors", HEAD_HINT))
+    return rows
+
+
+def _number(key: str, cell: str, mark: str) -> tuple[float, Fault | None]:
+    """Value of a cell, and what is wrong with it; an empty one is unknown, other than K_v."""
+    low, high, below, above = LIMITS[key]
+    try:
+        value = float(cell if mark == "," else cell.replace(",", ".")) if cell else math.nan
+    except ValueError:
+        value = math.inf
+    if low <= value <= high or (not cell and key != "kv"):
+        return value, None
+    ask = below if 0.0 < value < low else above if high < value < math.inf else ""
+    return value, Fault("", key, cell or "nothing", f"a number from {low:g} to {high:g}", ask)
+
+
 def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     """Read a CSV with the columns ``name, kv, resistance_mohm, no_load_A``; an empty cell is unknown.
 
@@ -128,16 +158,7 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     """
     file = Path(path)
     name = file.as_posix()
-    hint = f"The first line is {','.join(COLUMNS)}"
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise InputError(system_fault(error)) from error
-    except UnicodeDecodeError:
-        raise InputError(Fault(name, "", "bytes that are no UTF-8", "a CSV in UTF-8")) from None
-    rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip()]
-    if not rows:
-        raise InputError(Fault(name, "", "an empty file", "a CSV of motors", hint))
+    rows = _lines(file)
     mark = max(",;\t", key=rows[0][1].count)
     try:
         head, *cells = csv.reader((line for _, line in rows), delimiter=mark)
@@ -146,7 +167,7 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
     place = {key.strip().casefold(): i for i, key in enumerate(head)}
     missing = [key for key in COLUMNS if key.casefold() not in place]
     if missing:
-        raise InputError([Fault(name, f"column {key}", "none", "this column", hint) for key in missing])
+        raise InputError([Fault(name, f"column {key}", "none", "this column", HEAD_HINT) for key in missing])
     if not cells:
         raise InputError(Fault(name, "", "no motor", "a row or more below the first line"))
     faults: list[Fault] = []
@@ -158,20 +179,9 @@ def read_motors(path: str | os.PathLike[str]) -> tuple[KnownMotor, ...]:
             continue
         row += [""] * (len(head) - len(row))
         found = {key: row[place[key.casefold()]].strip() for key in COLUMNS}
-        values = {}
-        for key, (low, high, below, above) in LIMITS.items():
-            text = found[key] if mark == "," else found[key].replace(",", ".")
-            try:
-                value = float(text) if text else math.nan
-            except ValueError:
-                value = math.inf
-            unknown = not text and key != "kv"
-            if not unknown and not low <= value <= high:
-                ask = below if 0.0 < value < low else above if high < value < math.inf else ""
-                expected = f"a number from {low:g} to {high:g}"
-                faults.append(Fault(name, f"line {line}, {key}", found[key] or "nothing", expected, ask))
-            values[key] = value
-        motor = found["name"] or f"line {line}"
-        out.append(KnownMotor(motor, values["kv"], 1e-3 * values["resistance_mohm"], values["no_load_A"]))
+        values = {key: _number(key, found[key], mark) for key in LIMITS}
+        faults += [replace(f, file=name, where=f"line {line}, {f.where}") for _, f in values.values() if f]
+        kv, mohm, idle = (value for value, _ in values.values())
+        out.append(KnownMotor(found["name"] or f"line {line}", kv, 1e-3 * mohm, idle))
     refuse(faults)
     return tuple(out)

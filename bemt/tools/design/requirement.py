@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.errors import Fault, InputError, refuse
+from bemt.base.errors import Fault, refuse
 
 if TYPE_CHECKING:
     from bemt.physics.air import Air
@@ -221,6 +221,54 @@ def point_of(text: str) -> DesignPoint:
     return DesignPoint(**found)
 
 
+def _outside(name: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> Fault | None:
+    """What is wrong with a number; one that is none fails too."""
+    if low <= value <= high:
+        return None
+    return Fault(name, "", f"{value:g}", f"a number from {low:g} to {high:g} {unit}".rstrip(), hint)
+
+
+def _of_point(p: DesignPoint) -> list[Fault | None]:
+    """What is wrong with the numbers of a point."""
+    windmill = "A windmill is no propeller" if p.thrust_N < 0.0 else ""
+    found = [
+        _outside("--thrust-N", p.thrust_N, 1e-3, 1e4, "N", windmill),
+        _outside("--airspeed-m-s", p.airspeed_m_s, 0.0, FAST, "m/s",
+                 "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else ""),
+        _outside("--points", p.weight, 0.0, 1e6, "", "weight is a share of time"),
+    ]  # fmt: skip
+    if p.rpm is not None:
+        slow = "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else ""
+        found.append(_outside("--rpm", p.rpm, 100.0, 3e5, "rev/min", slow))
+    return found
+
+
+def _tip(rpm: float | None, V: float, diameter_m: float, a: float, max_tip_mach: float) -> Fault | None:
+    """A tip that is too fast: by its speed, or by the airspeed alone where the speed is free."""
+    mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / a
+    if not mach > max_tip_mach:
+        return None
+    if rpm is None:
+        return Fault("--airspeed-m-s", "", f"{V:g} m/s, Mach {mach:.2f}", f"a Mach number up to {max_tip_mach:g}",
+                     "The tip is faster still: raise --max-tip-mach")  # fmt: skip
+    top = 60.0 * math.sqrt(max((max_tip_mach * a) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
+    return Fault("--rpm", "", f"{rpm:g} rev/min, tip Mach {mach:.2f}", f"a tip Mach up to {max_tip_mach:g}",
+                 f"That is {top:.0f} rev/min at {V:g} m/s")  # fmt: skip
+
+
+def _on_disk(
+    points: Sequence[DesignPoint], static_rpm: float | None, diameter_m: float, air: Air, max_tip_mach: float
+) -> list[Fault]:
+    """Points that are too light for the disk, or too fast for its tip."""
+    light = LIGHTEST * 0.25 * math.pi * diameter_m**2
+    expected = f"{light:.2g} N or more on this disk"
+    faint = [Fault("--thrust-N", "", f"{p.thrust_N:g} N", expected, "Or a smaller diameter")
+             for p in points if p.thrust_N < light]  # fmt: skip
+    at = [*((p.rpm, p.airspeed_m_s) for p in points), (static_rpm, 0.0)]
+    tips = [_tip(rpm, V, diameter_m, float(air.a_sound), max_tip_mach) for rpm, V in at]
+    return [*faint, *(fault for fault in tips if fault)]
+
+
 def required(
     points: Sequence[DesignPoint], diameter_m: float, hub_ratio: float, blades: int, air: Air, *,
     static_thrust_N: float | None = None, static_rpm: float | None = None, min_chord_mm: float | None = None,
@@ -229,60 +277,34 @@ def required(
 ) -> Requirement:  # fmt: skip
     """Check a request; all faults at once."""
     D = 1e3 * diameter_m
-    faults: list[Fault] = []
     if min_chord_mm is None:
         min_chord_mm = min(MIN_CHORD_MM, MIN_CHORD * D)
-
-    def check(name: str, value: float, low: float, high: float, unit: str = "", hint: str = "") -> None:
-        if not low <= value <= high:  # not a number fails too
-            ends = f"a number from {low:g} to {high:g}"
-            faults.append(Fault(name, "", f"{value:g}", f"{ends} {unit}".rstrip(), hint))
-
-    for p in points:
-        check("--thrust-N", p.thrust_N, 1e-3, 1e4, "N", "A windmill is no propeller" if p.thrust_N < 0.0 else "")
-        check(
-            "--airspeed-m-s", p.airspeed_m_s, 0.0, FAST, "m/s",
-            "In km/h? Divide by 3.6" if p.airspeed_m_s > FAST else "",
-        )  # fmt: skip
-        check("--points", p.weight, 0.0, 1e6, "", "weight is a share of time")
-        if p.rpm is not None:
-            check("--rpm", p.rpm, 100.0, 3e5, "rev/min", "In rev/s? Times 60" if 0.0 < p.rpm < 100.0 else "")
+    found = [fault for p in points for fault in _of_point(p)]
     if static_thrust_N is not None:
-        check("--static-thrust-N", static_thrust_N, 1e-3, 1e4, "N")
+        found.append(_outside("--static-thrust-N", static_thrust_N, 1e-3, 1e4, "N"))
     if static_rpm is not None:
-        check("--static-rpm", static_rpm, 100.0, 3e5, "rev/min")
+        found.append(_outside("--static-rpm", static_rpm, 100.0, 3e5, "rev/min"))
         if static_thrust_N is None:
-            faults.append(Fault("--static-rpm", "", f"{static_rpm:g}", "nothing without --static-thrust-N"))
-    check("--min-chord-mm", min_chord_mm, 0.1, 0.2 * D if D > 0.0 else 1e3, "mm", "At most a fifth of the diameter")
-    check("--min-thickness-mm", min_thickness_mm, 0.0, 0.05 * D if D > 0.0 else 1e3, "mm", "At most D / 20")
-    check("--max-tip-mach", max_tip_mach, 0.05, 0.95, "", "Section theory ends below Mach 1")
-    check("--stall-margin", stall_margin, 0.0, 0.8, "", "In percent? Divide by 100" if stall_margin > 1.0 else "")
-    check("--safety", safety, 1.0, 50.0)
+            found.append(Fault("--static-rpm", "", f"{static_rpm:g}", "nothing without --static-thrust-N"))
+    percent = "In percent? Divide by 100" if stall_margin > 1.0 else ""
+    wide, thick = (0.2 * D, 0.05 * D) if D > 0.0 else (1e3, 1e3)
+    found += [
+        _outside("--min-chord-mm", min_chord_mm, 0.1, wide, "mm", "At most a fifth of the diameter"),
+        _outside("--min-thickness-mm", min_thickness_mm, 0.0, thick, "mm", "At most D / 20"),
+        _outside("--max-tip-mach", max_tip_mach, 0.05, 0.95, "", "Section theory ends below Mach 1"),
+        _outside("--stall-margin", stall_margin, 0.0, 0.8, "", percent),
+        _outside("--safety", safety, 1.0, 50.0),
+    ]  # fmt: skip
     if not points:
-        faults.append(Fault("--thrust-N, --points", "", "neither", "one of them", "As in --thrust-N 6 --rpm 7000"))
+        found.append(Fault("--thrust-N, --points", "", "neither", "one of them", "As in --thrust-N 6 --rpm 7000"))
     elif sum(p.weight for p in points) == 0.0:
-        faults.append(Fault("--points", "", "weight 0 everywhere", "one weight above 0"))
+        found.append(Fault("--points", "", "weight 0 everywhere", "one weight above 0"))
     if material not in MATERIALS:
-        faults.append(Fault("--material", "", material, f"one of {', '.join(MATERIALS)}"))
+        found.append(Fault("--material", "", material, f"one of {', '.join(MATERIALS)}"))
+    faults = [fault for fault in found if fault]
     if not faults:
-        light = LIGHTEST * 0.25 * math.pi * diameter_m**2
-        faults += [Fault("--thrust-N", "", f"{p.thrust_N:g} N", f"{light:.2g} N or more on this disk",
-                         "Or a smaller diameter") for p in points if p.thrust_N < light]  # fmt: skip
-        for rpm, V in [(p.rpm, p.airspeed_m_s) for p in points] + [(static_rpm, 0.0)]:
-            mach = math.hypot(math.pi * diameter_m * (rpm or 0.0) / 60.0, V) / float(air.a_sound)
-            if mach > max_tip_mach and rpm is None:
-                hint = "The tip is faster still: raise --max-tip-mach"
-                expected = f"a Mach number up to {max_tip_mach:g}"
-                faults.append(Fault("--airspeed-m-s", "", f"{V:g} m/s, Mach {mach:.2f}", expected, hint))
-            elif mach > max_tip_mach:
-                top = (
-                    60.0 * math.sqrt(max((max_tip_mach * float(air.a_sound)) ** 2 - V**2, 0.0)) / (math.pi * diameter_m)
-                )
-                faults.append(Fault("--rpm", "", f"{rpm:g} rev/min, tip Mach {mach:.2f}",
-                                    f"a tip Mach up to {max_tip_mach:g}",
-                                    f"That is {top:.0f} rev/min at {V:g} m/s"))  # fmt: skip
-    if faults:
-        raise InputError(list(dict.fromkeys(faults)))
+        faults = _on_disk(points, static_rpm, diameter_m, air, max_tip_mach)
+    refuse(dict.fromkeys(faults))
     every = tuple(points)
     if static_thrust_N is not None:
         every = (*every, DesignPoint(static_thrust_N, 0.0, static_rpm, 0.0))

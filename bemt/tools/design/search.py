@@ -113,6 +113,13 @@ class Target:
         return self.cells * float(np.interp(SOC, LIPO_SOC, LIPO_V))
 
     @property
+    def sizes_in(self) -> Sequence[float]:
+        """Standard diameters, smallest first. [in]"""
+        if self.fan:
+            return [mm / 25.4 for mm in FAN_MM]
+        return WATER_DIAMETERS if self.fluid == "water" else DIAMETERS
+
+    @property
     def at_N(self) -> float:
         """Thrust at which power is stated. [N]"""
         return self.thrust_N if self.cruise_N is None else self.cruise_N
@@ -257,24 +264,30 @@ def _check(kv: Sequence[float], max_diameter_in: float | None, sure: float, blad
     refuse(faults)
 
 
+def _area(diameter_in: float) -> float:
+    return 0.25 * math.pi * (diameter_in * INCH) ** 2
+
+
+def _no_size(target: Target, small: Sequence[float]) -> Fault:
+    """The thrust that no standard size carries, and what those that have room do."""
+    least, most = LOADING["fan" if target.fan else target.fluid]
+    ends = (small or target.sizes_in)[0], (small or target.sizes_in[:1])[-1]
+    low, high = least * _area(ends[0]), most * _area(ends[1])
+    within = "" if target.max_diameter_in is None else f" within {target.max_diameter_in:.3g} in"
+    what = "fans" if target.fan else "standard sizes"
+    expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {ends[0]:.3g} to {ends[1]:.3g} in"
+    hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
+    return Fault("", "--thrust-N", f"{target.thrust_N:g} N{within}", expected, hint)
+
+
 def _standard(target: Target, blades: Sequence[int]) -> tuple[str, ...]:
     """Standard sizes whose disk loading at the target can be expected to work."""
-    max_in = target.max_diameter_in
     least, most = LOADING["fan" if target.fan else target.fluid]
-    sizes = (
-        [mm / 25.4 for mm in FAN_MM] if target.fan else list(WATER_DIAMETERS if target.fluid == "water" else DIAMETERS)
-    )
-    area = {D: 0.25 * math.pi * (D * INCH) ** 2 for D in sizes}
-    small = [D for D in sizes if max_in is None or max_in * (1.0 + 1e-9) >= D]
-    fit = [D for D in small if least <= target.thrust_N / area[D] <= most]
+    room = math.inf if target.max_diameter_in is None else target.max_diameter_in * (1.0 + 1e-9)
+    small = [D for D in target.sizes_in if room >= D]
+    fit = [D for D in small if least <= target.thrust_N / _area(D) <= most]
     if not fit:
-        ends = (small or sizes)[0], (small or sizes[:1])[-1]
-        low, high = least * area[ends[0]], most * area[ends[1]]
-        got = f"{target.thrust_N:g} N" + ("" if max_in is None else f" within {max_in:.3g} in")
-        what = "fans" if target.fan else "standard sizes"
-        expected = f"{low:.2g} to {high:.3g} N, the load of {what} from {ends[0]:.3g} to {ends[1]:.3g} in"
-        hint = "Or more rotors" if target.fan else "Other sizes: name them with --labels"
-        raise InputError(Fault("", "--thrust-N", got, expected, hint))
+        raise InputError(_no_size(target, small))
     if target.fan:
         return tuple(f"{rotor_loads.FAN}{25.4 * D:.3g} mm" for D in fit)
     flying = target.airspeed_m_s > 0.0 or target.fluid == "water"

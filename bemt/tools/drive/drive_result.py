@@ -338,6 +338,30 @@ def shown(band: DriveBand, unit: str, scale: float = 1.0) -> str:
     return f"{value:.{digits}f} ± {u:.{digits}f} {unit}"
 
 
+def _aloft(found: DriveResult) -> str:
+    """Flight time, or why there is none."""
+    full, hover = found.full, found.hover
+    if math.isfinite(hover["power_W"].value):
+        known = drive_model.drive_table(found.case).battery.capacity_Ah is not None
+        return f"{'flight time':<12}{'':<28}{shown(hover['minutes'], 'min' if known else 'min per A h of capacity')}"
+    gives = f"{full['thrust_N'].value:.1f} N" if math.isfinite(full["thrust_N"].value) else "an unknown maximum"
+    return f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}"
+
+
+def _assumed(found: DriveResult) -> list[str]:
+    """What the sheet of the motor would bring, where it is not known."""
+    if not {item.key for item in found.case.assumptions} & set(SHEET):
+        return []
+    motor, amps = found.drive.motor, found.full["battery_A"]
+    a, b = (1e2 * u / amps.value for u in (amps.u, amps.u_with_sheet))
+    return [
+        f"assumed     winding {1e3 * motor.resistance_ohm:.0f} mohm, no-load current "
+        f"{motor.no_load_A:.2g} A: typical of such motors. With both from the",
+        f"            motor's sheet (--resistance-mohm, --no-load-A) the current is known to {b:.0f} % instead of "
+        f"{a:.0f} %",
+    ]
+
+
 def text(found: DriveResult) -> str:
     """Lay a result out: one screen."""
     t, full, hover, drive = drive_model.drive_table(found.case), found.full, found.hover, found.drive
@@ -353,12 +377,7 @@ def text(found: DriveResult) -> str:
     )  # fmt: skip
     lines += [f"{name:<12}{shown(full[key], unit, k):<28}{shown(hover[key], unit, k)}" for name, key, unit, k in rows]
     lines.append(f"{'throttle':<12}{'100 %':<28}{shown(hover['throttle'], '%', 100.0)}")
-    if math.isfinite(hover["power_W"].value):
-        aloft = "min" if t.battery.capacity_Ah is not None else "min per A h of capacity"
-        lines.append(f"{'flight time':<12}{'':<28}{shown(hover['minutes'], aloft)}")
-    else:
-        gives = f"{full['thrust_N'].value:.1f} N" if math.isfinite(full["thrust_N"].value) else "an unknown maximum"
-        lines.append(f"no hover: each rotor needs {hover['thrust_N'].value:.1f} N and gives {gives}")
+    lines.append(_aloft(found))
     at = range(4, 21, 4)
     curve = [shown(DriveBand(float(found.steady.thrust_N[i]), float(found.u["thrust_N"][i]), 0.0), "N") for i in at]
     lines += ["", "thrust at   " + ", ".join(f"{5 * i} %: {words}" for i, words in zip(at, curve, strict=True))]
@@ -370,15 +389,7 @@ def text(found: DriveResult) -> str:
         words = f"{found.settled_C:.0f} C" if math.isfinite(found.settled_C) else "no temperature (it runs away)"
         over = " above its limit" if not found.settled_C <= (t.motor.max_temperature_C or math.inf) else ""
         lines.append(f"at full throttle the winding settles at {words}{over}")
-    unknown = {item.key for item in found.case.assumptions}
-    if unknown & set(SHEET):
-        a, b = (1e2 * v / full["battery_A"].value for v in (full["battery_A"].u, full["battery_A"].u_with_sheet))
-        lines += [
-            f"assumed     winding {1e3 * drive.motor.resistance_ohm:.0f} mohm, no-load current "
-            f"{drive.motor.no_load_A:.2g} A: typical of such motors. With both from the",
-            f"            motor's sheet (--resistance-mohm, --no-load-A) the current is known to {b:.0f} % instead of "
-            f"{a:.0f} %",
-        ]
+    lines += _assumed(found)
     ask = [name for name, v in (("--mass-kg", mass), ("--capacity-Ah", t.battery.capacity_Ah)) if v is None]
     if ask:
         lines.append(f"for more results give {' and '.join(ask)}, or mass_kg and capacity_Ah in [drive]")

@@ -44,6 +44,14 @@ class MotorHead(Table):
     data: str = entry("description of the trials", default="")
     source: str | None = entry("source of the trials")
 
+    @property
+    def ke_sheet(self) -> tuple[float | None, float]:
+        """Constant of the data sheet and its standard uncertainty, of a uniform tolerance. [V s/rad]"""
+        if self.kv_rpm_V is None:
+            return None, math.nan
+        ke = mc.from_kv(self.kv_rpm_V, self.winding, self.kv_measure, self.kv_between)
+        return ke, math.nan if self.kv_tolerance_pct is None else ke * self.kv_tolerance_pct / 100.0 / math.sqrt(3.0)
+
 
 class ResultTable(Table):
     """[result]: convention for K_t."""
@@ -117,6 +125,20 @@ class MotorToml(Table):
         if self.back_emf is not None and self.back_emf.waveforms and self.motor.pole_pairs is None:
             yield "motor.pole_pairs", "nothing", "a whole number, for waveforms"
 
+    @property
+    def files(self) -> dict[str, str]:
+        """Names of the recordings by key."""
+        emf, torque = self.back_emf, self.torque
+        named = {"back_emf.file": emf and emf.file, "torque.file": torque and torque.file}
+        named |= {f"back_emf.waveforms[{i}]": name for i, name in enumerate((emf and emf.waveforms) or ())}
+        return {where: name for where, name in named.items() if name}
+
+    @property
+    def gains(self) -> dict[str, float | None]:
+        """Stated uncertainty of the gain of each recorded method. [%]"""
+        tables = {"back_emf": self.back_emf, "torque": self.torque}
+        return {name: table.u_gain_pct for name, table in tables.items() if table}
+
 
 @dataclass(frozen=True, eq=False)
 class MotorTrials:
@@ -137,20 +159,11 @@ def read(path: str | Path) -> MotorTrials:
     file = Path(path) / "motor.toml" if Path(path).is_dir() else Path(path)
     made = read_model(MotorToml, file)
     motor, result, emf_table, torque_table = made.motor, made.result, made.back_emf, made.torque
-    winding, notes = motor.winding, []
-    sheet, u_sheet = None, math.nan
-    if motor.kv_rpm_V is not None:
-        sheet = mc.from_kv(motor.kv_rpm_V, winding, motor.kv_measure, motor.kv_between)
-        if motor.kv_tolerance_pct is not None:
-            u_sheet = sheet * motor.kv_tolerance_pct / 100.0 / math.sqrt(3.0)
-        else:
-            notes.append("no tolerance of K_v is stated: the data sheet only bears on convention factors")
-    names = {"back_emf.file": emf_table and emf_table.file, "torque.file": torque_table and torque_table.file}
-    names |= {f"back_emf.waveforms[{i}]": n for i, n in enumerate((emf_table and emf_table.waveforms) or ())}
-    far = {where: name for where, name in names.items() if name and not inside(file.parent, name)}
-    if far:
-        expected = "the name of a file in the folder of the motor.toml"
-        raise InputError([Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items()])
+    winding, names = motor.winding, made.files
+    sheet, u_sheet = motor.ke_sheet
+    far = {where: name for where, name in names.items() if not inside(file.parent, name)}
+    expected = "the name of a file in the folder of the motor.toml"
+    refuse(Fault(file.as_posix(), k, repr(v), expected, "Copy it there") for k, v in far.items())
     faults: list[Fault] = []
     emf = torque = loop = None
     with gathered(faults):
@@ -159,8 +172,10 @@ def read(path: str | Path) -> MotorTrials:
         if torque_table is not None:
             torque, loop = _torque(file, torque_table, winding)
     refuse(faults)
-    gains = {name: table.u_gain_pct for name, table in (("back_emf", emf_table), ("torque", torque_table)) if table}
-    notes += [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
+    gains = made.gains
+    notes = [f"no gain uncertainty of {name} is stated: counted as none" for name, u in gains.items() if u is None]
+    if motor.kv_rpm_V is not None and motor.kv_tolerance_pct is None:
+        notes.insert(0, "no tolerance of K_v is stated: the data sheet only bears on convention factors")
     measured = Measured(
         sheet, u_sheet, emf, torque, (gains.get("back_emf") or 0.0) / 100.0, (gains.get("torque") or 0.0) / 100.0,
         torque_table.u_shunt_pct / 100.0 if torque_table else 0.0, loop.live_zero_Nm if loop else 0.0,
@@ -169,7 +184,7 @@ def read(path: str | Path) -> MotorTrials:
     convention = f"torque per {result.current.replace('_', ' ')} current in {where}, {winding}"
     stated = {item.name: item.Kt_Nm_A for item in made.stated}
     to_kt = mc.ke_to_kt(1.0, result.current, result.between, winding)
-    files = (file, *(file.parent / name for name in names.values() if name))
+    files = (file, *(file.parent / name for name in names.values()))
     return MotorTrials(motor.name, motor.data, measured, to_kt, convention, stated, tuple(notes), files)
 
 

@@ -126,7 +126,7 @@ def export(
     from bemt.tools.exports.folder import Exported, export_cases
     from bemt.tools.exports.printing import Print, asked
 
-    wanted, faults = [word.lower() for word in ([format] if isinstance(format, str) else format)], []
+    wanted = [word.lower() for word in ([format] if isinstance(format, str) else format)]
     numbers = {"rpm": rpm, "airspeed_m_s": airspeed_m_s, "sideslip_deg": sideslip_deg, "level": level}
     given: dict[str, Any] = {k: None if v is None else number(k, v, finite=False) for k, v in numbers.items()}
     given |= {"domain": domain, "sector": sector, "turbulence": turbulence, "solver": solver}
@@ -137,15 +137,15 @@ def export(
     if printable:
         request = Print(**{**vars(request), "min_thickness_mm": min_thickness_mm, "flare_mm": fillet_mm})
     else:
-        faults += [Fault("", name, "given", "nothing without --printable") for name in asked(request)]
-    refuse(faults)
+        refuse(Fault("", name, "given", "nothing without --printable") for name in asked(request))
     folder = path_text("out", out)
     named = isinstance(case, (str, os.PathLike)) and File(case).exists()
+    # Of a printed blade, flare and thickness are the print's
+    fillet, least = (0.0, 0.0) if printable else (fillet_mm or 0.0, min_thickness_mm or 0.0)
     try:
         made, refused = export_cases(
             os.fspath(case) if named else rotor_of(case).case, folder, wanted or ["stl"], unit,  # type: ignore[arg-type]
-            0.0 if printable else fillet_mm or 0.0, 0.0 if printable else min_thickness_mm or 0.0, given,
-            tuple(dict.fromkeys(hold)), request if printable else None, progress,
+            fillet, least, given, tuple(dict.fromkeys(hold)), request if printable else None, progress,
         )  # fmt: skip
     except OSError as error:
         raise InputError(system_fault(error)) from error

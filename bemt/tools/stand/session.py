@@ -148,6 +148,57 @@ class AtTheTerminal:
         return names
 
 
+class _Log:
+    """What is told of a sitting while it happens, and how far it has come."""
+
+    def __init__(self, path: Path, say: Callable[[str], None], yes: bool) -> None:
+        self.path, self.say, self.yes = path, say, yes
+        self.lines: list[str] = []
+        self.course, self.stopped = Course("", []), ""
+
+    def tell(self, text: str) -> None:
+        """Put a line into the log."""
+        self.lines.append(text)
+        self.say(f"{text}\n")
+        write_atomic(self.path, "\n".join(self.lines) + "\n")
+
+    def planned(self, points: Points, case: Path) -> None:
+        """Say what a recording of these points can show."""
+        seen = plan({k: [p[k] for p in points] for k in ("rpm", "airspeed_m_s")}, case).detectable
+        self.tell(f"plan: {len(points)} points; can show " + ", ".join(k for k, v in seen.items() if v == "yes"))
+        self.tell("plan: cannot show " + ", ".join(k for k, v in seen.items() if v == "no"))
+
+    def may(self, kind: str, rows: Rows) -> bool:
+        """Announce a run, and ask unless all are confirmed."""
+        speeds, winds = ([r[n] for r in rows] for n in ("rpm", "airspeed_m_s"))
+        what = {"again": "the recording", "run": "the run asked for", "reference": "a reference"}[kind]
+        wind = f", wind {min(winds):.1f} to {max(winds):.1f} m/s" if max(winds) else ", at rest"
+        self.tell(f"run: {what}, {len(rows)} points, {min(speeds):.0f} to {max(speeds):.0f} rev/min{wind}, about "
+                  f"{minutes('run', len(rows)):.0f} min")  # fmt: skip
+        return self.yes or ask("Enter to run, s to skip.") != "s"
+
+    def stop(self, why: str) -> None:
+        """Say why the guard stopped it, and how sure the stop is."""
+        self.stopped = why
+        sure = not why.startswith(("wire lost", "no row", "the guard"))
+        self.tell(f"stopped: {why}; {'the output is at its stop value' if sure else 'look: does the motor stand?'}")
+
+    def told(self, course: Course) -> None:
+        """Say what the last step and its diagnosis are."""
+        self.course = course
+        if course.steps:
+            aside = ", ".join(course.aside[-1])
+            self.tell(f"step: {course.steps[-1]}" + (f" {aside}" if aside else ""))
+        last = course.answers[-1]
+        if last.confirmed:
+            return self.tell(f"said: {', '.join(last.effects)} is there, a look has shown it")
+        what = f" {' or '.join(last.effects) if last.verdict == 'class' else ', '.join(last.effects)}".rstrip()
+        loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict, math.nan)
+        self.tell(f"said: {last.verdict}{what} (probability {last.sure:.2f}, expected loss {loss:.2f})")
+        if asks := dict(last.whole.get("next_measurement") or {}).get("text"):
+            self.tell(f"next: {asks}")
+
+
 def plan_of(top_rpm: float, wind_m_s: float) -> list[dict[str, float]]:
     """Points of a first recording: up and down at rest, or speeds by winds."""
     if not wind_m_s:
@@ -164,43 +215,13 @@ def sit(
 ) -> StandAnswer:  # fmt: skip
     """Sit at a stand; everything goes into one folder."""
     top = top_rpm or rotor.case.rpm
-    points, lines = plan_of(top, wind_m_s), list[str]()
-    course, stopped, made, there = Course("", []), "", list[tuple[str, str]](), None
+    points = plan_of(top, wind_m_s)
     case = rotor.write(out)
     for file in beside(rotor.case) if rotor.case.path.is_file() else ():
         write_atomic(out / file.relative_to(rotor.case.folder), file.read_bytes())
-
-    def tell(text: str) -> None:
-        lines.append(text)
-        say(f"{text}\n")
-        write_atomic(out / "log.txt", "\n".join(lines) + "\n")
-
-    def may(kind: str, rows: Rows) -> bool:
-        speeds, winds = ([r[n] for r in rows] for n in ("rpm", "airspeed_m_s"))
-        what = {"again": "the recording", "run": "the run asked for", "reference": "a reference"}[kind]
-        wind = f", wind {min(winds):.1f} to {max(winds):.1f} m/s" if max(winds) else ", at rest"
-        tell(f"run: {what}, {len(rows)} points, {min(speeds):.0f} to {max(speeds):.0f} rev/min{wind}, about "
-             f"{minutes('run', len(rows)):.0f} min")  # fmt: skip
-        return yes or ask("Enter to run, s to skip.") != "s"
-
-    def told(so_far: Course) -> None:
-        nonlocal course
-        course = so_far
-        if course.steps:
-            aside = ", ".join(course.aside[-1])
-            tell(f"step: {course.steps[-1]}" + (f" {aside}" if aside else ""))
-        last = course.answers[-1]
-        if last.confirmed:
-            return tell(f"said: {', '.join(last.effects)} is there, a look has shown it")
-        what = f" {' or '.join(last.effects) if last.verdict == 'class' else ', '.join(last.effects)}".rstrip()
-        loss = dict(last.whole.get("expected_loss") or {}).get(last.verdict, math.nan)
-        tell(f"said: {last.verdict}{what} (probability {last.sure:.2f}, expected loss {loss:.2f})")
-        if asks := dict(last.whole.get("next_measurement") or {}).get("text"):
-            tell(f"next: {asks}")
-
-    seen = plan({k: [p[k] for p in points] for k in ("rpm", "airspeed_m_s")}, case).detectable
-    tell(f"plan: {len(points)} points; can show " + ", ".join(k for k, v in seen.items() if v == "yes"))
-    tell("plan: cannot show " + ", ".join(k for k, v in seen.items() if v == "no"))
+    log = _Log(out / "log.txt", say, yes)
+    log.planned(points, case)
+    made, there = list[tuple[str, str]](), None
     with ExitStack() as held:
         limits = _limits(rotor, on, given, top_rpm, lapse)
         person: Person
@@ -208,44 +229,51 @@ def sit(
             key = out / "sealed"
             own = secrets.randbits(40) if seed is None else seed
             digest = sealed.seal_case(key, load_case(case), points, top, faults, own)
-            tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
+            log.tell(f"sealed: what is wrong with the simulated stand, SHA-256 {digest}")
             person = one = Simulated(key, "0000", wire_of_the_simulated(), lapse)
             held.callback(one.close)
             wire = (one.wire, one.address, "")
         else:
-            air = {n: asked_number(n) if given[n] is None else float(given[n] or 0.0)
-                   for n in ("temperature_C", "pressure_hPa")}  # fmt: skip
-            known = {"temperature_C": air["temperature_C"], "pressure_Pa": 100.0 * air["pressure_hPa"]}
-            person, wire = AtTheTerminal(points, known, wind_m_s, limits.rpm), (on, address, line)
+            person, wire = AtTheTerminal(points, _air(given), wind_m_s, limits.rpm), (on, address, line)
         try:
             stand = held.enter_context(Stand(*wire, limits, settle_s=max(2.0 / lapse, 0.3)))
             if isinstance(person, AtTheTerminal):
                 person.calm = stand.stop
                 stand.rest(_ARMING_S)
-            hand = Wired(stand, person, may, out.as_posix())
+            hand = Wired(stand, person, log.may, out.as_posix())
             made = hand.made
             if text := hand.again((), 0):
                 write_atomic(out / "recording.csv", text)
-                question = [*prove.question(out), "--top-rpm", f"{top:g}"]
-                first, said = prove.asked(out, question)
-                if not first:
-                    raise InputError(Fault(str(out / "recording.csv"), "", said[-300:], "a recording to diagnose"))
-                told(Course("", [first]))
-                course = follow(out, first, hand, runs, enough=A_RUN, tell=told, words=question)
+                _diagnosed(out, [*prove.question(out), "--top-rpm", f"{top:g}"], hand, runs, log)
         except Stopped as error:
-            stopped = str(error)
-            sure = not stopped.startswith(("wire lost", "no row", "the guard"))
-            tell(f"stopped: {stopped}; {'the output is at its stop value' if sure else 'look: does the motor stand?'}")
+            log.stop(str(error))
     if on == "simulated":
         there = sealed.bench_of(out / "sealed", "0000")[1].causes
-    answer = StandAnswer(rotor.name, course, stopped, there)
-    spent = sum(course.minutes) + minutes("run", len(points))
-    tell(f"found: {_found(answer)}; ended by: {stopped or course.end or 'no run'}; {spent:.0f} min of stand time")
+    answer = StandAnswer(rotor.name, log.course, log.stopped, there)
+    spent = sum(log.course.minutes) + minutes("run", len(points))
+    end = log.stopped or log.course.end or "no run"
+    log.tell(f"found: {_found(answer)}; ended by: {end}; {spent:.0f} min of stand time")
     if there is not None:
-        tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
+        log.tell(f"unsealed: there was {', '.join(there) or 'nothing wrong'}")
     write_atomic(out / "stand.json", json_text(answer.to_dict()))
-    files = write_story(out, rotor, answer.course, made, lines)
-    return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(lines))
+    files = write_story(out, rotor, answer.course, made, log.lines)
+    return replace(answer, files=(out / "stand.json", out / "log.txt", *files), lines=tuple(log.lines))
+
+
+def _diagnosed(out: Path, question: list[str], hand: Wired, runs: int, log: _Log) -> None:
+    """Diagnose the first recording and follow what the answers ask for."""
+    first, said = prove.asked(out, question)
+    if not first:
+        raise InputError(Fault(str(out / "recording.csv"), "", said[-300:], "a recording to diagnose"))
+    log.told(Course("", [first]))
+    log.course = follow(out, first, hand, runs, enough=A_RUN, tell=log.told, words=question)
+
+
+def _air(given: Mapping[str, float | None]) -> dict[str, float]:
+    """Air as given, else asked for."""
+    C, hPa = (asked_number(n) if given[n] is None else float(given[n] or 0.0)
+              for n in ("temperature_C", "pressure_hPa"))  # fmt: skip
+    return {"temperature_C": C, "pressure_Pa": 100.0 * hPa}
 
 
 def _found(answer: StandAnswer) -> str:

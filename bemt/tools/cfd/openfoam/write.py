@@ -297,12 +297,53 @@ def _mesh(rotor: Rotor, duct: Duct | None, options: Options | None) -> MeshModel
     return build(rotor, duct, options)
 
 
+def _solids(
+    case: Case, rotor: Rotor, sector: str, options: Options | None
+) -> tuple[Duct | None, MeshModel, np.ndarray | None, bool]:
+    """Duct that fits into the sector, mesh, outline of the centre body, and whether the vanes had to be left out."""
+    whole = case.duct()
+    duct, left_out = _standing(whole, {"half": 2, "blade": rotor.B}.get(sector, 1))
+    try:
+        model = _mesh(rotor, duct, options)
+        body = None if whole is None else _outline(rotor, whole, model)
+    except GeometryError as error:
+        raise InputError([Fault(case.path.as_posix(), *fault) for fault in error.faults]) from error
+    return duct, model, body, left_out
+
+
+def _extent(z: np.ndarray, radius: float) -> Body:
+    """Body between the ends along the shaft."""
+    return Body(float(z.min()), float(z.max()), float(radius))
+
+
+def _sweep(model: MeshModel, rotor: Rotor) -> RunSweep:
+    """Where the blades and their tips turn."""
+    blade = model.rotor.vertices[np.unique(model.rotor.part("blade"))]
+    tip = blade[np.hypot(blade[:, 0], blade[:, 1]) > 0.985 * rotor.R]
+    azimuth = np.arctan2(tip[:, 1], tip[:, 0])
+    first = np.abs(azimuth) < math.pi / max(rotor.B, 2)
+    return RunSweep(float(blade[:, 2].min()), float(blade[:, 2].max()), float(tip[:, 2].min()), float(tip[:, 2].max()),
+                    float(np.abs(azimuth[first]).max()))  # fmt: skip
+
+
+def _notes(s: Settings, mach: float, left_out: bool) -> list[str]:
+    """What a reader of the run has to know."""
+    said = {
+        f"tip Mach number {mach:.3f}: {'compressible' if s.compressible else 'incompressible'}": True,
+        "the vanes do not fit into the sector: left out, their centre body is there": left_out,
+        "oblique flow with a frozen rotor is an approximation: one azimuth of the blades": bool(s.sideslip),
+        "energy equation without the work of the turning frame: temperatures at the blade are wrong":
+            s.compressible and s.gas == "perfect",
+    }  # fmt: skip
+    return [note for note, holds in said.items() if holds]
+
+
 def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, dict[str, Any]]:
     """Work out the settings of a run."""
     file = case.path.as_posix()
     faults = check_run(run, file=file)
     refuse(faults)
-    rotor, whole, air = case.rotor(), case.duct(), case.air()
+    rotor, air = case.rotor(), case.air()
     rpm = case.rpm if run.rpm is None else run.rpm
     V = case.airspeed_m_s if run.airspeed_m_s is None else run.airspeed_m_s
     if case.angle_deg and run.sideslip_deg != case.angle_deg:
@@ -310,28 +351,12 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         raise InputError(Fault(file, "operating.angle_deg", got, "0, or that of the run", hint))
     sideslip = math.radians(run.sideslip_deg)
     sector = run.sector or sector_choice(rotor.B, sideslip)
-    parts = {"half": 2, "blade": rotor.B}.get(sector, 1)
-    duct, left_out = _standing(whole, parts)
-    try:
-        model = _mesh(rotor, duct, options)
-        body = None if whole is None else _outline(rotor, whole, model)
-    except GeometryError as error:
-        raise InputError([Fault(file, *fault) for fault in error.faults]) from error
+    duct, model, body, left_out = _solids(case, rotor, sector, options)
     points = model.rotor.vertices
-    blade = points[np.unique(model.rotor.part("blade"))]
-    tip = blade[np.hypot(blade[:, 0], blade[:, 1]) > 0.985 * rotor.R]
-    azimuth = np.arctan2(tip[:, 1], tip[:, 0])
-    first = np.abs(azimuth) < math.pi / max(rotor.B, 2)
-    sweep = RunSweep(float(blade[:, 2].min()), float(blade[:, 2].max()), float(tip[:, 2].min()), float(tip[:, 2].max()),
-                  float(np.abs(azimuth[first]).max()))  # fmt: skip
     surfaces = [name for part in model.parts for name in part.names]
-    around = None
-    if model.duct is not None:
-        z = model.duct.vertices[:, 2]
-        around = Body(float(z.min()), float(z.max()), float(np.hypot(*model.duct.vertices[:, :2].T).max()))
-    inner = None
-    if body is not None:
-        inner = Body(float(body[:, 1].min()), float(body[:, 1].max()), float(body[:, 0].max()))
+    solid = None if model.duct is None else model.duct.vertices
+    around = None if solid is None else _extent(solid[:, 2], np.hypot(*solid[:, :2].T).max())
+    inner = None if body is None else _extent(body[:, 1], body[:, 0].max())
     tail = body if left_out else None  # else it is of one piece with vanes and duct
     if tail is not None:
         surfaces.append("centrebody")
@@ -343,7 +368,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
     try:
         settings = Settings(
             R=rotor.R, Rhub=rotor.Rhub, B=rotor.B, rotation=rotor.rotation,
-            rotor=Body(float(points[:, 2].min()), float(points[:, 2].max()), rotor.R), blades=sweep, rpm=rpm, rho=rho,
+            rotor=_extent(points[:, 2], rotor.R), blades=_sweep(model, rotor), rpm=rpm, rho=rho,
             mu=mu, a_sound=a, temperature=temperature, V=V, sideslip=sideslip, sector=sector, domain=run.domain,
             level=run.level, turbulence=run.turbulence, compressible=compressible, gas=run.gas, duct=around, body=inner,
             gap=0.0 if duct is None else duct.gap, plate_z=plate, plate_radius=run.plate_radius_over_R * rotor.R,
@@ -353,13 +378,7 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         )  # fmt: skip
     except InputError as error:
         raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
-    notes = [f"tip Mach number {mach:.3f}: {'compressible' if compressible else 'incompressible'}"]
-    if left_out:
-        notes.append("the vanes do not fit into the sector: left out, their centre body is there")
-    if sideslip:
-        notes.append("oblique flow with a frozen rotor is an approximation: one azimuth of the blades")
-    if compressible and run.gas == "perfect":
-        notes.append("energy equation without the work of the turning frame: temperatures at the blade are wrong")
+    notes = _notes(settings, mach, left_out)
     return settings, {"rotor": rotor, "duct": duct, "tail": tail, "notes": notes, "model": model}
 
 
