@@ -70,6 +70,15 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
     )
 
 
+def _of_heading(heading: str) -> tuple[str, str]:
+    """Column that a heading is of, and the origin if it is a part of its uncertainty."""
+    if not heading.startswith("u_"):
+        return heading, ""
+    column = heading.removeprefix("u_")
+    origin = next((o for o in ORIGINS if column.startswith(f"{o}_")), "")
+    return column.removeprefix(f"{origin}_") if origin else column, origin
+
+
 def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
     """Make a dataset from a table whose headings carry their units.
 
@@ -109,9 +118,7 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     for heading in map(str, frame.columns):
         if heading == "flags":
             continue
-        column = heading.removeprefix("u_") if heading.startswith("u_") else heading
-        origin = next((o for o in ORIGINS if column.startswith(f"{o}_") and heading.startswith("u_")), "")
-        column = column.removeprefix(f"{origin}_") if origin else column
+        column, origin = _of_heading(heading)
         base, unit = units.split_suffix(column)
         scale, offset, channel = 1.0, 0.0, column
         named = column == "rpm" or column in DIMENSIONLESS

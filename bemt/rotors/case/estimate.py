@@ -108,13 +108,13 @@ def of_label(
         raise InputError([replace(f, hint=hint) if f.file == "label" else f for f in error.faults]) from None
 
 
-def _of_label(
-    label: str, axes: Sequence[Sequence[float]], blades: int | None, chord_mm: float | None,
-    measured_pitch_in: float | None, series: str | None, density: float | None, reading: str | None,
-) -> RotorEstimate:  # fmt: skip
-    told, faults = _label(label, blades)
+def _faults(
+    told: Designation | None, axes: Sequence[Sequence[float]], lengths: Sequence[tuple[str, float | None, str, str]],
+    density: float | None, series: str | None, reading: str | None,
+) -> list[Fault]:  # fmt: skip
+    """What is wrong beside the label; a length is option, value, unit and name."""
+    faults: list[Fault] = []
     D = told.diameter_in * INCH if told else math.nan
-    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
     for option, value, unit, name in lengths:
         if value is not None and not math.isfinite(value):
             faults.append(Fault(option, "", f"{value:g}", f"a length [{unit}]"))
@@ -140,6 +140,16 @@ def _of_label(
     if reading is not None:
         with gathered(faults):
             parse_reading(reading)
+    return faults
+
+
+def _of_label(
+    label: str, axes: Sequence[Sequence[float]], blades: int | None, chord_mm: float | None,
+    measured_pitch_in: float | None, series: str | None, density: float | None, reading: str | None,
+) -> RotorEstimate:  # fmt: skip
+    told, faults = _label(label, blades)
+    lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
+    faults += _faults(told, axes, lengths, density, series, reading)
     if faults or told is None:
         raise InputError(faults)
     case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density, reading)
