@@ -95,13 +95,16 @@ def parse_designation(text: str, blades_told: int | None = None) -> Designation:
     geometry.common.GeometryError: '10x100': got pitch/diameter 10; expected a ratio from 0.1 to 2.5. Meant 10x10?
     """
     where = repr(text)
-    plain, in_words = _plain(text)
+    plain = _INCHES.sub("", re.sub(r"(?<=\d)\s+by\s+(?=\d)", "x", text.strip(), flags=re.IGNORECASE)).strip()
+    plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
+    in_words = _BLADES.search(plain)
+    plain = _BLADES.sub(" ", plain, 1).strip()
     named = _sizes(plain, where)
     match, in_digits = named[-1], named[-1].re is _DIGITS
     before, after = plain[: named[0].start()].strip(" -_("), plain[match.end() :]
     count = re.search(r"-\s*B?(\d)$", after, re.IGNORECASE)  # 5152S-3
     after = after[: count.start()] if count else after
-    told = match["blades"] or (count[1] if count else None) or in_words
+    told = match["blades"] or (count[1] if count else None) or (in_words[1] if in_words else None)
     blades = int(told) if told else None
     suffix = _Suffix.read(after, where)
     maker, letters = _maker(before)
@@ -116,14 +119,6 @@ def parse_designation(text: str, blades_told: int | None = None) -> Designation:
         kind = "fpv"
     maker = f"{maker} {suffix.words}".strip()
     return Designation(D, pitch, blades, kind, maker, suffix.reverse, suffix.width or letters.width)
-
-
-def _plain(text: str) -> tuple[str, str | None]:
-    """Label with its size in bare inches and without a blade count in words; that count."""
-    plain = _INCHES.sub("", re.sub(r"(?<=\d)\s+by\s+(?=\d)", "x", text.strip(), flags=re.IGNORECASE)).strip()
-    plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
-    count = _BLADES.search(plain)
-    return (_BLADES.sub(" ", plain, 1).strip(), count[1]) if count else (plain, None)
 
 
 def _sizes(plain: str, where: str) -> list[re.Match[str]]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -383,32 +382,29 @@ def _refined(points: Array, faces: Faces, centre: Array, axis: Array) -> tuple[A
     return centre + np.mean(middles, axis=0) @ rows, normal * math.copysign(1.0, float(normal @ axis))
 
 
-def _candidates(points: Array, faces: Faces, parts: Sequence[Faces]) -> list[tuple[Faces, str]]:
-    """What may be the rotor, the likelier first, each with the words that tell of it."""
-    large = [p for p in parts if len(p) >= 20]
-    options: list[tuple[Faces, str]] = [(faces, "")]
-    if not 1 < len(large) <= 60:
-        return options
-    for k in range(min(3, len(large) - 1)):
-        rest = np.concatenate(large[k + 1 :])
-        options.append((rest, f"the {k + 1} largest of the file's bodies (a duct or stator?) were left out"))
-    options += [
-        (group, "equal bodies of the file were taken for the blades, the others left out")
-        for group in _alike(points, large)
-    ]
-    return options + [(p, "the other bodies of the file (a duct or stator?) were left out") for p in large]
-
-
 def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, list[str]]:
     """Separate the rotor from what stands beside it and find its axis."""
     parts = _bodies(points, faces)
+    large = [p for p in parts if len(p) >= 20]
+    options: list[tuple[Faces, str]] = [(faces, "")]
+    if 1 < len(large) <= 60:
+        for k in range(min(3, len(large) - 1)):
+            rest = np.concatenate(large[k + 1 :])
+            options.append((rest, f"the {k + 1} largest of the file's bodies (a duct or stator?) were left out"))
+        options += [
+            (group, "equal bodies of the file were taken for the blades, the others left out")
+            for group in _alike(points, large)
+        ]
+        options += [(p, "the other bodies of the file (a duct or stator?) were left out") for p in large]
     best: tuple[float, int, Array, Array] | None = None
     chosen, note = faces, ""
-    for candidate, text in _candidates(points, faces, parts):
+    for candidate, text in options:
         row = _best_axis(points, candidate)
-        if row[1] and _is_vane(points, candidate, row[2], row[3]):
+        if not row[1]:
+            continue
+        if _is_vane(points, candidate, row[2], row[3]):
             row = (row[0] + 0.4, *row[1:])
-        if row[1] and (best is None or row[0] < 0.5 * best[0]):
+        if best is None or row[0] < 0.5 * best[0]:
             best, chosen, note = row, candidate, text
             if row[0] < 0.02:
                 break

@@ -208,16 +208,11 @@ def expected(kind: Any, limits: FieldLimits, name: str = "") -> str:
     models = list(_models(kind))
     if models:
         return f"tables [[{name}]]" if lists else f"a table [{name}]"
-    return _noun(first, lists) + ("" if first is str and not lists else _within(limits))
-
-
-def _noun(first: Any, lists: Sequence[Any]) -> str:
-    """What a single value of a type is, or a list of such."""
-    one = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}.get(first or NoneType, "")
+    one = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}.get(first, "")
     many = {str: "a list of texts", float: "a list of numbers"}.get(lists[0], "a list") if lists else ""
     if first is str and not many:
         return "a text that is not empty"
-    return " or ".join(word for word in (one, many) if word)
+    return " or ".join(word for word in (one, many) if word) + _within(limits)
 
 
 def _within(limits: FieldLimits) -> str:
@@ -262,7 +257,14 @@ def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
         return ""
     if Span in parts:
         return f"Write [{shown(value)}]"
-    return (limits.suspect(float(value)) if limits.suspect else "") or _length_hint(where, value, limits)
+    low, high = limits.low, limits.high
+    if limits.suspect and (hint := limits.suspect(float(value))):
+        return hint
+    if limits.unit == "m" and where.endswith("_m") and low <= value / 1e3 <= high:
+        return f"In mm? Divide by 1000, or write {name.removesuffix('_m')}_mm"
+    if limits.unit == "mm" and where.endswith("_mm") and low <= value * 1e3 <= high and value < 1.0:
+        return "In m? Times 1000"
+    return ""
 
 
 def _text_hint(name: str, value: str, parts: Sequence[Any], limits: FieldLimits) -> str:
@@ -272,16 +274,6 @@ def _text_hint(name: str, value: str, parts: Sequence[Any], limits: FieldLimits)
         return ""
     told = unit_hint(name, value)
     return "Drop the quotes" if _quoted_number(value) else told[1] if told else ""
-
-
-def _length_hint(where: str, value: float, limits: FieldLimits) -> str:
-    """Hint at a length that would be right in the other of m and mm."""
-    low, high, name = limits.low, limits.high, where.rpartition(".")[2]
-    if limits.unit == "m" and where.endswith("_m") and low <= value / 1e3 <= high:
-        return f"In mm? Divide by 1000, or write {name.removesuffix('_m')}_mm"
-    if limits.unit == "mm" and where.endswith("_mm") and low <= value * 1e3 <= high and value < 1.0:
-        return "In m? Times 1000"
-    return ""
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:

@@ -70,15 +70,6 @@ def concat(series: Iterable[Dataset], name: str | None = None) -> Dataset:
     )
 
 
-def _of_heading(heading: str) -> tuple[str, str]:
-    """Column that a heading is of, and the origin if it is a part of its uncertainty."""
-    if not heading.startswith("u_"):
-        return heading, ""
-    column = heading.removeprefix("u_")
-    origin = next((o for o in ORIGINS if column.startswith(f"{o}_")), "")
-    return column.removeprefix(f"{origin}_") if origin else column, origin
-
-
 def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", **more: Any) -> Dataset:
     """Make a dataset from a table whose headings carry their units.
 
@@ -118,7 +109,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     for heading in map(str, frame.columns):
         if heading == "flags":
             continue
-        column, origin = _of_heading(heading)
+        prefix = next((f"{o}_" for o in ORIGINS if heading.startswith(f"u_{o}_")), "")
+        column = heading.removeprefix("u_").removeprefix(prefix)
         base, unit = units.split_suffix(column)
         scale, offset, channel = 1.0, 0.0, column
         named = column == "rpm" or column in DIMENSIONLESS
@@ -136,8 +128,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
             continue
         if heading == column:
             values[channel] = numbers * scale + offset
-        elif origin:
-            u_by.setdefault(origin, {})[channel] = numbers * scale
+        elif prefix:
+            u_by.setdefault(prefix[:-1], {})[channel] = numbers * scale
         else:
             u[channel] = numbers * scale
     refuse(faults)

@@ -152,8 +152,7 @@ class Dataset:
         unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
         object.__setattr__(self, "u", MappingProxyType({key: u.get(key, unknown) for key in values}))
-        flags = self.flags if {*map(type, self.flags)} <= {tuple} else (tuple(f) for f in self.flags)
-        object.__setattr__(self, "flags", tuple(flags) or ((),) * n)
+        object.__setattr__(self, "flags", tuple(map(tuple, self.flags)) or ((),) * n)
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
         by = {origin: MappingProxyType(u_by[origin]) for origin in ORIGINS if u_by.get(origin)}

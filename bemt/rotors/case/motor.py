@@ -13,7 +13,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -133,7 +133,14 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
     except ImportError:
         hint = 'Install it: pip install "bemt[motors]"'
         raise InputError(Fault(where, "", repr(name), "the list of motors, setuav-pythrust", hint)) from None
-    found = _motors_with(name, Path(dataset_dir()) / "motors")
+    words, found = [word for word in _words(name) if len(word) > 1], []
+    for file in sorted((Path(dataset_dir()) / "motors").glob("*.json")):
+        stem = _words(file.stem)
+        numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
+        if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):
+            one = json.loads(file.read_text(encoding="utf-8"))
+            if all(abs(float(w) / float(one["kv"]) - 1.0) < 0.02 for w in numbers):
+                found.append((len(stem), one))
     fewest = [one for size, one in found if size == min(n for n, _ in found)]
     if len(fewest) != 1:
         names = ", ".join(f"{one['manufacturer']} {one['name']}" for _, one in found[:8])
@@ -148,19 +155,6 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
     source = f"setuav-pythrust {__version__} (Karakaya, Apache-2.0), makers' numbers: {one['id']}"
     label = f"{one['manufacturer']} {one['name']}"
     return NamedMotor(label, float(one["kv"]), number("resistance", 1e3), number("io"), number("weight_g"), source)
-
-
-def _motors_with(name: str, folder: Path) -> list[tuple[int, dict[str, Any]]]:
-    """Motors that have all words of a name, each behind how many words its own has."""
-    words, found = [word for word in _words(name) if len(word) > 1], list[tuple[int, dict[str, Any]]]()
-    for file in sorted(folder.glob("*.json")) if words else ():
-        stem = _words(file.stem)
-        numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
-        if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):
-            one = json.loads(file.read_text(encoding="utf-8"))
-            if all(abs(float(w) / float(one["kv"]) - 1.0) < 0.02 for w in numbers):
-                found.append((len(stem), one))
-    return found
 
 
 def _words(name: str) -> set[str]:

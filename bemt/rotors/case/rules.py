@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -222,7 +222,11 @@ def _check_section(out: Collector, section: SectionTable) -> None:
     for key, count in lists.items():
         if count != len(radii):
             out.add(f"blade.section.{key}", f"a list of {count}", f"as many values as r_over_R has, {len(radii)}")
-    _check_naca(out, section.naca or ())
+    names = section.naca or ()
+    for name in (names,) if isinstance(names, str) else names:
+        if not re.fullmatch(r"\d{4,5}", name):
+            hint = "Leave the word NACA out" if name.upper().startswith("NACA") else ""
+            out.add("blade.section.naca", repr(name), "four or five digits, such as 4412 or 23012", hint)
     if any(b <= a for a, b in zip(radii, radii[1:], strict=False)):
         out.add("blade.section.r_over_R", "radii that do not ascend", "ascending radii")
     if radii and not lists:
@@ -230,15 +234,7 @@ def _check_section(out: Collector, section: SectionTable) -> None:
         out.add("blade.section.r_over_R", got, expected)
     for key in ("camber", "camber_position"):
         if key in stated and "thickness" not in stated:
-            value = [*stated[key]] if isinstance(stated[key], tuple) else stated[key]
-            out.add(f"blade.section.{key}", shown(value), "nothing without thickness")
-
-
-def _check_naca(out: Collector, names: str | Sequence[str]) -> None:
-    for name in (names,) if isinstance(names, str) else names:
-        if not re.fullmatch(r"\d{4,5}", name):
-            hint = "Leave the word NACA out" if name.upper().startswith("NACA") else ""
-            out.add("blade.section.naca", repr(name), "four or five digits, such as 4412 or 23012", hint)
+            out.add(f"blade.section.{key}", shown(stated[key]), "nothing without thickness")
 
 
 def _check_axial(out: Collector, case: CaseFile, what: str, why: str) -> None:

@@ -228,13 +228,6 @@ def text(doc: Validation) -> str:
 SCHEMA = "bemt.validation/1"
 
 
-def _zero_thrust(rows: Sequence[ValidatedRotor]) -> ZeroThrustErrors:
-    J0 = np.array([[r.J0, r.J0_bemt] for r in rows]).reshape(-1, 2)
-    J0 = J0[np.isfinite(J0).all(axis=1) & (J0 != 0.0).all(axis=1)]
-    zero = statistics(J0[:, 1] / J0[:, 0] - 1.0)
-    return ZeroThrustErrors(zero.median_abs, zero.p90_abs, zero.bias, propellers=len(J0))
-
-
 def validate(
     folder: Path | Sequence[Path], effects: Sequence[Effect] | None = None, fixed_re: float | None = None,
     progress: Callable[[str], None] | None = None, match_J0: bool = False, as_drawn: bool = False,
@@ -250,6 +243,7 @@ def validate(
     rows: list[ValidatedRotor] = []
     pool, drawn, turned = Pool(), Pool(), Pool()
     shifts: list[float] = []
+    pairs: list[tuple[float, float]] = []  # J0 measured and of bemt
     unconverged = 0
     for i, (p, stations) in enumerate(found.propellers):
         if progress:
@@ -269,15 +263,19 @@ def validate(
             at = turned.add(fit[1])
             shifted = ShiftedErrors(at.static, at.forward, fit[0])
             shifts.append(fit[0])
+        pairs.append((points.J0, points.J0_bemt))
         rows.append(ValidatedRotor(
             own.static, own.forward, p.name, p.family, p.diameter_in, p.pitch_in, p.blades,
             p.geometry.origin if p.geometry is not None else "apc_pe0", points.J0, points.J0_bemt, as_given, shifted,
         ))  # fmt: skip
+    J0 = np.reshape(pairs, (-1, 2))
+    J0 = J0[np.isfinite(J0).all(axis=1) & (J0 != 0.0).all(axis=1)]
+    zero = statistics(J0[:, 1] / J0[:, 0] - 1.0)
     spread = tuple(np.quantile(shifts, (0.1, 0.5, 0.9)).tolist()) if shifts else None
     whole, again = pool.total(), turned.total()
     return Validation(
         whole.static, whole.forward, " ".join(f.name for f in folders), J_SHARE,
-        _zero_thrust(rows), unconverged,
+        ZeroThrustErrors(zero.median_abs, zero.p90_abs, zero.bias, propellers=len(J0)), unconverged,
         tuple(e.describe() for e in eff), SectionRule(section_rule.N_CRIT, section_rule.DRAG_LEVEL, fixed_re),
         tuple(rows), tuple(Skipped(name, why) for name, why in found.skipped), tuple(found.faults),
         drawn.total() if built else None, dict(population().provenance) if built else None,
