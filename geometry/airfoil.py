@@ -332,6 +332,19 @@ def _numbers(text: str, faults: Faults) -> tuple[str, list[tuple[int, float, flo
     return title, rows
 
 
+def _from_tail(points: Array, upper: int | None) -> Array:
+    """Points in Selig order, around the section from its tail; `upper` is the Lednicer count of the first side."""
+    if upper is None and points[0, 0] >= 0.5 * points[:, 0].max():
+        return points
+    fall = np.diff(points[:, 0])
+    if upper is None and fall.min() > -0.5:  # a loop that starts at the nose
+        cut = int(np.argmax(points[:, 0]))
+        return np.vstack([points[cut:], points[: cut + 1]])
+    # Lednicer; without counts the second side starts where x falls back to the nose
+    cut = upper if upper is not None else int(np.argmin(fall)) + 1
+    return np.vstack([points[:cut][::-1], points[cut:]])
+
+
 def parse_dat(text: str, name: str = "") -> Airfoil:
     r"""Read a section file in Selig or Lednicer form.
 
@@ -361,14 +374,7 @@ def parse_dat(text: str, name: str = "") -> Airfoil:
         got = f"x from {points[:, 0].min():g} to {points[:, 0].max():g}"
         faults.add("section file", got, "x from 0 to 1 (unit chord)", hint)
     faults.check()
-    if counts is not None or points[0, 0] < 0.5 * points[:, 0].max():
-        fall = np.diff(points[:, 0])
-        if counts is None and fall.min() > -0.5:  # a loop that starts at the nose
-            cut = int(np.argmax(points[:, 0]))
-            points = np.vstack([points[cut:], points[: cut + 1]])
-        else:  # Lednicer; without counts the second side starts where x falls back to the nose
-            cut = counts[0] if counts is not None else int(np.argmin(fall)) + 1
-            points = np.vstack([points[:cut][::-1], points[cut:]])
+    points = _from_tail(points, counts[0] if counts is not None else None)
     points = points[np.concatenate([[True], np.abs(np.diff(points, axis=0)).max(axis=1) > 1e-9])]
     x, y = points.T
     if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:

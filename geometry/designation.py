@@ -98,13 +98,9 @@ def parse_designation(text: str, blades_told: int | None = None) -> Designation:
     plain = _INCHES.sub("", re.sub(r"(?<=\d)\s+by\s+(?=\d)", "x", text.strip(), flags=re.IGNORECASE)).strip()
     plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
     in_words = _BLADES.search(plain)
-    plain = _BLADES.sub(" ", plain, 1).strip() if in_words else plain
-    sizes = list(_SIZE.finditer(plain))
-    named = sizes or list(_DIGITS.finditer(plain))
-    if len({match[0].casefold() for match in named}) != 1:
-        got = " and ".join(match[0] for match in named) + ", several sizes" if named else "unreadable text"
-        raise GeometryError([(where, got, _EXPECTED, "" if sizes else _meant(plain))])
-    match = named[-1]
+    plain = _BLADES.sub(" ", plain, 1).strip()
+    named = _sizes(plain, where)
+    match, in_digits = named[-1], named[-1].re is _DIGITS
     before, after = plain[: named[0].start()].strip(" -_("), plain[match.end() :]
     count = re.search(r"-\s*B?(\d)$", after, re.IGNORECASE)  # 5152S-3
     after = after[: count.start()] if count else after
@@ -113,17 +109,33 @@ def parse_designation(text: str, blades_told: int | None = None) -> Designation:
     suffix = _Suffix.read(after, where)
     maker, letters = _maker(before)
     kind = suffix.kind or letters.kind or blade_class(f"{maker} {suffix.words}")
-    if sizes:
+    if not in_digits:
         D, pitch = _sized(match[1], match[2], where, blades)
     else:
         D, pitch = _from_digits(match["digits"], where, bool(blades or kind == "fpv"))
-        if blades is None and D <= _FPV_LARGEST and (glued := re.search(r"(?:^|[\s-])([TQ])-?$", before)):
-            blades = {"T": 3, "Q": 4}[glued[1]]  # T5143S: makers' mark of three blades
-        blades = 3 if blades is None and len(match["digits"]) == 5 and D <= _FPV_LARGEST else blades
-    if kind is None and D <= _FPV_LARGEST and (not sizes or (blades or blades_told or 2) > 2):
+        if blades is None and D <= _FPV_LARGEST:
+            blades = _fpv_blades(before, match["digits"])
+    if kind is None and D <= _FPV_LARGEST and (in_digits or (blades or blades_told or 2) > 2):
         kind = "fpv"
     maker = f"{maker} {suffix.words}".strip()
     return Designation(D, pitch, blades, kind, maker, suffix.reverse, suffix.width or letters.width)
+
+
+def _sizes(plain: str, where: str) -> list[re.Match[str]]:
+    """Where a label states its size: with an x, else in digits; it may repeat it, but not state another."""
+    sizes = list(_SIZE.finditer(plain))
+    named = sizes or list(_DIGITS.finditer(plain))
+    if len({match[0].casefold() for match in named}) != 1:
+        got = " and ".join(match[0] for match in named) + ", several sizes" if named else "unreadable text"
+        raise GeometryError([(where, got, _EXPECTED, "" if sizes else _meant(plain))])
+    return named
+
+
+def _fpv_blades(before: str, digits: str) -> int | None:
+    """Blades of an FPV propeller whose label does not count them: T5143S has the makers' mark of three."""
+    if glued := re.search(r"(?:^|[\s-])([TQ])-?$", before):
+        return {"T": 3, "Q": 4}[glued[1]]
+    return 3 if len(digits) == 5 else None
 
 
 @dataclass(frozen=True)

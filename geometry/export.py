@@ -56,18 +56,7 @@ def export(
         files: list[dict[str, Any]] = []
         volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
         for word in dict.fromkeys(formats):
-            if word in ("step", "flow"):
-                from geometry.cad import kernel
-
-                with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
-                    files.append(_step(rotor, duct, work, name, unit, model, volumes) if word == "step"
-                                 else _flow(rotor, duct, work, name, unit, model))  # fmt: skip
-            elif word == "openfoam":
-                files += _openfoam(model, work)
-            elif word == "3mf":
-                files.append(_three_mf(model, work, name))
-            else:
-                files.append(_meshes(model, work, name, word, unit))
+            files += _written(word, rotor, duct, work, name, unit, model, volumes)
         for item in files:
             data = (work / item["path"]).read_bytes()
             item |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
@@ -92,6 +81,25 @@ def export(
         raise
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def _written(
+    word: str, rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel,
+    volumes: dict[str, Any],
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Write one format; its files as the manifest lists them."""
+    if word == "openfoam":
+        return _openfoam(model, work)
+    if word == "3mf":
+        return [_three_mf(model, work, name)]
+    if word not in ("step", "flow"):
+        return [_meshes(model, work, name, word, unit)]
+    from geometry.cad import kernel
+
+    with kernel(word, "a solid that it makes", "Use stl, obj, 3mf or openfoam, which need no kernel"):
+        made = (_step(rotor, duct, work, name, unit, model, volumes) if word == "step"
+                else _flow(rotor, duct, work, name, unit, model))  # fmt: skip
+    return [made]
 
 
 def _rounded(value: Any) -> Any:

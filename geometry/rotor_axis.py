@@ -400,9 +400,11 @@ def pick(points: Array, faces: Faces) -> tuple[Faces, int, float, Array, Array, 
     chosen, note = faces, ""
     for candidate, text in options:
         row = _best_axis(points, candidate)
-        if row[1] and _is_vane(points, candidate, row[2], row[3]):
+        if not row[1]:
+            continue
+        if _is_vane(points, candidate, row[2], row[3]):
             row = (row[0] + 0.4, *row[1:])
-        if row[1] and (best is None or row[0] < 0.5 * best[0]):
+        if best is None or row[0] < 0.5 * best[0]:
             best, chosen, note = row, candidate, text
             if row[0] < 0.02:
                 break

@@ -93,16 +93,7 @@ def time_steps(time: ArrayLike) -> Array:
     return np.concatenate([[0.0 if t[0] == 0.0 else min(dt[0], t[0]) if t[0] > 0 else dt[0]], dt])
 
 
-def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolutions: int | None = None) -> Average:
-    """Average over the last whole revolutions, by time.
-
-    >>> import numpy as np
-    >>> t = np.cumsum(np.where(np.arange(900) < 300, 0.004, 0.002))          # the step halves at 1.2 s
-    >>> a = revolution_average(t, 5.0 + np.cos(2 * np.pi * t / 0.5) + 0.2 * np.exp(-t / 0.1), period=0.5)
-    >>> round(a.mean, 4), a.revolutions, a.rows, abs(a.drift) < 1e-4
-    (5.0, 2, 500, True)
-    """
-    t, v = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
+def _check_history(t: Array, v: Array, period: float, revolutions: int | None) -> None:
     faults = []
     if not (math.isfinite(period) and period > 0.0):
         faults.append(Fault("", "period", f"{period:g}", "a positive time in seconds"))
@@ -113,6 +104,19 @@ def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolu
     elif t.size and not (np.all(np.isfinite(t)) and np.all(np.diff(t) > 0.0)):
         faults.append(Fault("", "time", "times that do not ascend", "strictly ascending times", "Use keep_last first"))
     refuse(faults)
+
+
+def revolution_average(time: ArrayLike, values: ArrayLike, period: float, revolutions: int | None = None) -> Average:
+    """Average over the last whole revolutions, by time.
+
+    >>> import numpy as np
+    >>> t = np.cumsum(np.where(np.arange(900) < 300, 0.004, 0.002))          # the step halves at 1.2 s
+    >>> a = revolution_average(t, 5.0 + np.cos(2 * np.pi * t / 0.5) + 0.2 * np.exp(-t / 0.1), period=0.5)
+    >>> round(a.mean, 4), a.revolutions, a.rows, abs(a.drift) < 1e-4
+    (5.0, 2, 500, True)
+    """
+    t, v = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
+    _check_history(t, v, period, revolutions)
     none = Average(None, 0, 0, math.nan, math.nan)
     if t.size < 2:
         return replace(none, problem=f"{number_of(t.size, 'row')}: no revolution")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cache
 from types import NoneType, UnionType
@@ -93,18 +94,19 @@ def _each(kind: Any, found: Iterable[tuple[Any, Any]], lenient: bool) -> Iterato
                 raise
 
 
+def _is_plain(kind: type, value: Any) -> bool:
+    """Whether a value is of a plain type: a whole number is also a float, true and false are no numbers."""
+    if kind in (int, float) and isinstance(value, bool):
+        return False
+    return isinstance(value, int | float if kind is float else kind)
+
+
 def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
     """Value of a document as its type says; TypeError where it is another."""
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, UnionType):
-        if value is None and NoneType in inner and float not in inner:
-            return None
-        for one in inner:
-            try:
-                return typed(one, value, lenient)
-            except TypeError:
-                continue
-    elif kind is float and value is None:
+        return _of_union(kind, value, lenient)
+    if kind is float and value is None:
         return math.nan
     elif kind is Any or (origin is Literal and value in inner):
         return value
@@ -116,7 +118,21 @@ def typed(kind: Any, value: Any, lenient: bool = False) -> Any:
         return {str(key): item for key, item in _each(inner[1], value.items(), lenient)}
     elif origin is None and issubclass(kind, Documented):
         return kind.from_document(value, lenient)
-    elif origin is None and isinstance(value, int | float if kind is float else kind):
-        if kind not in (int, float) or not isinstance(value, bool):
-            return value
-    raise TypeError(f"got {value!r:.80}; expected {getattr(kind, '__name__', kind)}")
+    elif origin is None and _is_plain(kind, value):
+        return value
+    raise _another(kind, value)
+
+
+def _of_union(kind: Any, value: Any, lenient: bool) -> Any:
+    """Value of the first type of a union that it is of."""
+    inner = get_args(kind)
+    if value is None and NoneType in inner and float not in inner:
+        return None
+    for one in inner:
+        with suppress(TypeError):
+            return typed(one, value, lenient)
+    raise _another(kind, value)
+
+
+def _another(kind: Any, value: Any) -> TypeError:
+    return TypeError(f"got {value!r:.80}; expected {getattr(kind, '__name__', kind)}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -208,15 +208,21 @@ def expected(kind: Any, limits: FieldLimits, name: str = "") -> str:
     models = list(_models(kind))
     if models:
         return f"tables [[{name}]]" if lists else f"a table [{name}]"
-    one = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}.get(first or NoneType, "")
+    one = {str: "a text", bool: "true or false", int: "a whole number", float: "a number"}.get(first, "")
     many = {str: "a list of texts", float: "a list of numbers"}.get(lists[0], "a list") if lists else ""
     if first is str and not many:
         return "a text that is not empty"
-    noun = " or ".join(word for word in (one, many) if word)
-    if math.isfinite(limits.low):
-        finite = math.isfinite(limits.high)
-        noun += f" from {limits.low:g} to {limits.high:g}" if finite else f" of {limits.low:g} or more"
-    return noun + (f" {limits.unit}" if limits.unit else "")
+    return " or ".join(word for word in (one, many) if word) + _within(limits)
+
+
+def _within(limits: FieldLimits) -> str:
+    """Range and unit of a number, in words that follow it."""
+    unit = f" {limits.unit}" if limits.unit else ""
+    if not math.isfinite(limits.low):
+        return unit
+    if math.isfinite(limits.high):
+        return f" from {limits.low:g} to {limits.high:g}{unit}"
+    return f" of {limits.low:g} or more{unit}"
 
 
 def shown(value: Any) -> str:
@@ -244,13 +250,7 @@ def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
     """How to repair a value that is not what its field holds."""
     parts, name = _parts(kind), where.rpartition(".")[2]
     if isinstance(value, str):
-        choices = limits.choices or next((get_args(k) for k in parts if get_origin(k) is Literal), ())
-        if choices:
-            return (limits.suspect(value) if limits.suspect else "") or _did_you_mean(value, choices)
-        if not {int, float} & set(parts):
-            return ""
-        told = unit_hint(name, value)
-        return "Drop the quotes" if _quoted_number(value) else told[1] if told else ""
+        return _text_hint(name, value, parts, limits)
     if isinstance(value, Mapping) and next(_models(parts[0]), None) and get_origin(parts[0]) is tuple:
         return f"Write [[{name}]] with two brackets"
     if not _is_number(value) or not math.isfinite(value):
@@ -265,6 +265,15 @@ def _hint(where: str, value: Any, kind: Any, limits: FieldLimits) -> str:
     if limits.unit == "mm" and where.endswith("_mm") and low <= value * 1e3 <= high and value < 1.0:
         return "In m? Times 1000"
     return ""
+
+
+def _text_hint(name: str, value: str, parts: Sequence[Any], limits: FieldLimits) -> str:
+    if choices := limits.choices or next((get_args(k) for k in parts if get_origin(k) is Literal), ()):
+        return (limits.suspect(value) if limits.suspect else "") or _did_you_mean(value, choices)
+    if not {int, float} & set(parts):
+        return ""
+    told = unit_hint(name, value)
+    return "Drop the quotes" if _quoted_number(value) else told[1] if told else ""
 
 
 def _parts(kind: Any) -> tuple[Any, ...]:

@@ -182,6 +182,22 @@ def _density(c: Mapping[str, Array], i: int) -> float:
     return Air.from_state(p, float(celsius)).rho
 
 
+def _groups(
+    names: Sequence[str], D: Array, pitch: Array, B: Array, duct: Array
+) -> tuple[dict[tuple[Any, ...], list[int]], int]:
+    """Rows of each propeller, by name, diameter, pitch, blades and whether it is in a duct; how many rows have none."""
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    bad = 0
+    for i, name in enumerate(names):
+        values = (D[i], pitch[i], B[i])
+        if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
+            bad += 1
+            continue
+        key = (name, *values, bool(duct[i] > 0))
+        groups.setdefault(key, []).append(i)
+    return groups, bad
+
+
 def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list[str]]:
     """Any table with the columns of the module notes."""
     N, constants = len(found), found.provenance.get("constants", {})
@@ -219,15 +235,7 @@ def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list
         notes.append(f"{path}: no column blades, 2 assumed")
     duct = np.zeros(N) if duct is None else duct
     names = found.texts.get("name") or found.texts.get("propeller") or (path.stem,) * N
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    bad = 0
-    for i in range(N):
-        values = (D[i], pitch[i], B[i])
-        if not (all(np.isfinite(v) and v > 0 for v in values) and B[i] == round(B[i])):
-            bad += 1
-            continue
-        key = (names[i], *values, bool(duct[i] > 0))
-        groups.setdefault(key, []).append(i)
+    groups, bad = _groups(names, D, pitch, B, duct)
     rows: list[Rows] = []
     for (name, d, p, b, inside), at in groups.items():
         maker = str(name).split("_")[0].split(" ")[0]

@@ -450,6 +450,19 @@ class Propeller:
         return file
 
 
+def _size_faults(told: Mapping[str, tuple[float, float]], label: str | None) -> list[Fault]:
+    """What is wrong with diameters by key: value and its unit. [m]"""
+    faults = []
+    for key, (value, unit) in told.items():
+        if not 0.01 <= value * unit <= 10.0:
+            hint = "Is that in mm? Divide by 1000" if unit == 1.0 and 10.0 < value <= 1e4 else ""
+            ends = f"{0.01 / unit:.4g} to {10.0 / unit:.4g} {key.partition('_')[2]}"
+            faults.append(Fault("", key, f"{value:g}", ends, hint))
+        if label is not None:
+            faults.append(Fault("", key, f"{value:g}", "nothing, because the label states it"))
+    return faults
+
+
 @worded
 def propeller(
     label: str | None = None, *, stations: str | os.PathLike[str] | None = None, diameter_m: float | None = None,
@@ -512,13 +525,7 @@ def propeller(
         stations = path_text("stations", stations)
     rpm = None if rpm is None else number("rpm", rpm)
     airspeed_m_s = number("airspeed_m_s", airspeed_m_s)
-    for key, (value, unit) in told.items():
-        if not 0.01 <= value * unit <= 10.0:
-            hint = "Is that in mm? Divide by 1000" if unit == 1.0 and 10.0 < value <= 1e4 else ""
-            ends = f"{0.01 / unit:.4g} to {10.0 / unit:.4g} {key.partition('_')[2]}"
-            faults.append(Fault("", key, f"{value:g}", ends, hint))
-        if label is not None:
-            faults.append(Fault("", key, f"{value:g}", "nothing, because the label states it"))
+    faults += _size_faults(told, label)
     refuse(faults)
     if label is not None:
         text = fresh.label_text(label, blades, rpm, airspeed_m_s)

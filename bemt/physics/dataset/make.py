@@ -109,9 +109,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
     for heading in map(str, frame.columns):
         if heading == "flags":
             continue
-        column = heading.removeprefix("u_") if heading.startswith("u_") else heading
-        origin = next((o for o in ORIGINS if column.startswith(f"{o}_") and heading.startswith("u_")), "")
-        column = column.removeprefix(f"{origin}_") if origin else column
+        prefix = next((f"{o}_" for o in ORIGINS if heading.startswith(f"u_{o}_")), "")
+        column = heading.removeprefix("u_").removeprefix(prefix)
         base, unit = units.split_suffix(column)
         scale, offset, channel = 1.0, 0.0, column
         named = column == "rpm" or column in DIMENSIONLESS
@@ -129,8 +128,8 @@ def from_pandas(frame: pd.DataFrame, kind: str = "bench", name: str = "table", *
             continue
         if heading == column:
             values[channel] = numbers * scale + offset
-        elif origin:
-            u_by.setdefault(origin, {})[channel] = numbers * scale
+        elif prefix:
+            u_by.setdefault(prefix[:-1], {})[channel] = numbers * scale
         else:
             u[channel] = numbers * scale
     refuse(faults)

@@ -59,6 +59,10 @@ def _frozen(array: ArrayLike) -> Array:
 _UNKNOWN = _frozen(np.nan)
 
 
+def _root_sums(parts: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
+    return {key: _frozen(np.sqrt(np.sum(np.square(each), axis=0))) for key, each in parts.items() if each}
+
+
 @dataclass(frozen=True, eq=False)
 class Dataset:
     """N points of one source: channels, uncertainties by origin, provenance.
@@ -141,18 +145,14 @@ class Dataset:
         u_by = {origin: checked(f"u_by.{origin}", parts) for origin, parts in self.u_by.items()}
         for origin in u_by.keys() - set(ORIGINS):
             found.append((f"u_by.{origin}", "an unknown origin", f"one of {', '.join(ORIGINS)}", ""))
-        for key in values.keys() - u.keys():
-            parts = [part[key] for part in u_by.values() if key in part]
-            if parts:
-                u[key] = _frozen(np.sqrt(np.sum(np.square(parts), axis=0)))
+        u |= _root_sums({key: [part[key] for part in u_by.values() if key in part] for key in values.keys() - u.keys()})
         if found:
             file = str(self.provenance.get("file", "")) or self.name
             raise InputError([Fault(file, *fault) for fault in found])
         unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
         object.__setattr__(self, "u", MappingProxyType({key: u.get(key, unknown) for key in values}))
-        flags = self.flags if {*map(type, self.flags)} <= {tuple} else (tuple(f) for f in self.flags)
-        object.__setattr__(self, "flags", tuple(flags) or ((),) * n)
+        object.__setattr__(self, "flags", tuple(map(tuple, self.flags)) or ((),) * n)
         object.__setattr__(self, "labels", tuple(self.labels))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
         by = {origin: MappingProxyType(u_by[origin]) for origin in ORIGINS if u_by.get(origin)}

@@ -113,13 +113,14 @@ def _of_label(
     measured_pitch_in: float | None, series: str | None, density: float | None, reading: str | None,
 ) -> RotorEstimate:  # fmt: skip
     told, faults = _label(label, blades)
-    D = told.diameter_in * INCH if told else math.nan
     lengths = (("--chord-mm", chord_mm, "mm", "chord"), ("--measured-pitch-in", measured_pitch_in, "in", "pitch"))
     for option, value, unit, name in lengths:
-        if value is not None and not math.isfinite(value):
+        if value is None:
+            continue
+        if not math.isfinite(value):
             faults.append(Fault(option, "", f"{value:g}", f"a length [{unit}]"))
-        elif value is not None and told:
-            faults += length_fault(option, value, unit, D, POSSIBLE[name])
+        elif told:
+            faults += length_fault(option, value, unit, told.diameter_in * INCH, POSSIBLE[name])
     if density is not None and not DENSITY[0] <= density <= DENSITY[1]:
         hint = "In g/m3? Divide by 1000" if 10.0 < density < 2000.0 else ""
         faults.append(Fault("--density-kg-m3", "", f"{density:g}", "0.01 to 10 kg/m3", hint))
@@ -134,12 +135,10 @@ def _of_label(
         for value in values
         if not low <= value <= high
     ]
-    if series is not None:
-        with gathered(faults):
-            find_family(series)
-    if reading is not None:
-        with gathered(faults):
-            parse_reading(reading)
+    for stated, check in ((series, find_family), (reading, parse_reading)):
+        if stated is not None:
+            with gathered(faults):
+                check(stated)
     if faults or told is None:
         raise InputError(faults)
     case = case_of_label(label, blades, chord_mm, measured_pitch_in, series, density, reading)
@@ -153,7 +152,7 @@ def _of_label(
         "u95_power_W": found.half_width95("power_W"), "u_reading_thrust_N": found.u_reading("thrust_N"),
         "u_reading_power_W": found.u_reading("power_W"), "J": points.J, "CT": points.CT, "CP": points.CP,
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
-        "H_force_N": points["H_force_N"] if "H_force_N" in points else np.where(points.converged, 0.0, np.nan),
+        "H_force_N": points.values.get("H_force_N", np.where(points.converged, 0.0, np.nan)),
     }  # fmt: skip
     given = {"label": label, "diameter_in": told.diameter_in, "pitch_in": told.pitch_in, "blades": told.blades,
              "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,

@@ -134,7 +134,7 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
         hint = 'Install it: pip install "bemt[motors]"'
         raise InputError(Fault(where, "", repr(name), "the list of motors, setuav-pythrust", hint)) from None
     words, found = [word for word in _words(name) if len(word) > 1], []
-    for file in sorted((Path(dataset_dir()) / "motors").glob("*.json")) if words else ():
+    for file in sorted((Path(dataset_dir()) / "motors").glob("*.json")):
         stem = _words(file.stem)
         numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
         if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):

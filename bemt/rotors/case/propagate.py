@@ -10,7 +10,7 @@ far measured rotors of such a description are from the solver (`bemt.rotors`), w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -244,6 +244,11 @@ def _unknowns_of_second(case: Case) -> tuple[Assumption, ...]:
     return tuple(item for item in case.second().assumptions if not item.key.startswith(shared))
 
 
+def _flagged(flags: Iterable[tuple[str, ...]], where: Array, word: str) -> tuple[tuple[str, ...], ...]:
+    """Flags of each point, with one more where it holds."""
+    return tuple((*f, word) if holds else f for f, holds in zip(flags, where, strict=True))
+
+
 def propagate(
     case: Case, rpm: ArrayLike | None = None, airspeed_m_s: ArrayLike | None = None,
     density_kg_m3: ArrayLike | None = None, *, angle_deg: ArrayLike | None = None,
@@ -295,8 +300,7 @@ def propagate(
         words = error.words
     else:
         factor, words = validity_of(case, beside.J, beside.Re75, beside.M_tip)
-    turned = (((_UNMEASURED,) if one else ()) for one in skewed)
-    flags = tuple((*a, *b, *c) for a, b, c in zip(found.flags, words, turned, strict=True))
+    flags = _flagged(((*a, *b) for a, b in zip(found.flags, words, strict=True)), skewed, _UNMEASURED)
     nominal = channels(found)
     if not bands:
         nothing = {key: np.full(len(found), np.nan) for key in nominal}
@@ -315,8 +319,7 @@ def propagate(
     answer = replace(found, u={}, u_by=parts)
     stand = _of_stand(case, found, model.upper.diameter_m if isinstance(model, PairModel) else model.diameter_m)
     lost = found.converged & np.isnan(answer.u["thrust_N"])
-    why = ("unconverged somewhere in the range of the assumptions: u unknown",)
-    flags = tuple((*f, *(why if bad else ())) for f, bad in zip(flags, lost, strict=True))
+    flags = _flagged(flags, lost, "unconverged somewhere in the range of the assumptions: u unknown")
     return Propagated(replace(answer, flags=flags), nominal, moved, refined, model, wide, stand)
 
 

@@ -14,7 +14,7 @@ from bemt.base.given import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.rotors.case.reading import parse_reading
-from bemt.rotors.case.schema import GROUPS, INCH, AsBuiltTable, CaseFile, SectionTable
+from bemt.rotors.case.schema import GROUPS, INCH, AsBuiltTable, BladeTable, CaseFile, SectionTable
 from bemt.rotors.measured import records
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
@@ -150,6 +150,13 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         for key in (*pitches, *_given(blade, "max_chord_over_R", "taper", "pitch_law", "tip_relief")):
             hint = "Use beta_offset_deg to turn the blade" if key in pitches else ""
             out.add(f"blade.{key}", shown(getattr(blade, key)), f"nothing, because {source} gives it", hint)
+    _check_as_built(out, blade)
+    if blade.section is not None:
+        _check_section(out, blade.section)
+
+
+def _check_as_built(out: Collector, blade: BladeTable) -> None:
+    """Check that what tells of the rotor as built goes together."""
     told = AsBuiltTable() if blade.as_built is None else blade.as_built
     measured, posterior = told.measured, told.file is not None or (told.reading is not None and told.measured is None)
     if (blade.known_from == "reference") != posterior:
@@ -171,8 +178,6 @@ def _check_blade(out: Collector, case: CaseFile) -> None:
         close = difflib.get_close_matches(measured, records(), n=1)
         out.add("blade.as_built.measured", repr(measured), "a measured propeller that bemt knows",
                 f"Did you mean {close[0]}?" if close else "")  # fmt: skip
-    if blade.section is not None:
-        _check_section(out, blade.section)
 
 
 def _check_pitch(out: Collector, case: CaseFile) -> None:
@@ -229,8 +234,7 @@ def _check_section(out: Collector, section: SectionTable) -> None:
         out.add("blade.section.r_over_R", got, expected)
     for key in ("camber", "camber_position"):
         if key in stated and "thickness" not in stated:
-            value = [*stated[key]] if isinstance(stated[key], tuple) else stated[key]
-            out.add(f"blade.section.{key}", shown(value), "nothing without thickness")
+            out.add(f"blade.section.{key}", shown(stated[key]), "nothing without thickness")
 
 
 def _check_axial(out: Collector, case: CaseFile, what: str, why: str) -> None:

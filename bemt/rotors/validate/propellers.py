@@ -172,8 +172,8 @@ def _coverage_lines(doc: Validation) -> list[str]:
     return out
 
 
-def text(doc: Validation) -> str:
-    """Table for people."""
+def _table(doc: Validation) -> list[str]:
+    """Errors of each propeller and of all together."""
     head = f"{'':24} {'J0':>6} {'bemt':>6}"
     for kind in ("static", "forward"):
         for q in ("CT", "CP"):
@@ -184,10 +184,16 @@ def text(doc: Validation) -> str:
         j = [f"{J:6.3f}" if math.isfinite(J) else f"{'-':>6}" for J in (r.J0, r.J0_bemt)]
         lines.append(f"{r.name[:24]:24} {j[0]} {j[1]}{_percents(r)}")
     totals: list[tuple[str, ErrorTotals]] = [("all points", doc)]
-    drawn, turned, z, p = doc.as_drawn, doc.matched_J0, doc.zero_thrust_J, doc.polar
+    drawn, turned = doc.as_drawn, doc.matched_J0
     totals += [("stations as given", drawn)] if drawn else []
     totals += [(f"turned to measured J0, {turned.propellers}", turned)] if turned and turned.propellers else []
     lines += ["-" * len(sub), *(f"{name:38}{_percents(found)}" for name, found in totals)]
+    return lines
+
+
+def text(doc: Validation) -> str:
+    """Table for people."""
+    lines, drawn, turned, z, p = _table(doc), doc.as_drawn, doc.matched_J0, doc.zero_thrust_J, doc.polar
     lines += ["", *_coverage_lines(doc)] if drawn else []
     mine = [r.name for r in doc.propellers if r.name in records()]
     if drawn and mine:
@@ -237,6 +243,7 @@ def validate(
     rows: list[ValidatedRotor] = []
     pool, drawn, turned = Pool(), Pool(), Pool()
     shifts: list[float] = []
+    pairs: list[tuple[float, float]] = []  # J0 measured and of bemt
     unconverged = 0
     for i, (p, stations) in enumerate(found.propellers):
         if progress:
@@ -256,11 +263,12 @@ def validate(
             at = turned.add(fit[1])
             shifted = ShiftedErrors(at.static, at.forward, fit[0])
             shifts.append(fit[0])
+        pairs.append((points.J0, points.J0_bemt))
         rows.append(ValidatedRotor(
             own.static, own.forward, p.name, p.family, p.diameter_in, p.pitch_in, p.blades,
             p.geometry.origin if p.geometry is not None else "apc_pe0", points.J0, points.J0_bemt, as_given, shifted,
         ))  # fmt: skip
-    J0 = np.array([[r.J0, r.J0_bemt] for r in rows]).reshape(-1, 2)
+    J0 = np.reshape(pairs, (-1, 2))
     J0 = J0[np.isfinite(J0).all(axis=1) & (J0 != 0.0).all(axis=1)]
     zero = statistics(J0[:, 1] / J0[:, 0] - 1.0)
     spread = tuple(np.quantile(shifts, (0.1, 0.5, 0.9)).tolist()) if shifts else None
