@@ -204,7 +204,7 @@ def expected(kind: Any, limits: FieldLimits, name: str = "") -> str:
     if choices:
         return ("one of " if len(choices) > 1 else "") + ", ".join(choices)
     lists = [get_args(part)[0] for part in parts if get_origin(part) is tuple]
-    first = next((part for part in parts if get_origin(part) is not tuple), None)
+    first: Any = next((part for part in parts if get_origin(part) is not tuple), None)
     models = list(_models(kind))
     if models:
         return f"tables [[{name}]]" if lists else f"a table [{name}]"
