@@ -25,7 +25,6 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_of
 from bemt.physics import coefficients as co
-from bemt.physics.dataset import tables
 from bemt.physics.dataset.channels import KINDS, ORIGINS, channel_fault, unit_in
 
 if TYPE_CHECKING:
@@ -200,6 +199,8 @@ class Dataset:
 
     def _repr_html_(self) -> str:
         """Show the points in a notebook, with standard uncertainties if known."""
+        from bemt.physics.dataset import tables
+
         return tables.to_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -401,6 +402,8 @@ class Dataset:
               rpm  thrust_N  u_thrust_N
         0  6000.0      10.0         0.1
         """
+        from bemt.physics.dataset import tables
+
         return tables.to_pandas(self)
 
     def to_xarray(self) -> xr.Dataset:
@@ -422,6 +425,8 @@ class Dataset:
         >>> x["thrust_N"].attrs["units"], x.sizes["point"]
         ('N', 1)
         """
+        from bemt.physics.dataset import tables
+
         return tables.to_xarray(self)
 
     def plot(self, x: str | None = None, y: Sequence[str] = (), ax: Any = None) -> Any:
@@ -452,6 +457,8 @@ class Dataset:
         >>> d.plot().get_xlabel()
         'rpm'
         """
+        from bemt.physics.dataset import tables
+
         return tables.plot(self, x, y, ax)
 
     def to_rows(self) -> list[dict[str, Any]]:

@@ -307,13 +307,15 @@ def _unused(given: Mapping[str, Any], formats: Sequence[str], hold: tuple[str, .
 
 def _errors_text(error: Mapping[str, Any]) -> list[str]:
     """Greatest errors: of a target of many points at rest and in flight, else of its one point."""
+    if not error:
+        return []
     parted = any(isinstance(error.get(word), dict) for word in ("thrust", "torque"))
     lines = []
     for at, words in (("at_rest", " at rest"), ("flight", ", flight included")) if parted else (("", ""),):
         worst = {w: v.get(at) if isinstance(v := error.get(w), dict) else v for w in ("thrust", "torque")}
         told = (f"{w} {'not held' if v is None else number_text(v, 3) + ' %'}" for w, v in worst.items())
         lines.append(f"  greatest error{words}: {', '.join(told)} (of {error['of']})")
-    return lines if error else []
+    return lines
 
 
 def _targets_text(manifest: Manifest, out: Path) -> list[str]:
