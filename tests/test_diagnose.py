@@ -10,7 +10,7 @@ import pytest
 from diagnosing import case, diagnose, left_out, points, recording
 
 from bemt.judge.diagnose import assemble, chain, document, figures, noise, plan, record, signatures
-from bemt.judge.loss import UNKNOWN
+from bemt.judge.explanation import UNKNOWN
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 

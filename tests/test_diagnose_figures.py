@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from bemt.base import canvas
 from bemt.judge.diagnose import chain, figures, figures_effects, fit, form, record
-from bemt.judge.loss import NONE, Explanation
+from bemt.judge.explanation import NONE, Explanation
 from bemt.physics.dataset import Dataset
 from bemt.rotors.case import load_case
 from bemt.rotors.case.prepare import prepare_case

@@ -343,7 +343,7 @@ def maker(project: Path) -> ModuleType:
 
 def test_the_diagnosis_page_says_what_the_code_does(project: Path, maker: ModuleType) -> None:
     from bemt.judge.diagnose import document, form, knowledge, plan, posterior
-    from bemt.judge.loss import Explanation
+    from bemt.judge.explanation import Explanation
 
     text = (project / "docs" / "diagnosis.md").read_text(encoding="utf-8")
     assert maker.numbers(text) == text, "run python docs/make.py"

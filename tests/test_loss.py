@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bemt.judge import loss
-from bemt.judge.loss import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 
 GAIN, ZERO, DUCT = (Explanation.of(i) for i in ("thrust_gain", "thrust_zero", "duct"))
 BOTH = Explanation.of("thrust_gain", "thrust_zero")

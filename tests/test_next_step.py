@@ -16,7 +16,7 @@ from bemt.judge.diagnose.assemble import build
 from bemt.judge.diagnose.document import text
 from bemt.judge.diagnose.problem import Part
 from bemt.judge.diagnose.record import Record, from_series
-from bemt.judge.loss import NONE, UNKNOWN
+from bemt.judge.explanation import NONE, UNKNOWN
 from bemt.physics.dataset import Dataset
 from bemt.rotors.latents import AsBuilt
 

@@ -26,7 +26,7 @@ from bemt.judge.compare.recordings import (
 )
 from bemt.judge.compare.selection import Invocation
 from bemt.judge.compare.smooth_change import Ratio
-from bemt.judge.loss import Size
+from bemt.judge.explanation import Size
 from bemt.physics.effects import catalogue
 
 AIR_OF_BOTH = "--air-a TEMPERATURE,PRESSURE --air-b TEMPERATURE,PRESSURE"

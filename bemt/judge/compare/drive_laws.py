@@ -20,7 +20,8 @@ from bemt.base.gaussian.whitening import log_density, whitener
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.matched import MatchedChannel
 from bemt.judge.compare.smooth_change import Scatter
-from bemt.judge.loss import NONE, UNKNOWN, Decision, Explanation, Sizes, decide
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Sizes
+from bemt.judge.loss import Decision, decide
 from bemt.physics.effects.base import FORM
 
 PRIOR = {"none": 0.7, "single": 0.2, "pair": 0.05, "unknown": 0.05}

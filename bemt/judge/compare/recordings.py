@@ -17,7 +17,8 @@ from bemt.base.units import ZERO_CELSIUS
 from bemt.judge.compare import smooth_change as fits
 from bemt.judge.compare.drive_laws import SUPPLY, TOLD_VOLTAGE, Judgement, Load, judge_drive, weigh
 from bemt.judge.compare.matched import DRIVE, LOADS, MatchedChannel, StandRun, advance, density_change
-from bemt.judge.loss import NONE, SECOND, Decision, Size, decide, joined, parts
+from bemt.judge.explanation import NONE, Size
+from bemt.judge.loss import SECOND, Decision, decide, joined, parts
 
 REVERSED = "thrust has the other sign in B, and its size is the same"
 """Verdict of a reversed cell, or of a rotor that is mounted or turns the other way round."""

@@ -13,7 +13,8 @@ from bemt.base.arrays import Array
 from bemt.judge.diagnose import fit as fitting
 from bemt.judge.diagnose import knowledge
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.loss import UNKNOWN, Decision, Explanation, Sizes
+from bemt.judge.explanation import UNKNOWN, Explanation, Sizes
+from bemt.judge.loss import Decision
 from bemt.physics import effects
 
 if TYPE_CHECKING:

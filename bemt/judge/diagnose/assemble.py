@@ -12,9 +12,9 @@ from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 from bemt.data.recordings.slips import Level, outlier_runs
 from bemt.judge.diagnose import repeats
+from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_of
 from bemt.judge.diagnose.noise import in_time
 from bemt.judge.diagnose.nuisance import nuisances
-from bemt.judge.diagnose.other_rotor import PLAIN, CalibratedBlade, calibrated, prior_of
 from bemt.judge.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.judge.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
 from bemt.physics import coefficients as co

@@ -19,7 +19,7 @@ from bemt.judge.diagnose import knowledge, posterior, signatures
 from bemt.judge.diagnose.assemble import assemble
 from bemt.judge.diagnose.law_rotor import BLADE_LAWS, LAWS, VARIANTS, CoefficientCurve, LawRotor, Laws, law_part
 from bemt.judge.diagnose.record import Record, thinned
-from bemt.judge.loss import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.air import Air
 from bemt.physics.bem.model import acts_on_rotor

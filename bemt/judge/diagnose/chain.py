@@ -22,7 +22,7 @@ from bemt.judge.diagnose.fit import fit, form_covariance
 from bemt.judge.diagnose.knowledge import ALWAYS
 from bemt.judge.diagnose.nuisance import following
 from bemt.judge.diagnose.record import CHANNELS
-from bemt.judge.loss import NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
     from bemt.judge.diagnose.record import Record
     from bemt.judge.diagnose.signatures import Candidate
-    from bemt.judge.loss import Explanation
+    from bemt.judge.explanation import Explanation
     from bemt.rotors.case import Case
 
 __all__ = ["MOTOR", "Diagnosis", "diagnose"]

@@ -18,7 +18,7 @@ from bemt.judge.diagnose.form import nearest
 from bemt.judge.diagnose.posterior import LEAST
 from bemt.judge.diagnose.record import DROPPED, NO_SPEED
 from bemt.judge.diagnose.suggest import LEVEL
-from bemt.judge.loss import NONE, UNKNOWN, Explanation, Size
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation, Size
 from bemt.physics import effects
 
 if TYPE_CHECKING:

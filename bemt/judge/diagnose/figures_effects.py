@@ -15,7 +15,7 @@ from bemt.judge.diagnose import form
 from bemt.judge.diagnose.fit import fit, weights
 from bemt.judge.diagnose.record import CHANNELS
 from bemt.judge.diagnose.signatures import Setting, effect_of
-from bemt.judge.loss import NONE, Explanation, Size
+from bemt.judge.explanation import NONE, Explanation, Size
 from bemt.physics.bem import model as bem
 from bemt.physics.bem import solver
 

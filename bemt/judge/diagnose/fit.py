@@ -22,7 +22,7 @@ from bemt.base.gaussian.whitening import whitener
 from bemt.judge.diagnose import noise
 from bemt.judge.diagnose.form import form_modes
 from bemt.judge.diagnose.signatures import Setting, effect_of
-from bemt.judge.loss import Explanation, Size, Sizes
+from bemt.judge.explanation import Explanation, Size, Sizes
 from bemt.physics import effects
 from bemt.physics.effects.base import FORM
 

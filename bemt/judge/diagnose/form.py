@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.gaussian.evidence import LinearTerms, log_sum
 from bemt.judge.diagnose import noise
-from bemt.judge.loss import Explanation
+from bemt.judge.explanation import Explanation
 from bemt.physics import effects
 from bemt.physics.effects.base import FORM
 

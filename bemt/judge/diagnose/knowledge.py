@@ -24,7 +24,7 @@ from bemt.judge.compare.matched import StandRun, stand_run
 from bemt.judge.compare.recordings import RunChange, changed
 from bemt.judge.diagnose import other_rotor, record
 from bemt.judge.diagnose.record import merged
-from bemt.judge.loss import DOUBT, NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import DOUBT, NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.dataset import Dataset
 from bemt.physics.effects.air_density import AirDensity

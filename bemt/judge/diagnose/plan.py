@@ -17,7 +17,8 @@ from bemt.judge.diagnose import form, knowledge, noise, posterior, problem, sign
 from bemt.judge.diagnose import suggest as suggestion
 from bemt.judge.diagnose.assemble import assemble, build
 from bemt.judge.diagnose.record import Record
-from bemt.judge.loss import COSTS, NONE, Explanation
+from bemt.judge.explanation import NONE, Explanation
+from bemt.judge.loss import COSTS
 from bemt.physics import effects
 
 if TYPE_CHECKING:

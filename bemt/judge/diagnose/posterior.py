@@ -21,7 +21,7 @@ from bemt.base.gaussian.evidence import log_sum, shares
 from bemt.base.gaussian.whitening import conditional
 from bemt.judge.diagnose import form, knowledge, noise
 from bemt.judge.diagnose.form import State
-from bemt.judge.loss import NONE, UNKNOWN, Explanation
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
 from bemt.physics import effects
 from bemt.physics.effects import base as effect_base
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
-from bemt.judge.diagnose.other_rotor import PLAIN, CalibratedBlade
+from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade
 from bemt.judge.diagnose.record import CHANNELS, Record
 from bemt.physics import effects
 from bemt.physics.bem import model as bem

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.judge.loss import NONE, Decision
+from bemt.judge.explanation import NONE
+from bemt.judge.loss import Decision
 from bemt.tools.flight.balance import axes_of, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify

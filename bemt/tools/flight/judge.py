@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.judge.diagnose.knowledge import LEFT_OUT, PRIOR
 from bemt.judge.diagnose.suggest import Suggestion
-from bemt.judge.loss import CLAIMS, NONE, UNKNOWN, Decision, Explanation, decide
+from bemt.judge.explanation import NONE, UNKNOWN, Explanation
+from bemt.judge.loss import CLAIMS, Decision, decide
 from bemt.tools.flight.balance import (
     ALARM,
     BLADE,
