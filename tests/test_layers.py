@@ -44,7 +44,7 @@ ROOMS: tuple[str, ...] = (
     "data|data.actions",
     "rotors|rotors.*",
     # judge
-    "judge.loss",
+    "judge.explanation|judge.loss",
     "judge.compare|judge.compare.*",
     "judge.diagnose|judge.diagnose.*",
     "judge.proof|judge.proof.*",

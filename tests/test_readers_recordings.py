@@ -1343,3 +1343,13 @@ def test_air_above_the_headings_is_that_of_all_rows(tmp_path: Path, air: tuple[s
     found = importers.read(file)
     assert found["pressure_Pa"] == pytest.approx([98500.0] * 3)
     assert found["temperature_K"] == pytest.approx([291.15] * 3)
+
+
+@pytest.mark.parametrize(("air", "known"), [("Pressure [Pa];101,325", False), ("Pressure [Pa];98500", True)])
+def test_air_above_the_headings_is_read_as_its_table_is(tmp_path: Path, air: str, known: bool) -> None:
+    """With decimal points a comma is none: 101,325 Pa is neither 101 Pa nor guessed."""
+    file = tmp_path / "stand.csv"
+    rows = ("rpm;thrust (N)", "3344;1.44", "4176;2.27", "5025;3.34", "")
+    file.write_text("\n".join([air, "", *rows]), encoding="utf-8")
+    found = importers.read(file)
+    assert ("pressure_Pa" in found) == known and found["thrust_N"] == pytest.approx([1.44, 2.27, 3.34])

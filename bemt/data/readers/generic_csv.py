@@ -22,10 +22,11 @@ from bemt.data.readers import head_text, load_text, number
 from bemt.data.readers._large import NumberTable, large_table
 from bemt.data.readers._words import NEUTRAL, english
 from bemt.data.readers.headings import Heading, heading, slug
-from bemt.data.readers.recording import COMMAS_READ, Builder
+from bemt.data.readers.recording import Builder
 from bemt.data.readers.samples import Channel
 from bemt.data.readers.split import (
     SplitTable,
+    column_numbers,
     decimal_mark,
     find_start,
     heading_cells,
@@ -110,26 +111,22 @@ def _air_above(build: Builder) -> None:
             continue
         value, unit = with_unit(cells[1].strip()) or (cells[1].strip(), "")
         head = heading(f"{cells[0].strip(' :')} ({unit})" if unit else cells[0].strip())
-        known = number(value.replace(",", "."))
-        if head.unit is None or known is None or head.name not in _AIR or head.name in build.channels:
+        (known,), bad, _ = column_numbers([value], build.decimal)
+        if head.unit is None or bad or head.name not in _AIR or head.name in build.channels:
             continue
         filled = np.full(len(build.table), known * head.unit.factor + head.unit.offset)
         build.channels[head.name], build.headings[head.name] = Channel(filled, head.unit_name), head.text
-        build.warnings.append(f"{head.text} {value} of all rows, as line {line} says")
+        build.warnings.append(f"{head.text} {value} is that of all rows (line {line})")
 
 
 def convert(table: SplitTable | NumberTable, decimal: str = ".") -> Dataset:
     """Make channels of a split table."""
-    build = Builder(table, KIND, kind="table")
+    build = Builder(table, KIND, kind="table", decimal=decimal)
     for k, head in enumerate(heads_of(table)):
-        build.add(k, head, decimal)
+        build.add(k, head)
     _air_above(build)
     if not table.headings:
         build.warnings.append("no heading line: columns are numbered; a recording.toml with header = false names them")
-    if decimal == ".,":
-        build.warnings.append("commas between thousands left out")
-    if decimal == ",":
-        build.warnings.append(COMMAS_READ)
     build.flag_time()
     speeds = [n for n in build.channels if n == "rpm" or n.endswith("_rpm")]
     build.flag_speeds(*speeds)

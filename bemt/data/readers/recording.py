@@ -59,9 +59,6 @@ SLIP = 0.02
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?")
 
 
-COMMAS_READ = "decimal commas read as decimal points"
-
-
 @dataclass
 class Builder:
     """Gathers the channels, texts, flags and warnings of one table and makes the `Dataset`."""
@@ -85,6 +82,10 @@ class Builder:
 
     def __post_init__(self) -> None:
         self.warnings.extend(self.table.warnings)
+        if self.decimal == ".,":
+            self.warnings.append("commas between thousands left out")
+        if self.decimal == ",":
+            self.warnings.append("decimal commas read as decimal points")
         if self.table.cut is not None:
             self.flag([self.table.cut], "line cut off at the end of the file")
         self.flag(self.table.misfits, f"not {self.table.width} cells", "; no value of them is taken")
@@ -94,8 +95,6 @@ class Builder:
         """Begin with the table of a stand, whose headings are known and stand once each."""
         table = split_table(load_text(path), header=True)
         build = cls(table, format, decimal=decimal_mark(table))
-        if build.decimal == ",":
-            build.warnings.append(COMMAS_READ)
         names = build.table.headings
         for name in sorted(h for h, times in Counter(names).items() if h and times > 1):
             build.fault("1", f"a second column {name!r}", "each column once")
@@ -168,10 +167,9 @@ class Builder:
             out, k = f"{name}_{k}", k + 1
         return out
 
-    def add(self, index: int, head: Heading, decimal: str = "", sign: float = 1.0) -> str:
+    def add(self, index: int, head: Heading, sign: float = 1.0) -> str:
         """Add column `index` as a channel or a text; gives its name ("" when the column is empty)."""
-        decimal = decimal or self.decimal
-        values, bad, empty = self.table.numbers(index, decimal)
+        values, bad, empty = self.table.numbers(index, self.decimal)
         label = head.text or f"column {index + 1}"
         if empty and (errors := sum(cell.lower() in SHEET_ERRORS for cell in self.table.cells(index))):
             note = f"column {label!r}: {number_of(errors, 'cell')} with an error of the spreadsheet, taken as empty"
@@ -179,10 +177,12 @@ class Builder:
         if empty == len(values):
             self.empty.append(repr(label))
             return ""
-        if decimal == "." and self._has_commas(index, label, bad):
+        if self.decimal == "." and self._has_commas(index, label, bad):
             return ""
         if bad and (stated := self._one_unit(index, bad)):
-            values, bad, _ = column_numbers([(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], decimal)
+            values, bad, _ = column_numbers(
+                [(with_unit(c) or (c, ""))[0] for c in self.table.cells(index)], self.decimal
+            )
             head = heading(f"{head.text} ({stated})") if head.unit is None or head.name == "throttle" else head
             head = replace(head, text=label)
             self.warnings.append(f"column {label!r}: its cells say the unit, {stated}")

@@ -307,9 +307,9 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
     told = (head.delimiter, head.header)
     table = large[0] if large is not None and large[1] == "." else split_table(load_text(path), *told)
     width, places = table.width, _places(file, table, columns)
-    build = Builder(table, KIND)
     stated = "decimal" in head.model_fields_set
     decimal = decimal_mark(table) if isinstance(table, SplitTable) and not stated else head.decimal
+    build = Builder(table, KIND, decimal=decimal)
     heads = heads_of(table)
     for k in sorted(range(width), key=lambda k: k not in places):
         text = table.headings[k] if table.headings else ""
@@ -317,13 +317,13 @@ def _run(file: str, path: Path, made: RecordingToml) -> Dataset:
             column = columns[places[k]]
             at = _heading(places[k], column.unit, text or f"column {k + 1}")
             rows = len(build.unitless)
-            name = build.add(k, at, decimal, float(column.sign))
+            name = build.add(k, at, float(column.sign))
             if not name and not build.faults:
                 where = f"columns.{places[k]}.column"
                 build.faults.append(Fault(file, where, f"column {k + 1} without numbers", "a column of numbers"))
             del build.unitless[rows:]
         else:
-            build.add(k, heads[k], decimal)
+            build.add(k, heads[k])
     if not build.faults:
         only_ones(build)
         if "power" not in columns:

@@ -191,7 +191,7 @@ def _fan(fan: Fan | None) -> Section:
         ["momentum through the exit", num(fan.exit_momentum_N), "N"],
         [
             "pressure in the exit plane and on the outer wall",
-            num(fan.rotor_thrust_N + fan.duct_thrust_N + fan.stator_thrust_N - fan.exit_momentum_N, 3),
+            num(fan.exit_pressure_N, 3),
             "N",
         ],
         ["pitch speed", num(fan.geometric_pitch_speed_m_s), "m/s"],

@@ -234,6 +234,11 @@ class Fan(Documented):
     annulus_solidity: float
     geometric_pitch_speed_m_s: float
 
+    @property
+    def exit_pressure_N(self) -> float:
+        """Thrust that is no momentum through the exit: pressure in its plane and on the outer wall [N]."""
+        return self.rotor_thrust_N + self.duct_thrust_N + self.stator_thrust_N - self.exit_momentum_N
+
 
 class PairResult(Documented):
     """What a second rotor adds, at the case's own operating point; the upper rotor is the first."""

@@ -150,7 +150,7 @@ def _fan_lines(fan: Fan | None) -> list[str]:
         f"  mass flow {_n(fan.mass_flow_kg_s)} kg/s; exhaust {_n(fan.exhaust_speed_m_s)} m/s "
         f"(u {_n(fan.u_exhaust_speed_m_s, 2)}); pitch speed {_n(fan.geometric_pitch_speed_m_s)} m/s",
         f"  momentum through the exit {_n(fan.exit_momentum_N)} N; pressure in the exit plane and on the outer wall "
-        f"{_n(fan.rotor_thrust_N + fan.duct_thrust_N + fan.stator_thrust_N - fan.exit_momentum_N, 3)} N",
+        f"{_n(fan.exit_pressure_N, 3)} N",
     ]
 
 

@@ -126,7 +126,8 @@ def judge(
     if sure.said.verdict == "none" and out.total_moved:
         step = "weigh the vehicle and charge the battery, then hover 30 s; --healthy-mass-kg, the mass of the " \
                "healthy flights, gives that of this one"  # fmt: skip
-        out = replace(out, next=Suggestion(step, (), (), 0.0, 0.0, "run"))
+        said = replace(sure.said, why="the motors share the work as in healthy flights")
+        out = replace(out, said=said, next=Suggestion(step, (), (), 0.0, 0.0, "run"))
     if n < 3:
         return out
     bad, several = [], np.unique(label).size > 1

@@ -179,7 +179,7 @@ def _level(shake: Vibration) -> str:
 
 def _seen(a: FlightAnswer) -> list[str]:
     """Lines on what this flight alone shows."""
-    parts = (_drives, _moved, _by_rotor, _demanded, _heard, _level_lines, _blown)
+    parts = (_drives, _moved, _by_rotor, _demanded, _heard, _along_axes, _blown)
     return [f"  {line}" for part in parts for line in part(a)]
 
 
@@ -256,7 +256,7 @@ def _heard(a: FlightAnswer) -> list[str]:
     return lines + ([f"At twice that: {shake.twice:.2g} {shake.unit}."] if np.isfinite(shake.twice) else [])
 
 
-def _level_lines(a: FlightAnswer) -> list[str]:
+def _along_axes(a: FlightAnswer) -> list[str]:
     """Vibration in the three axes."""
     shake = a.vibration
     if not shake.rms or not np.isfinite(shake.rms[0]):
