@@ -536,11 +536,11 @@ def test_the_lip_by_advance_separates_at_rest_first() -> None:
     T0 = found.T.copy()
     LipSeparation(onset=0.25, loss=0.4, by="advance").loads(found, flow)
     lost = T0 - found.T
-    assert lost[0] == pytest.approx(0.4 * 4.0) and 0.0 < lost[1] < lost[0] and lost[2] == 0.0
-    flow, found = ducted([4.0, 8.0])  # all at rest: nothing to tell by
-    T0 = found.T.copy()
-    LipSeparation(by="advance").loads(found, flow)
-    assert np.array_equal(found.T, T0)
+    assert lost[0] == pytest.approx(0.4 * 4.0)
+    assert np.all(np.diff(lost) < 0.0)
+    flow, found = ducted([4.0, 8.0])  # at rest an inviscid flow loses the same share at any load
+    LipSeparation(onset=0.9, loss=0.4, by="advance").loads(found, flow)
+    np.testing.assert_allclose(found.T_duct, [0.6 * 4.0, 0.6 * 8.0])
 
 
 def test_the_lip_by_turning_is_that_of_a_straight_duct() -> None:
