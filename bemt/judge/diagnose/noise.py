@@ -269,7 +269,7 @@ def _behind(problem: Problem, groups: Sequence[tuple[int, ...]]) -> Iterator[Smo
     (load, falling), free, c = loading(problem), problem.free, problem.channel
     for group in groups:
         here = free & np.isin(c, group)
-        if any(np.count_nonzero(here & (falling == k)) < _FEW * len(group) for k in (0.0, 1.0)):
+        if min(np.count_nonzero(here & side) for side in (falling < 1.0, falling == 1.0)) < _FEW * len(group):
             continue
         mine = here & (falling > 0.0)
         size = np.zeros(c.size)
