@@ -191,7 +191,7 @@ class Reliability(Documented):
     high: float
     n: int
     stated: float  # Mean of what was printed [1]
-    there: int  # How many of the effects were at work, or one that the plan cannot tell from it
+    there: int  # How many of the effects were at work
 
 
 class Stratum(Documented):

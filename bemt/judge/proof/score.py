@@ -362,7 +362,7 @@ def reliability(
     """
     out = []
     for referenced in (True, False):
-        told = [(p, any(i in names for names in j.entry.allowed)) for j in judged if bool(j.entry.referenced) is referenced
+        told = [(p, i in j.entry.causes) for j in judged if bool(j.entry.referenced) is referenced
                 for i, p in j.answer.inclusion.items()]  # fmt: skip
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             some = [(p, there) for p, there in told if low <= p < high or p == high == edges[-1]]
