@@ -388,7 +388,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
     n = rpm / 60.0
     D = prep.D
     if prep.duct is not None:
-        T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, out))
+        T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, points[:, K.P_MU], out))
         T_duct = T - T_rotor - T_stator
         mass = out[:, K.O_MASS] * nan
     else:
