@@ -27,7 +27,7 @@ from bemt.base.arrays import Array
 from bemt.physics.air import Air
 from bemt.physics.bem import duct as duct_model
 from bemt.physics.bem import solver
-from bemt.physics.bem.duct_stream import Stream, jet_area
+from bemt.physics.bem.duct_stream import BASE_PRESSURE, Stream, jet_area
 from bemt.physics.bem.model import Model, flow_of, respond
 from bemt.physics.effects.oblique_inflow import ObliqueInflow
 from bemt.physics.effects.tip_gap import TipGap
@@ -104,7 +104,7 @@ def test_the_stream_leaves_a_steep_boattail() -> None:
         rotor = Rotor(helix(0.2, 0.1), 4)
         flow = duct_model.duct_flow(duct, rotor)
         skin = duct_model.WALL_FRICTION * duct_model.FORM_FACTOR * 2.0 * math.pi * 0.11 * duct.length
-        base = duct_model.BASE_PRESSURE * math.pi * float(r.max() ** 2 - r[-1] ** 2)
+        base = BASE_PRESSURE * math.pi * float(r.max() ** 2 - r[-1] ** 2)
         jet = jet_area(duct, rotor.Rhub)
         found.append((flow.drag_area - skin) / base)
         assert flow.capture == pytest.approx(jet.in_stream + found[-1] * (jet.at_rest - jet.in_stream))

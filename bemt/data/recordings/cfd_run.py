@@ -216,7 +216,7 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         work.used.add(own[0].name)
     elif sized := [c for c in work.columns if CELL_SIZE.fullmatch(c.stem)][:1]:
         unit = unit_of(sized[0].unit) if sized[0].unit else None
-        values["cell_size"] = sized[0].record[sized[0].name] * (1.0 if unit is None else unit.factor)
+        values["cell_size"] = (sized[0].record[sized[0].name] * (1.0 if unit is None else unit.factor)) ** -3.0
         work.size_unit = "m" if unit is not None and unit.dimension == "length" else ""
         work.used.add(sized[0].name)
     for name, quantity, given in (
@@ -279,7 +279,8 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
         return
     names = ", ".join(dict.fromkeys(c.name for c in rest))
     state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
-    apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if state and not _GRIDS & state.keys() else not state
+    stated = state and not _GRIDS & state.keys()
+    apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
     work.notes.insert(
         0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
@@ -322,7 +323,7 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
         got = ", ".join(f"{k} {size}" for k, size in sizes.items())
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
     full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k not in _GRIDS}
-    each = values.get("cells", values.get("cell_size"))
+    each = values.get("cells", values.get("cell_size"))  # h^-3
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     provenance = {

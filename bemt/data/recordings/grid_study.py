@@ -99,13 +99,6 @@ class LoadStudy(Documented):
         return tuple(v / self.sizes[0] for v in self.sizes) or tuple((self.cells[0] / n) ** (1 / 3) for n in self.cells)
 
     @property
-    def grids(self) -> tuple[str, ...]:
-        """Each grid in words."""
-        mm = self.size_unit == "m"
-        sizes = tuple(f"{1e3 * v:.4g} mm" if mm else f"size {v:.4g}" for v in self.sizes)
-        return sizes or tuple(f"{n:,.0f} cells" for n in self.cells)
-
-    @property
     def name(self) -> str:
         """Load in words."""
         return self.channel if not LOADS[self.channel] else self.channel.rsplit("_", 1)[0].replace("_", " ")
@@ -118,12 +111,12 @@ class LoadStudy(Documented):
         >>> LoadStudy("thrust_N", (5.8e6, 1.7e6, 0.5e6), s.values, *told, rpm=6000.0).sentence()
         'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.672 N at cell size 0, GCI 1.68 %, u 1.5 %'
         """  # noqa: E501
-        unit, many = LOADS[self.channel], max(self.cells, default=0.0) >= 1e5
+        unit, many, mm = LOADS[self.channel], max(self.cells, default=0.0) >= 1e5, self.size_unit == "m"
         grids = ", ".join(f"{c / (1e6 if many else 1.0):.3g}" for c in self.cells)
         on = f"{grids}{' million' if many else ''} cells"
         if self.sizes:
-            on = f"cells of {', '.join(v.removeprefix('size ').removesuffix(' mm') for v in self.grids)}"
-            on += " mm" if self.size_unit == "m" else " (unit not stated)"
+            sizes = ", ".join(f"{1e3 * v if mm else v:.4g}" for v in self.sizes)
+            on = f"cells of {sizes} {'mm' if mm else '(no unit)'}"
         state = "one speed" if math.isnan(self.rpm) else f"{self.rpm:g} rev/min"
         state += f", {self.airspeed_m_s:g} m/s" if self.airspeed_m_s > 0.0 else ""
         state += f", J {self.J:g}" if self.J > 0.0 else ""
@@ -271,24 +264,23 @@ def _alike(d: Dataset, i: int, k: int) -> bool:
 def by_grid(d: Dataset, cells: Array, size_unit: str | None = None) -> Dataset:
     """Points of a run of which some rows are one condition on several grids, as points with u of the grid.
 
-    `cells` (N,) are those of each row's grid [1], NaN where not stated; with a `size_unit`, "m" or "" if that is not
-    known, they are the sizes of its cells (h of Celik 2008, of which only ratios count). One point for each condition, that of its
-    finest grid; ``provenance["studies"]`` has a `LoadStudy` for each load that was extrapolated.
+    `cells` (N,) are those of each row's grid [1], NaN where not stated; h^-3 where their size h is, whose `size_unit`
+    is "m", or "" if not known (Celik 2008: only ratios of h count). One point for each condition, that of its finest
+    grid; ``provenance["studies"]`` has a `LoadStudy` for each load that was extrapolated.
     """
-    h = np.cbrt(1.0 / cells) if size_unit is None else cells
     keep: list[int] = []
     studies: list[LoadStudy] = []
     sizes: dict[str, Array] = {k: np.full(len(d), np.nan) for k in LOADS if k in d}
     for group in groups(d):
-        order = sorted(group, key=lambda i: h[i] if math.isfinite(h[i]) else math.inf)
+        order = sorted(group, key=lambda i: -cells[i] if math.isfinite(cells[i]) else 1.0)
         keep.append(order[0])
         if len(group) == 1:
             continue
         if len(set(cells[group][np.isfinite(cells[group])])) < len(group):
-            got = f"{len(group)} runs at {_state(d, group[0])} on " + ", ".join(f"{cells[i]:,.6g}" for i in group)
+            shown = [f"{cells[i]:,.0f}" if size_unit is None else f"h {_size(cells[i]):.4g}" for i in group]
+            got = f"{len(group)} runs at {_state(d, group[0])} on {', '.join(shown)}"
             hint = "State the cells of each grid: --setup cells=N; runs on one grid are no study"
-            what = "cells" if size_unit is None else "size of the cells"
-            raise InputError(Fault(str(d.provenance.get("file", d.name)), what, got, "grids of unlike size", hint))
+            raise InputError(Fault(str(d.provenance.get("file", d.name)), "cells", got, "grids of unlike size", hint))
         for s in filter(None, (_study(d, k, order, cells, size_unit) for k in sizes)):
             studies.append(s)
             sizes[s.channel][order[0]] = s.u_relative
@@ -315,24 +307,24 @@ def _state(d: Dataset, row: int) -> str:
     )
 
 
-def _study(
-    d: Dataset, channel: str, order: Sequence[int], cells: Array, size_unit: str | None
-) -> LoadStudy | None:
+def _size(cells: float) -> float:
+    return float(cells ** (-1.0 / 3.0))
+
+
+def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array, unit: str | None) -> LoadStudy | None:
     """Grid study of one load at one condition, finest grid first; None where there is none."""
     order = [i for i in order if math.isfinite(d[channel][i])]
     fine = order[:MOST]
     if len(fine) < 2 or any(d[channel][i] == 0.0 for i in fine[:2]):
         return None
-    grids = tuple(float(cells[i]) for i in order)
-    r = ratios(grids[: len(fine)])
-    if size_unit is not None:
-        r = tuple(b / a for a, b in zip(grids, grids[1 : len(fine)], strict=False))
-    found = grid_study([float(d[channel][i]) for i in fine], r)
+    found = grid_study([float(d[channel][i]) for i in fine], ratios([float(cells[i]) for i in fine]))
+    grids = tuple(float(cells[i]) if unit is None else _size(cells[i]) for i in order)
     more = (f"{len(order)} grids: the order is that of the finest {MOST}",) if len(order) > MOST else ()
     return LoadStudy(
-        channel, grids if size_unit is None else (), tuple(float(d[channel][i]) for i in order), found.u_relative,
+        channel, grids if unit is None else (), tuple(float(d[channel][i]) for i in order), found.u_relative,
         found.order, found.extrapolated, found.gci_fine, found.gci_coarse, found.asymptotic, (*found.flags, *more),
-        sizes=() if size_unit is None else grids, size_unit=size_unit or "", **{k: float(d[k][order[0]]) for k in _SAME if k in d},
+        sizes=() if unit is None else grids, size_unit=unit or "",
+        **{k: float(d[k][order[0]]) for k in _SAME if k in d},
     )  # fmt: skip
 
 
@@ -390,7 +382,7 @@ CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)
 """Columns of a size of cells in a table of grids."""
 HEIGHT, LOWEST = re.compile(r"h(_m)?", re.IGNORECASE), 0.01
 """Of these, one that may be a height over ground as well, and a height at which no rotor turns [m]."""
-OF_CFD = re.compile(r"(grid|mesh|level|solver|turbulence|y_?plus|cfd)", re.IGNORECASE)
+OF_CFD = re.compile(r"grid|mesh|solver|turbulence|y_?plus|cfd", re.IGNORECASE)
 """Other columns by which a table is one of CFD."""
 
 
@@ -419,4 +411,4 @@ def of_table(record: Dataset) -> Dataset:
     about["conditions"] = told
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     made = Dataset("cfd", record.name, values, provenance={**record.provenance, **about}, notes=record.notes)
-    return by_grid(made, cells, None if counts else unit)
+    return by_grid(made, cells) if counts else by_grid(made, cells**-3.0, unit)

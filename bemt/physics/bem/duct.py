@@ -47,7 +47,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.physics.bem.duct_stream import BASE_PRESSURE, NOSE_NU, jet_area
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -125,8 +124,9 @@ class DuctFlow:
     # Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m]
     exit_hub: float = float("nan")
     length: float = 0.0  # Of the duct [m]
-    # Drag of an outer wall that the stream leaves at its nose over 1/2 rho V^2, at `NOSE_NU`; none if not known [m2]
-    nose_drag: tuple[float, ...] = ()
+    # V / V_j, rising, and the drag of an outer wall that the stream leaves at its nose over 1/2 rho V^2 [m2]; () if the
+    # shape is not known
+    nose_drag: tuple[tuple[float, float], ...] = ()
 
     def drag(self, V: Array, jet: Array, viscosity: ArrayLike) -> Array:
         """Drag of the outer wall over the density, at jets [m/s] and a kinematic viscosity [m2/s]. [m4/s2]"""
@@ -134,7 +134,7 @@ class DuctFlow:
         if self.nose_drag:
             with np.errstate(divide="ignore", invalid="ignore"):
                 Re, nu = np.abs(V) * self.length / np.asarray(viscosity), np.where(jet > 0.0, V / jet, 0.0)
-            area = area + np.interp(Re, NOSE_RE, (1.0, 0.0)) * np.interp(nu, NOSE_NU, self.nose_drag)
+            area = area + np.interp(Re, NOSE_RE, (1.0, 0.0)) * np.interp(nu, *np.transpose(self.nose_drag))
         return np.asarray(0.5 * V * np.abs(V) * area)
 
     def jet_speed(self, w: Array, V: Array) -> Array:
@@ -213,15 +213,19 @@ def hydraulic_diameter(duct: Duct, rotor: Rotor) -> float:
 
 def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) -> DuctFlow:
     """Momentum numbers of a duct around a rotor, with the friction coefficient of its walls [1]."""
+    from bemt.physics.bem.duct_stream import BASE_PRESSURE, NOSE_NU, jet_area  # which an open rotor does not need
+
     duct.check(rotor)
     hydraulic = hydraulic_diameter(duct, rotor)
     outer = duct.inner_radius + duct.lip_radius
     jet = jet_area(duct, rotor.Rhub)
     left, base = _boattail(duct)
-    nose: tuple[float, ...] = ()
+    nose: tuple[tuple[float, float], ...] = ()
     if duct.outer_radius is not None and wall_friction > 0.0:  # of a known shape, in a stream with a boundary layer
-        behind = (1.0 - left) * BASE_PRESSURE * base
-        nose = tuple(behind + lost * duct.inner_radius**2 for lost in jet.nose)
+        facing = math.pi * (duct.outer_radius**2 - float(duct.exit_radius or 0.0) ** 2)  # with the trailing edge
+        behind = BASE_PRESSURE * max(facing - left * base, 0.0)
+        area = duct.inner_radius**2
+        nose = tuple((nu, behind + lost * area) for nu, lost in zip(NOSE_NU, jet.nose, strict=True))
     return DuctFlow(
         wake_ratio=duct.exit_area / rotor.annulus_area,
         wall_loss=wall_friction * 4.0 * duct.length / hydraulic,

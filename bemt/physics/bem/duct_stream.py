@@ -157,7 +157,6 @@ class Stream(NamedTuple):
         """Volume flow through the exit in a stream of ``nu`` with a jet of 1."""
         return float(2.0 * np.pi * (nu * self.exit_in_stream + self.exit_of_sheet @ self.strength(nu)))
 
-
     def lost(self, nu: float) -> float:
         """Suction of the outer nose beyond base pressure, over 1/2 rho V^2, in a stream of ``nu`` with a jet of 1."""
         speed = self.nose[:, 0] * nu + self.nose[:, 1:] @ self.strength(nu)
