@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -232,7 +232,7 @@ def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> Duc
         return duct
     from bemt.physics.bem.duct import DuctFlow
 
-    return replace(duct or DuctFlow(1.0), **numbers)
+    return replace(duct or DuctFlow(1.0), **dict[str, Any](numbers))
 
 
 def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:

@@ -109,7 +109,8 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     friction = case.get("duct.wall_friction")
     flow = duct_flow(duct, rotor, WALL_FRICTION if friction is None else float(friction))
     given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
-    return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
+    stated: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
+    return dataclasses.replace(flow, **stated)
 
 
 def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
