@@ -65,7 +65,8 @@ class JetArea(NamedTuple):
     """Area of the jet far behind over the exit's: ``at_rest``, and ``in_stream`` where the rotor adds nothing.
 
     ``bend`` is how far the jet's speed between the two is from a straight line; see the head of the module. ``nose``
-    is the drag over 1/2 rho V^2 times the bore's radius squared of an outer nose whose suction is lost, at `NOSE_NU`.
+    is the drag over 1/2 rho V^2 times the bore's radius squared of an outer nose whose suction is lost, at `NOSE_NU`; ()
+    where the outer wall is not stated.
     """
 
     at_rest: float
@@ -95,7 +96,7 @@ def _solved(
     y = np.array([stream.through(v) for v in _NU]) / duct.exit_area / at_rest
     straight = y - in_stream / at_rest * nu
     off, per = 1.0 - nu - straight, straight * nu / np.hypot(y, nu)
-    nose = tuple(stream.lost(v) for v in NOSE_NU)
+    nose = tuple(stream.lost(v) for v in NOSE_NU) if outer else ()
     return JetArea(at_rest, in_stream, float(np.clip(off @ per / (per @ per), -0.5, 0.5)), nose)
 
 
