@@ -181,6 +181,24 @@ def test_mass_flow_speed_and_area_are_one(f1: Model) -> None:
     assert np.allclose(s.Q, 2.0 * np.pi * 1.225 * spin, rtol=1e-9)
 
 
+def test_kernel_and_balance_see_one_stream_leave_the_nose(f1: Model) -> None:
+    """Reynolds numbers V length / nu from 4e4 to 9e5."""
+    assert f1.duct is not None
+    numbers: dict[str, Any] = {"exit_hub": math.nan, "nose_drag": ((0.2, 0.0), (1.0, 0.02)), "nose_capture": 0.05}
+    duct = dataclasses.replace(f1.duct, **numbers)
+    air, V = Air.from_density(1.225), np.array([5.0, 30.0, 50.0, 60.0, 105.0])
+    nu = air.mu / air.rho
+    left = duct.left(V, nu)
+    assert left[0] == left[1] == 1.0 > left[2] > left[3] > left[4] == 0.0
+    prep = solver.prepare(f1.rotor, f1.polars, f1.effects, duct)
+    s = solver.solve(prep, 40000.0, V, air, radial=True)
+    w = s.radial["w"]
+    step = 1.225 * w * 2.0 * np.pi * s.radial["r"] * prep.st[:, 1]
+    leaves = duct.jet_speed(w, V[:, None], nu)
+    jet = (step * leaves).sum(axis=1) / s.mass_flow
+    assert s.converged.all() and np.allclose(s.T, s.mass_flow * (jet - V) - 1.225 * duct.drag(V, jet, nu), rtol=1e-9)
+
+
 def test_a_stator_ends_what_swirl_takes_from_the_jet(f1: Model) -> None:
 
     def thrust(**numbers: float) -> float:
@@ -249,8 +267,9 @@ def test_ka_4_70_in_nozzle_19a(shared_data: Path, tmp_path: Path, pitch: float) 
     known = fans.nozzle_19a(shared_data, tmp_path, pitch)
     some = known.CT > 0.15 * known.CT[0]
     CT, CQ, _ = (np.abs(v) for v in off(known))
-    assert np.median(CT[some]) < 0.02
-    assert np.max(CT[some]) < 0.15  # light loads, where the nozzle drags
+    assert np.median(CT[some]) < 0.03
+    assert np.max(CT[some]) < 0.1
+    assert np.max(CT[known.CT > 0.13 * known.CT[0]]) < 0.2  # light loads, where the nozzle drags
     assert np.median(CQ[some]) < 0.06
 
 

@@ -47,6 +47,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
+from bemt.physics.bem.residual import RE_HELD, RE_LEFT
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -63,9 +64,9 @@ _LIP_K_HIGH = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.
 # Outer wall behind its widest place: the stream follows it up to the first angle and has left it at the second, where
 # it neither squeezes the jet nor gives its pressure back: base pressure (the two angles are declared).
 _BOATTAIL = math.radians(18.0), math.radians(24.0)
-# Reynolds numbers of V and the duct's length between which the stream comes to follow the outer nose at light load:
-# NeuralFoil on the section of nozzle 19A at -8 deg, cd 0.094, 0.091, 0.036 and 0.018 at 2e5, 4e5, 5e5 and 1e6.
-NOSE_RE = 4e5, 6e5
+# A stream that has left the outer nose squeezes the jet less: share of what a wall does that it has left altogether.
+# Set on the torque of nozzle 19A at pitch 1.0, whose error then changes least with the load; no other pitch, no thrust.
+_UNSQUEEZED = 0.2
 
 # Steps in which the core of a swirling jet settles; each takes off most of what is left.
 _CORE_STEPS = 12
@@ -127,26 +128,33 @@ class DuctFlow:
     # V / V_j, rising, and the drag of an outer wall that the stream leaves at its nose over 1/2 rho V^2 [m2]; () if the
     # shape is not known
     nose_drag: tuple[tuple[float, float], ...] = ()
+    nose_capture: float = 0.0  # What `capture` gains then [1]
+
+    def left(self, V: Array, viscosity: ArrayLike) -> Array:
+        """Share of the stream that leaves the outer nose at a kinematic viscosity [m2/s]; as the kernel's. [1]"""
+        Re = np.abs(V) * self.length / np.maximum(viscosity, 1e-12)
+        return np.asarray(np.interp(Re, (RE_LEFT, RE_HELD), (1.0, 0.0)))
 
     def drag(self, V: Array, jet: Array, viscosity: ArrayLike) -> Array:
         """Drag of the outer wall over the density, at jets [m/s] and a kinematic viscosity [m2/s]. [m4/s2]"""
         area: Array | float = self.drag_area
         if self.nose_drag:
             with np.errstate(divide="ignore", invalid="ignore"):
-                Re, nu = np.abs(V) * self.length / np.asarray(viscosity), np.where(jet > 0.0, V / jet, 0.0)
-            area = area + np.interp(Re, NOSE_RE, (1.0, 0.0)) * np.interp(nu, *np.transpose(self.nose_drag))
+                nu = np.where(jet > 0.0, V / jet, 0.0)
+            area = area + self.left(V, viscosity) * np.interp(nu, *np.transpose(self.nose_drag))
         return np.asarray(0.5 * V * np.abs(V) * area)
 
-    def jet_speed(self, w: Array, V: Array) -> Array:
+    def jet_speed(self, w: Array, V: Array, viscosity: ArrayLike = 0.0) -> Array:
         """Speed of the jet far behind for a mean speed w through the disk; as the kernel's. [m/s]"""
+        capture = self.capture + self.nose_capture * self.left(V, viscosity)
         y = w / (self.wake_ratio * self.contraction)
         with np.errstate(divide="ignore", invalid="ignore"):
             bend = np.where(V > 0.0, self.bend * V / np.hypot(y, V), 0.0)
-        return np.asarray(V + (y - self.capture / self.contraction * V) * (1.0 + bend))
+        return np.asarray(V + (y - capture / self.contraction * V) * (1.0 + bend))
 
     def balance(self, w: Array, V: Array, viscosity: ArrayLike) -> tuple[Array, Array]:
         """Thrust over density and swept area, and the duct's share of it, at a speed through the disk; no swirl."""
-        jet = self.jet_speed(w, V)
+        jet = self.jet_speed(w, V, viscosity)
         T = w * (jet - V) - self.drag(V, jet, viscosity) / self.area
         own = 0.5 * (jet**2 - V**2 + self.wall_loss * w**2 + self.lip_loss * (w - V) ** 2)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -158,7 +166,8 @@ class DuctFlow:
         NaN where none is left.
         """
         wanted = np.asarray(thrust) / self.area
-        low = self.wake_ratio * self.capture * np.abs(V)  # the rotor adds nothing
+        capture = self.capture + self.nose_capture * self.left(V, viscosity)
+        low = self.wake_ratio * capture * np.abs(V)  # the rotor adds nothing
         high = low + 4.0 * np.sqrt(np.abs(wanted)) + 1e-9
         lost = self.balance(low, V, viscosity)[0] > wanted
         for _ in range(60):
@@ -241,6 +250,7 @@ def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) ->
         exit_hub=duct.exit_hub_radius,
         length=duct.length,
         nose_drag=nose,
+        nose_capture=_UNSQUEEZED * (1.0 - left) * (jet.at_rest - jet.in_stream) if nose else 0.0,
     )
 
 

@@ -249,6 +249,8 @@ def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
         num[res.N_WAKE] = 1.0 / (duct.wake_ratio * duct.contraction)
         num[res.N_STREAM] = duct.capture / duct.contraction - 1.0
         num[res.N_BEND] = duct.bend
+        num[res.N_LEFT] = duct.nose_capture / duct.contraction
+        num[res.N_LENGTH] = duct.length
         num[res.N_WALL] = duct.wall_loss
         num[res.N_LIP] = duct.lip_loss
         num[res.N_STATOR] = duct.stator

@@ -315,7 +315,7 @@ class BladeProblem:
         area = 2.0 * math.pi * s.r * s.dr
         w, v_t = e[_AXIAL], e[_SWIRL]
         mass = rho * np.abs(w) * area
-        jet = mass * flow.jet_speed(w, V[:, None])
+        jet = mass * flow.jet_speed(w, V[:, None], float(self.need.air.mu) / rho)
         stator = flow.stator * 2.0 * rho * np.maximum(v_t, 0.0) ** 2 * area
         return np.stack([mass, jet, stator, 4.0 * v_t**2 * s.dr / s.r, 4.0 * mass * v_t**2])
 
