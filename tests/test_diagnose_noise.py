@@ -28,14 +28,16 @@ def test_repeats_give_the_noise_beside_gain_zero_and_drift(a: float, b: float) -
     run, place = np.repeat([0.0, 1.0], 28), np.tile(np.arange(28.0), 2)
     true = 1e-7 * rpm**2
     full = np.full_like(true, true.max())
-    shown = true * np.where(run == 0, 1.03, 0.98) + full * (0.01 * run + 0.02 * place / 28.0)
+    fell = np.tile([0.0, 1.0], 28)
+    behind = 0.03 * full * fell * (1.0 - true / full)  # a balance that stays behind scatters by nothing
+    shown = true * np.where(run == 0, 1.03, 0.98) + full * (0.01 * run + 0.02 * place / 28.0) + behind
     sd = np.hypot(a * true, b * full)
     found = []
     for _ in range(20):
         y = shown + sd * rng.standard_normal(sd.size)
         label = conditions(rpm, np.zeros_like(rpm), np.full_like(rpm, 1.2))
         assert np.unique(label).size == 7
-        sizes = noise_sizes(y - true, y, full, projected_out(label, true, true, full, run, place))
+        sizes = noise_sizes(y - true, y, full, projected_out(label, true, true, full, run, place, fell))
         assert sizes is not None
         found.append(np.sqrt(np.mean(np.hypot(sizes[0] * true, sizes[1] * full) ** 2) / np.mean(sd**2)))
     assert np.mean(found) == pytest.approx(1.0, abs=0.15)
@@ -57,7 +59,7 @@ def test_what_is_stated_stays_where_the_repeats_agree() -> None:
     e = u * rng.standard_normal(60)
     label = np.repeat(np.arange(6), 10)
     one = np.ones(60)
-    fixed = projected_out(label, one, one, one, np.zeros(60), np.arange(60.0))
+    fixed = projected_out(label, one, one, one, np.zeros(60), np.arange(60.0), np.zeros(60))
     assert noise_sizes(e, one, one, fixed, u)[:2] == (0.0, 0.0)  # type: ignore[index]
     doubled = noise_sizes(3.0 * e, one, one, fixed, u)
     assert doubled is not None and np.hypot(*doubled[:2]) == pytest.approx(0.028, rel=0.3)

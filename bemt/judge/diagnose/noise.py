@@ -65,8 +65,8 @@ _FORM_LENGTH = 0.7
 _RIVAL_LENGTHS = (0.15, 0.5)
 _RIVAL_SIZES = (0.03, 0.12)
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
-# less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
-# fewest points of either kind.
+# less increasing load; not checked): shares of the largest reading, length over the load, and fewest points of either
+# kind.
 _BEHIND, _BEHIND_LENGTH, _FEW = (0.01, 0.04), 0.5, 4
 
 

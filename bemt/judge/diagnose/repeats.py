@@ -26,7 +26,7 @@ _USUAL, _SPREAD = np.log([5e-3, 1e-3]), 1.5
 # Least change of the load that has a direction, share of the largest.
 _STEP = 0.002
 # Terms over the load of what stays behind while it falls.
-_BEHIND = 3
+_TERMS = 3
 # No stand is better than this, whatever digits repeat.
 _BEST = np.array([2e-4, 1e-4])
 # The data must be this much likelier (natural logarithm) before stated uncertainties are enlarged.
@@ -80,7 +80,7 @@ def projected_out(
         late = (place - place[mine].mean()) / max(float(np.ptp(place[mine])), 1e-12)
         columns += [np.where(mine, shape, 0.0) for shape in (model, full, full * late)]
     share = model / np.where(full > 0.0, full, 1.0)
-    columns += [fell * full * share**k for k in range(_BEHIND)]
+    columns += [fell * full * share**k for k in range(_TERMS)]
     return np.stack(columns, axis=1)
 
 
