@@ -39,6 +39,8 @@ CLASS_DRAG: dict[str | None, tuple[float, float]] = {"sport": (0.43, 0.11)}
 """ln(profile drag) of a class of blades over the usual and its scatter, fitted beside angle, chord and camber: 27 APC
 Sport of UIUC (0.49 from flight alone, 0.54 at rest alone), 8 sport propellers of Drive Calculator 0.63 +- 0.37.
 Electric, folding and slow flyers are within 0.1 of none (56) [1]."""
+SPORT_DEG = 0.97
+"""Further zero-lift angle of sport propellers from the same fit, +- 0.26 [deg]."""
 BLADES_DRAG = (0.23, 0.13)
 """The same of three and more blades: 40 of Drive Calculator's and 7 of UIUC, eight makers alike in weight (0.16 to 0.30
 with one left out). The same blade on two, three and four arms differs by 0.04 +- 0.07: it is the blades on sale [1]."""
@@ -127,14 +129,17 @@ CHORDS = ("chord_law", "stations", "uiuc", "apc")
 
 
 def section_of(blade_class: str | None) -> tuple[Unknown, ...]:
-    """Section of a class of blades: slow flyers are cambered as the measured ones are, reversible ones not at all."""
+    """Section of a class of blades: slow flyers and sport propellers are cambered as measured, reversible ones not."""
     if blade_class == "reversible":
         return Unknown("blade.section.camber", 0.0, 0.0, 0.01, "turns both ways: symmetric, or nearly so"), THICKNESS
-    if blade_class != "slow_flyer":
+    more_deg = {"slow_flyer": population().slow_flyer_deg, "sport": SPORT_DEG}.get(blade_class or "")
+    if more_deg is None:
         return SECTION
-    camber = round(SECTION[0].value + population().slow_flyer_deg / DEG_PER_CAMBER, 3)
-    why = "section not known; slow flyers of two makers have 5 to 7 %"
-    return Unknown("blade.section.camber", camber, camber - 0.015, camber + 0.015, why), THICKNESS
+    camber = round(SECTION[0].value + more_deg / DEG_PER_CAMBER, 3)
+    ends = round(camber - 0.015, 3), round(camber + 0.015, 3)
+    kind = str(blade_class).replace("_", " ")
+    why = f"section not known; {kind} propellers have {100 * ends[0]:.2g} to {100 * ends[1]:.2g} %"
+    return Unknown("blade.section.camber", camber, *ends, why), THICKNESS
 
 
 def surface_of(blade_class: str | None, blades: int | None) -> tuple[Unknown, ...]:
