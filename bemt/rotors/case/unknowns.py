@@ -155,8 +155,8 @@ def surface_of(blade_class: str | None, blades: int | None) -> tuple[Unknown, ..
         return SURFACE
     level = DRAG_LEVEL * math.exp(more)
     of = " and ".join([f"{blade_class} propellers"] * bool(kind[0]) + ["three and more blades"] * bool(many[0]))
-    ends = (round(level * math.exp(sign * scatter), 2) for sign in (-1.0, 1.0))
-    return SURFACE[0], Unknown("model.drag_level", round(level, 2), *ends, f"profile drag not known; range of {of}")
+    low, high = (round(level * math.exp(sign * scatter), 2) for sign in (-1.0, 1.0))
+    return SURFACE[0], Unknown("model.drag_level", round(level, 2), low, high, f"profile drag not known; range of {of}")
 
 
 def offset_of(family: str | None) -> Unknown:
@@ -295,7 +295,7 @@ def _left_out(made: dict[str, Any]) -> list[Unknown]:
         if not any(key in rotor for key in HUBS):
             unknowns.append(FAN[0] if fan else HUB)
     if isinstance(blade, dict):
-        surface = SURFACE
+        surface: tuple[Unknown, ...] = SURFACE
         if not any(key in blade for key in CHORDS):
             surface = SURFACE if fan else surface_of(blade.get("class"), _blades(rotor))
             blade["chord_law"] = "fan" if fan else "apc_like"

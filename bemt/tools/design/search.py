@@ -180,21 +180,23 @@ MAKERS = 3
 def _on_sale(
     table: pd.DataFrame, loads: Sequence[RotorLoads], spreads: Sequence[LoadScatter], target: Target, sure: float
 ) -> tuple[dict[str, Any], ...]:
-    """Motors on sale that turn the first propeller, least power first: those that are sure and stand their current."""
+    """The most usual motors on sale for the first propeller that are sure of the target and stand their current."""
     first = table.iloc[0]
     if first.probability < sure or target.fluid != "air":
         return ()
     one = next(x for x in loads if x.label == first.label)
     even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
     theirs, u = dataclasses.replace(target, sized=False), rotor_loads.nearest(one, spreads)
-    found: list[dict[str, Any]] = []
+    found: dict[str, dict[str, Any]] = {}
     for motor in motors_file.on_sale(math.sqrt(even * first.kv), first.motor_g):
+        if motor.maker in found:
+            continue
         row = _rows(one, u, (motor,), theirs)[0] | {"maker": motor.maker, "max_current_A": motor.max_current_A}
         if row["probability"] >= sure and not row["peak_A"] > motor.max_current_A:
-            found.append(row)
-    found.sort(key=lambda row: row["power_W"])
-    makers = list(dict.fromkeys(row["maker"] for row in found))[:MAKERS]
-    return tuple(next(row for row in found if row["maker"] == maker) for maker in makers)
+            found[motor.maker] = row
+        if len(found) == MAKERS:
+            break
+    return tuple(found.values())
 
 
 def _several(value: Any) -> tuple[Any, ...]:
