@@ -49,7 +49,8 @@ def row(words: str, table: pd.DataFrame) -> str:
     other = "the same" if least.label == first.label else f"{least.label}, {gain:.1%} less"
     stock = next((f"{m['motor']}, {m['motor_g']:.0f} g, {m['power_W']:.3g} W" for m in table.attrs["on_sale"]), "-")
     cells = (words, first.label, f"{first.kv:.0f} ({even:.0f})", f"{first.power_W:.3g} ± {first.u_power_W:.2g}",
-             f"{first.g_per_W:.3g}", f"{first.full_thrust_N:.3g}", f"{first.propulsion_g:.0f}", other, stock)  # fmt: skip
+             f"{first.g_per_W:.3g}", f"{first.full_thrust_N:.3g}", f"{first.propulsion_g:.0f}", other,
+             stock)  # fmt: skip
     return f"| {' | '.join(cells)} |"
 
 

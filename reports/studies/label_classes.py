@@ -26,6 +26,7 @@ from bemt.data.readers.uiuc import UiucPropeller
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
+from bemt.physics.sections.rule import DRAG_LEVEL
 from bemt.rotors.case import case_of, fresh
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, Sensed
@@ -70,7 +71,7 @@ def beside(
     """Solve the rotor of a size, without any class, with its slopes."""
     D, pitch, blades = size
     case = case_of(fresh.label_text(f"{D:.4g}x{pitch:.4g}x{blades}", measured=False), ends=False)
-    case = case.replaced({"blade.max_chord_over_R": 0.2 * (D / 10.0) ** -0.2})
+    case = case.replaced({"blade.max_chord_over_R": 0.2 * (D / 10.0) ** -0.2, "model.drag_level": DRAG_LEVEL})
     air, V = Air.from_density(), J * rpm / 60.0 * case.diameter_m
     model = prepare_case(case).at_speeds(rpm, V, air)
     Re = np.asarray(co.Re75(model.chord75_m, rpm / 60.0, model.diameter_m, V, air.rho, air.mu))
@@ -191,7 +192,7 @@ def fit(
 
 def usable(one: Labelled) -> bool:
     """Whether readings of a stand can be those of a propeller as drawn: pitch, figure of merit."""
-    FM = float(np.nanmean(0.8 * one.y[0] ** 1.5 / one.y[1]))
+    FM = float(np.mean(0.8 * one.y[0] ** 1.5 / one.y[1]))
     return one.diameter_in >= 4.0 and 0.3 <= one.pitch_ratio <= 0.95 and 0.2 < FM < 0.85
 
 

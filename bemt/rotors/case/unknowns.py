@@ -37,8 +37,8 @@ BLADES_EXPONENT = 0.2
 blades (0.18), 57 and 19 of Drive Calculator's against its two-bladed ones (0.1 to 0.2), FPV (0.4 +- 0.2) [1]."""
 CLASS_DRAG: dict[str | None, tuple[float, float]] = {"sport": (0.43, 0.11)}
 """ln(profile drag) of a class of blades over the usual and its scatter, fitted beside angle, chord and camber: 27 APC
-Sport of UIUC (0.49 from flight alone, 0.54 at rest alone), 8 sport propellers of Drive Calculator 0.63 +- 0.37.
-Electric, folding and slow flyers are within 0.1 of none (56) [1]."""
+Sport of UIUC (0.49 from flight alone, 0.54 at rest alone), 42 sport propellers of Drive Calculator 0.30 +- 0.17.
+Electric, folding and slow flyers are within 0.1 of none (57) [1]."""
 SPORT_DEG = 0.97
 """Further zero-lift angle of sport propellers from the same fit, +- 0.26 [deg]."""
 BLADES_DRAG = (0.23, 0.13)
