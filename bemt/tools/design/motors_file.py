@@ -151,8 +151,9 @@ def on_sale(kv: float, mass_g: float) -> list[KnownMotor]:
     """
     far = []
     for one in motors_on_sale():
-        if one.mass_g is None or one.resistance_mohm is None or one.no_load_A is None:
+        if None in (one.mass_g, one.resistance_mohm, one.no_load_A, one.max_current_A):
             continue
+        assert one.mass_g is not None and one.resistance_mohm is not None  # as just checked
         by, heavier = one.kv / kv, one.mass_g / mass_g
         if NEAR_KV[0] <= by <= NEAR_KV[1] and NEAR_MASS[0] <= heavier <= NEAR_MASS[1]:
             usual = 1e3 * WINDING * float(resistance_of_mass(one.kv, one.mass_g))
