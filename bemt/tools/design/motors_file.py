@@ -137,15 +137,15 @@ def motors_of(given: str | os.PathLike[str] | KnownMotor) -> tuple[KnownMotor, .
     return (_known(named_motor(text, "--motors")),)
 
 
-NEAR_KV, NEAR_MASS = (0.75, 1.4), (0.5, 1.6)
+NEAR_KV, NEAR_MASS = (0.75, 1.4), (0.5, 2.5)
 """Motors that are tried, over the K_v with an even chance and over the mass of the law [1]."""
 TRIED = 48
 WINDING = 0.44
 """Winding of those on sale over `resistance_of_mass`, which holds all losses: median of 7,880, 0.24 to 1.2 for 80 %."""
 
 
-def on_sale(kv: float, mass_g: float) -> list[KnownMotor]:
-    """Motors on sale near a K_v [rev/min/V] and a mass [g], the nearest first, `TRIED` at most.
+def on_sale(kv: float, mass_g: float, current_A: float) -> list[KnownMotor]:
+    """Motors on sale near a K_v [rev/min/V] and a mass [g] that stand a current, the nearest first, `TRIED` at most.
 
     Near is the winding too, to what is usual: the best of many sheets would be the one with the largest mistake.
     """
@@ -153,9 +153,10 @@ def on_sale(kv: float, mass_g: float) -> list[KnownMotor]:
     for one in motors_on_sale():
         if None in (one.mass_g, one.resistance_mohm, one.no_load_A, one.max_current_A):
             continue
-        assert one.mass_g is not None and one.resistance_mohm is not None  # as just checked
+        assert one.mass_g is not None and one.resistance_mohm is not None and one.max_current_A is not None
         by, heavier = one.kv / kv, one.mass_g / mass_g
-        if NEAR_KV[0] <= by <= NEAR_KV[1] and NEAR_MASS[0] <= heavier <= NEAR_MASS[1]:
+        near = NEAR_KV[0] <= by <= NEAR_KV[1] and NEAR_MASS[0] <= heavier <= NEAR_MASS[1]
+        if near and one.max_current_A >= current_A:
             usual = 1e3 * WINDING * float(resistance_of_mass(one.kv, one.mass_g))
             far.append((math.hypot(4.0 * math.log(by), math.log(heavier), math.log(one.resistance_mohm / usual)), one))
     return [_known(one) for _, one in sorted(far, key=lambda pair: pair[0])[:TRIED]]

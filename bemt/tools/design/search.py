@@ -188,7 +188,7 @@ def _on_sale(
     even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
     theirs, u = dataclasses.replace(target, sized=False), rotor_loads.nearest(one, spreads)
     found: dict[str, dict[str, Any]] = {}
-    for motor in motors_file.on_sale(math.sqrt(even * first.kv), first.motor_g):
+    for motor in motors_file.on_sale(math.sqrt(even * first.kv), first.motor_g, 0.8 * first.peak_A):
         if motor.maker in found:
             continue
         row = _rows(one, u, (motor,), theirs)[0] | {"maker": motor.maker, "max_current_A": motor.max_current_A}
