@@ -5,6 +5,9 @@
 DATA holds the recorded benches (docs/choose.md names them). At a thrust that every propeller of a bench reached, the
 measured g/W are ranked against those of `choose` for the same labels on one motor of the same K_v, which knows no blade
 and no loss of the bench. Where no motor was on the stand (shaft power), the motor of `choose` has no losses either.
+Below the table: how far power lies from the stated one, and where a battery was on the stand its current (the voltage
+there differs by a few per cent only). Current is compared at a thrust, not at full throttle, which two stands never
+reached: the supply of the RS2205S gives 11 A and drops from 11 to 8 V, WVU's ramps end at a pulse of 1,544 us.
 """
 
 from __future__ import annotations
@@ -161,8 +164,8 @@ def benches(folder: Path) -> Iterator[Bench]:
     yield from uiuc(folder)
 
 
-def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float]]]]:
-    """Thrusts [N], and measured and predicted g/W of each label there."""
+def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float, float]]]]:
+    """Thrusts [N], and measured and predicted g/W of each label there, with its relative uncertainty."""
     most = min(T.max() for T, _ in bench.rows.values())
     for share in SHARES:
         thrust = float(f"{share * most:.2g}")
@@ -174,10 +177,11 @@ def compared(bench: Bench) -> Iterator[tuple[float, dict[str, tuple[float, float
             max_tip_mach=0.95,
         ).set_index("label")  # fmt: skip
         out = {
-            label: (1e3 * thrust / G0 / power_at(thrust, *row), float(table.g_per_W[label]))
+            label: (1e3 * thrust / G0 / power_at(thrust, *row), float(table.g_per_W[label]),
+                    float(table.u_power_W[label] / table.power_W[label]))
             for label, row in inside.items()
             if math.isfinite(table.g_per_W[label])
-        }
+        }  # fmt: skip
         if len(out) >= 3:
             yield thrust, out
 
@@ -186,7 +190,7 @@ def main() -> None:
     """Print the table."""
     folder = Path(sys.argv[1])
     right = total = 0
-    losses = []
+    losses, errors = [], []
     print("| bench | propellers | thrust N | measured best | first of `choose` | loses |\n|---|---|---|---|---|---|")
     for bench in benches(folder):
         for thrust, found in compared(bench):
@@ -194,11 +198,20 @@ def main() -> None:
             lost = 1.0 - found[first][0] / found[best][0]
             total, right = total + 1, right + (first == best)
             losses.append(lost)
+            errors += [(bench.name, a / b - 1.0, u) for a, b, u in found.values()]
             shown = [f"{label}, {found[label][0]:.3g} ({found[label][1]:.3g})" for label in (best, first)]
             row = (bench.name, f"{len(found)}", f"{thrust:g}", *shown, "-" if first == best else f"{lost:.1%}")
             print(f"| {' | '.join(row)} |", flush=True)
             if "-v" in sys.argv:
-                print("   ", {k: (round(a, 2), round(b, 2)) for k, (a, b) in found.items()})
+                print("   ", {k: (round(a, 2), round(b, 2)) for k, (a, b, _) in found.items()})
+    table = pd.DataFrame(errors, columns=["bench", "error", "u"])
+    battery, rest = ~table.bench.str.contains("shaft"), ~table.bench.str.contains("[1-9] kt")
+    groups = {"power": table, "current": table[battery], "current at rest": table[battery & rest]}
+    groups |= dict(iter(table.groupby("bench"))) if "-v" in sys.argv else {}
+    for what, some in groups.items():
+        z = (some.error / some.u).abs()
+        print(f"{what}: {len(some)} readings, off by {some.error.abs().median():.1%} in the median; "
+              f"{(z < 1.0).mean():.0%} within one u, {(z < 2.0).mean():.0%} within two")  # fmt: skip
     print(f"{right} of {total} right; g/W lost: mean {np.mean(losses):.1%}, most {np.max(losses):.1%}")
 
 

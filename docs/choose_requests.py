@@ -33,7 +33,7 @@ REQUESTS: tuple[tuple[str, dict[str, Any]], ...] = (
 )  # fmt: skip
 HEAD = (
     "| request | first: smallest within 5 % | K_v (even chance) | power W | g/W | full throttle N | motor, propeller, "
-    "controller, arm g | least power |\n|---|---|---|---|---|---|---|---|\n"
+    "controller, arm g | least power | a motor on sale |\n|---|---|---|---|---|---|---|---|---|\n"
 )
 
 
@@ -42,13 +42,15 @@ def row(words: str, table: pd.DataFrame) -> str:
     first, sure = table.iloc[0], table.attrs["sure"]
     if first.probability < sure:
         most = table.loc[table.full_thrust_N.idxmax()]
-        return f"| {words} | none is sure; {most.label} gives {most.full_thrust_N:.3g} N |" + " |" * 6
+        return f"| {words} | none is sure; {most.label} gives {most.full_thrust_N:.3g} N |" + " |" * 7
     even = table[(table.label == first.label) & (table.probability >= 0.5)].kv.min()
     least = best_of_each(table[table.probability >= sure]).sort_values("power_W").iloc[0]
     gain = 1.0 - least.power_W / first.power_W
     other = "the same" if least.label == first.label else f"{least.label}, {gain:.1%} less"
+    stock = next((f"{m['motor']}, {m['motor_g']:.0f} g, {m['power_W']:.3g} W" for m in table.attrs["on_sale"]), "-")
     cells = (words, first.label, f"{first.kv:.0f} ({even:.0f})", f"{first.power_W:.3g} ± {first.u_power_W:.2g}",
-             f"{first.g_per_W:.3g}", f"{first.full_thrust_N:.3g}", f"{first.propulsion_g:.0f}", other)  # fmt: skip
+             f"{first.g_per_W:.3g}", f"{first.full_thrust_N:.3g}", f"{first.propulsion_g:.0f}", other,
+             stock)  # fmt: skip
     return f"| {' | '.join(cells)} |"
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import bemt
 from bemt.app.cli import main
 from bemt.base.errors import InputError
 from bemt.rotors.propeller import rotor_of
@@ -242,3 +243,29 @@ def test_the_command_writes_document_table_and_picture(tmp_path, capsys: pytest.
     assert main([*words, "--motors", str(motors), "--out", str(tmp_path / "o")]) == 0
     assert {f.name for f in (tmp_path / "o").iterdir()} == {"choose.json", "choose.csv", "choose.png"}
     assert "P(met)" in capsys.readouterr().out
+
+
+def test_motors_on_sale_are_named_where_their_list_is_installed() -> None:
+    pytest.importorskip("pythrust", reason="extra motors")
+    found = bemt.choose(mass_kg=1.4, cells=4, rotors=4, labels=["12x4.5", "13x4.5"])
+    stock = found.table.attrs["on_sale"]
+    assert len(stock) == len({row["maker"] for row in stock}) > 1
+    for row in stock:
+        assert row["label"] == found.table.label[0] and row["probability"] >= 0.9
+        assert row["peak_A"] <= row["max_current_A"] and row["asked_N"] <= row["full_thrust_N"]
+        assert row["motor"] in found.text
+    assert "Apache-2.0" in found.text and found.to_dict()["on_sale"][0]["motor"] == stock[0]["motor"]
+    light, heavy = sorted(stock, key=lambda row: row["motor_g"])[:: len(stock) - 1]
+    more = 1e-3 * 9.80665 * (heavy["motor_g"] - light["motor_g"])  # each lifts itself
+    assert heavy["at_N"] - light["at_N"] == pytest.approx(more, rel=0.1)
+    named = bemt.choose(mass_kg=1.4, cells=4, rotors=4, labels=[heavy["label"]], motors=heavy["motor"])
+    assert named.power_W.iloc[0] == pytest.approx(heavy["power_W"], rel=1e-3)
+    assert named.table.attrs["on_sale"] == ()
+    with pytest.raises(InputError, match="no motor has"):
+        bemt.choose(8.0, 3, motors="Nobody 9999 12345")
+
+
+def test_three_blades_of_a_racer_need_more_power_than_two() -> None:
+    """As on the RS2205S, 4.5 to 8.6 % more: what is on sale with three blades has more drag than the drawing."""
+    table = choose(3.0, 4, labels=["5x4", "5x4x3"], kv=2600.0).set_index("label")
+    assert table.power_W["5x4x3"] > table.power_W["5x4"]

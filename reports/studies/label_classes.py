@@ -1,7 +1,8 @@
-"""Chord, blade angle and camber of classes of blades, fitted to readings through the slopes of the label's rotor.
+"""Chord, angle, camber and drag of classes of blades, fitted to readings through the slopes of the label's rotor.
 
 ``python reports/studies/label_classes.py uiuc uiuc_2 --drivecalc FILE`` prints the table from which
-`bemt.rotors.case.unknowns.CLASS_CHORD`, `WIDTH_CHORD` and `BLADES_EXPONENT` were read.  APC's computed tables come with
+`bemt.rotors.case.unknowns.CLASS_CHORD`, `CLASS_DRAG`, `WIDTH_CHORD` and `BLADES_EXPONENT` were read, and, with makers
+alike in weight, `BLADES_DRAG`.  APC's computed tables come with
 the package setuav-pythrust; they and Drive Calculator's stands share a gain of their own.
 """
 
@@ -11,6 +12,7 @@ import argparse
 import csv
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +26,7 @@ from bemt.data.readers.uiuc import UiucPropeller
 from bemt.data.readers.uiuc_names import class_of
 from bemt.physics import coefficients as co
 from bemt.physics.air import Air
+from bemt.physics.sections.rule import DRAG_LEVEL
 from bemt.rotors.case import case_of, fresh
 from bemt.rotors.case.prepare import prepare_case
 from bemt.rotors.latents import NAMES, Sensed
@@ -38,9 +41,11 @@ from geometry.designation import parse_designation
 Array = NDArray[np.float64]
 COMPUTED, STAND = (0.05, 0.08), (0.05, 0.10)
 """Gains on CT and CP that all readings of a computed table, or of a hobby stand, share [1]."""
-_LOOSE = np.array([0.5, 0.25, 0.8])  # prior of a class: angle [deg], ln(chord), camber [deg]
-_SD, _SD_LN = np.array([0.6, 0.12, 0.7]), np.array([0.4, 0.5, 0.4])  # prior of the scatter within one
-_DRAG, _LIFT, _NU = 0.11, 0.037, 5.0
+GAINS = {"uiuc": (0.0, 0.0), "apc": COMPUTED, "stands": STAND}
+_LOOSE = np.array([0.5, 0.25, 0.8, 0.5])  # prior of a class: angle [deg], ln(chord), camber [deg], ln(drag)
+_ONLY_DRAG = np.array([0.01, 0.01, 0.01, 0.5])
+_SD, _SD_LN = np.array([0.6, 0.12, 0.7, 0.2]), np.array([0.4, 0.5, 0.4, 0.5])  # prior of the scatter within one
+_LIFT, _NU = 0.037, 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,21 +53,25 @@ class Labelled:
     """Readings of a propeller beside the rotor that its size alone draws."""
 
     source: str
+    maker: str
     kind: str | None
     width: int
     blades: int
     diameter_in: float
+    pitch_ratio: float
     at: Sensed
     chord_slope: Array  # (2, P) of CT and CP with ln(chord)
     y: Array  # (2, P)
 
 
-def beside(source: str, kind: str | None, width: int, size: tuple[float, float, int], rpm: Array, J: Array, y: Array
-           ) -> Labelled:  # fmt: skip
+def beside(
+    source: str, maker: str, kind: str | None, width: int, size: tuple[float, float, int],
+    rpm: Array, J: Array, y: Array,
+) -> Labelled:  # fmt: skip
     """Solve the rotor of a size, without any class, with its slopes."""
     D, pitch, blades = size
     case = case_of(fresh.label_text(f"{D:.4g}x{pitch:.4g}x{blades}", measured=False), ends=False)
-    case = case.replaced({"blade.max_chord_over_R": 0.2 * (D / 10.0) ** -0.2})
+    case = case.replaced({"blade.max_chord_over_R": 0.2 * (D / 10.0) ** -0.2, "model.drag_level": DRAG_LEVEL})
     air, V = Air.from_density(), J * rpm / 60.0 * case.diameter_m
     model = prepare_case(case).at_speeds(rpm, V, air)
     Re = np.asarray(co.Re75(model.chord75_m, rpm / 60.0, model.diameter_m, V, air.rho, air.mu))
@@ -72,7 +81,7 @@ def beside(source: str, kind: str | None, width: int, size: tuple[float, float, 
         wider = case.replaced({"blade.max_chord_over_R": factor * case.get("blade.max_chord_over_R")})
         found = prepare_case(wider).at_speeds(rpm, V, air).solve(rpm, V, air)
         ends.append(np.array([found.CT, found.CP]))
-    return Labelled(source, kind, width, blades, D, at, (ends[1] - ends[0]) / math.log(1.1 / 0.9), y)
+    return Labelled(source, maker, kind, width, blades, D, pitch / D, at, (ends[1] - ends[0]) / math.log(1.1 / 0.9), y)
 
 
 def readings(folders: Sequence[Path]) -> Iterator[tuple[UiucPropeller, Array, Array, Array]]:
@@ -93,7 +102,7 @@ def readings(folders: Sequence[Path]) -> Iterator[tuple[UiucPropeller, Array, Ar
 def of_uiuc(folders: Sequence[Path]) -> Iterator[Labelled]:
     """Every measured propeller with a pitch, whether its stations are known or not."""
     for p, rpm, J, y in readings(folders):
-        yield beside("uiuc", class_of(p.family), 0, (p.diameter_in, p.pitch_in, p.blades), rpm, J, y)
+        yield beside("uiuc", p.family, class_of(p.family), 0, (p.diameter_in, p.pitch_in, p.blades), rpm, J, y)
 
 
 def of_drivecalc(file: Path) -> Iterator[Labelled]:
@@ -111,7 +120,16 @@ def of_drivecalc(file: Path) -> Iterator[Labelled]:
             CT = a * (rpm / 1e3) ** b * 1e-3 * G0 / (rho[0] * n**2 * m**4) if a > 0 else np.full(2, np.nan)
             CP = c * (rpm / 1e3) ** d / (rho[1] * n**3 * m**5) if c > 0 else np.full(2, np.nan)
             size = (D, pitch, told.blades or 2)
-            yield beside("stands", told.blade_class, told.width, size, rpm, np.zeros(2), np.array([CT, CP]))
+            yield beside(
+                "stands",
+                row["Name"].split()[0],
+                told.blade_class,
+                told.width,
+                size,
+                rpm,
+                np.zeros(2),
+                np.array([CT, CP]),
+            )
 
 
 def _density(altitude_m: float, temperature_C: float) -> float:
@@ -133,41 +151,49 @@ def of_apc() -> Iterator[Labelled]:
         line = rows[(rows[:, 0] == here) & (rows[:, 2] > 0.015)]
         line = line[np.unique(np.linspace(0, len(line) - 1, 6).round().astype(int))]
         size = (about["diameter_in"], about["pitch_in"], about["blade_count"])
-        yield beside("apc", told.blade_class, told.width, size, line[:, 0], line[:, 1], line[:, 2:].T)
+        yield beside("apc", "APC", told.blade_class, told.width, size, line[:, 0], line[:, 1], line[:, 2:].T)
 
 
-def fit(members: Sequence[Labelled], gains: tuple[float, float]) -> tuple[Array, Array, Array]:
-    """Mean of angle [deg], ln(chord) and camber [deg] of a class, its standard error, and the scatter within."""
+def fit(
+    members: Sequence[Labelled], loose: Array = _LOOSE, weights: Sequence[float] | None = None
+) -> tuple[Array, Array, Array]:
+    """Mean of angle [deg], ln(chord), camber [deg] and ln(drag) of a class, its standard error, the scatter within."""
     from scipy.optimize import minimize
 
     p, rows = population(), []
     names = [NAMES.index(n) for n in ("angle_deg", "camber_deg", "drag", "lift")]
-    for one in members:
+    for one, weight in zip(members, weights or [1.0] * len(members), strict=True):
         at = one.at
         left = (one.y - at.f - p.bias(at)).reshape(-1)
         slopes = [at.T[:, names[0]], one.chord_slope, *(at.T[:, k] for k in names[1:])]
         T = np.stack(slopes, -1).reshape(left.size, -1)
         N = p.rest(at) + np.diag((p.noise_sd(at) ** 2).reshape(-1))
-        for i, g in enumerate(gains):
+        for i, g in enumerate(GAINS[one.source]):
             common = np.zeros_like(one.y)
             common[i] = g * np.nan_to_num(one.y[i])
             N = N + np.outer(common.reshape(-1), common.reshape(-1))
         good = np.isfinite(left) & np.isfinite(at.f.reshape(-1))
         if good.any():
-            rows.append((left[good], T[good], N[np.ix_(good, good)]))
+            rows.append((weight, left[good], T[good], N[np.ix_(good, good)]))
 
     def misfit(theta: Array) -> float:
-        mean, sd = np.append(theta[:3], [0.0, 0.0]), np.exp(theta[3:])
-        C = np.diag([*sd**2, _DRAG**2, _LIFT**2])
-        total = 0.5 * float(np.sum((theta[:3] / _LOOSE) ** 2) + np.sum(((theta[3:] - np.log(_SD)) / _SD_LN) ** 2))
-        for left, T, N in rows:
+        mean, sd = np.append(theta[:4], 0.0), np.exp(theta[4:])
+        C = np.diag([*sd**2, _LIFT**2])
+        total = 0.5 * float(np.sum((theta[:4] / loose) ** 2) + np.sum(((theta[4:] - np.log(_SD)) / _SD_LN) ** 2))
+        for weight, left, T, N in rows:
             S, e = T @ C @ T.T + N, left - T @ mean
             q = float(e @ np.linalg.solve(S, e))
-            total += 0.5 * float(np.linalg.slogdet(S)[1]) + 0.5 * (_NU + e.size) * math.log1p(q / _NU)
+            total += weight * (0.5 * float(np.linalg.slogdet(S)[1]) + 0.5 * (_NU + e.size) * math.log1p(q / _NU))
         return total
 
-    found = minimize(misfit, np.append(np.zeros(3), np.log(_SD)), method="BFGS", options={"maxiter": 60, "gtol": 1e-3})
-    return found.x[:3], np.sqrt(np.diag(found.hess_inv))[:3], np.exp(found.x[3:])
+    found = minimize(misfit, np.append(np.zeros(4), np.log(_SD)), method="BFGS", options={"maxiter": 60, "gtol": 1e-3})
+    return found.x[:4], np.sqrt(np.diag(found.hess_inv))[:4], np.exp(found.x[4:])
+
+
+def usable(one: Labelled) -> bool:
+    """Whether readings of a stand can be those of a propeller as drawn: pitch, figure of merit."""
+    FM = float(np.mean(0.8 * one.y[0] ** 1.5 / one.y[1]))
+    return one.diameter_in >= 4.0 and 0.3 <= one.pitch_ratio <= 0.95 and 0.2 < FM < 0.85
 
 
 def main(words: list[str] | None = None) -> int:
@@ -178,20 +204,28 @@ def main(words: list[str] | None = None) -> int:
     args = parser.parse_args(words)
     found = [*of_uiuc([where(f) for f in args.folders]), *of_apc()]
     found += of_drivecalc(Path(args.drivecalc)) if args.drivecalc else []
-    gains = {"uiuc": (0.0, 0.0), "apc": COMPUTED, "stands": STAND}
     groups: dict[tuple[str, str | None, int, int], list[Labelled]] = {}
     for one in found:
         groups.setdefault((one.source, one.kind, one.width, min(one.blades, 4)), []).append(one)
-    head = ("source, class, width, blades", "n", "angle [deg]", "ln chord", "camber [deg]")
-    print("{:34} {:>4}  {:>14}  {:>14}  {:>14}  scatter".format(*head))
+    head = ("source, class, width, blades", "n", "angle [deg]", "ln chord", "camber [deg]", "ln drag")
+    print("{:34} {:>4}  {:>14}  {:>14}  {:>14}  {:>14}  scatter".format(*head))
     for key, members in sorted(groups.items(), key=str):
         if len(members) < 2:
             continue
         name = " ".join(map(str, key))
-        mean, error, sd = fit(members, gains[members[0].source])
-        cells = "  ".join(f"{m:+6.2f} +- {e:4.2f}" for m, e in zip(mean, error, strict=True))
-        print(f"{name:34} {len(members):4d}  {cells}   {sd[0]:.2f} {sd[1]:.3f} {sd[2]:.2f}")
+        _show(name, members, *fit(members))
+    many = [one for one in found if one.blades > 2 and one.source != "apc" and (one.source == "uiuc" or usable(one))]
+    for left in ("", *sorted({one.maker for one in many})) if many else ():
+        some = [one for one in many if one.maker != left]
+        count = Counter(one.maker for one in some)
+        weights = [count[one.maker] ** -0.5 for one in some]
+        _show(f"three and more blades{' but ' * bool(left)}{left}", some, *fit(some, _ONLY_DRAG, weights))
     return 0
+
+
+def _show(name: str, members: Sequence[Labelled], mean: Array, error: Array, sd: Array) -> None:
+    cells = "  ".join(f"{m:+6.2f} +- {e:4.2f}" for m, e in zip(mean, error, strict=True))
+    print(f"{name:34} {len(members):4d}  {cells}   {sd[0]:.2f} {sd[1]:.3f} {sd[2]:.2f} {sd[3]:.2f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from bemt.rotors.case.unknowns import (
     label_chord,
     offset_of,
     section_of,
+    surface_of,
 )
 from bemt.rotors.measured import MeasuredRotor, find, records
 from geometry.common import GeometryError
@@ -192,9 +193,11 @@ def label_text(
     chord, section = label_chord(D * INCH, told.blade_class, B, told.width), section_of(told.blade_class)
     offset = offset_of(family)
     known = find(told, family) if measured else None
-    open_ = (HUB, offset, chord, *section, *SURFACE, AIR)
+    surface = surface_of(told.blade_class, B)
+    open_ = (HUB, offset, chord, *section, *surface, AIR)
     values = (chord.value, section[0].value, offset.value)
     source = f"from its label. {_UNKNOWN}"
+    drag = "" if surface is SURFACE or known is not None else f"\n[model]\ndrag_level = {surface[1].value:g}\n"
     if known is not None:
         open_, values = (AIR,), (known.chord, known.camber, known.offset_deg)
         source = f"as measured: {known.source}.\n# The numbers are those of bemt's own fit to it."
@@ -219,7 +222,7 @@ max_chord_over_R = {values[0]:.3g}
 [blade.section]
 camber = {values[1]:g}
 thickness = 0.09
-{_tail(D * INCH, rpm, airspeed_m_s, motor, *open_)}"""
+{drag}{_tail(D * INCH, rpm, airspeed_m_s, motor, *open_)}"""
 
 
 _UNKNOWN = (

@@ -12,6 +12,7 @@ import json
 import math
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -112,6 +113,8 @@ class NamedMotor:
     no_load_A: float | None
     mass_g: float | None
     source: str
+    maker: str = ""
+    max_current_A: float | None = None
 
     @property
     def keys(self) -> dict[str, float | str]:
@@ -123,38 +126,50 @@ class NamedMotor:
         return {f"drive.{key}": value for key, value in given.items() if value is not None}
 
 
-def named_motor(name: str, where: str = "--motor") -> NamedMotor:
-    """Motor by its name, such as ``T-Motor MN2212 920``: words of the name in any order, and its K_v as a number.
+LIST = "setuav-pythrust"
+"""List of motors by name (Karakaya, Apache-2.0), extra ``motors``; its numbers are the makers' own."""
 
-    From setuav-pythrust (Karakaya, Apache-2.0, extra ``motors``), whose numbers are makers' own.
-    """
+
+@cache
+def motors_on_sale() -> tuple[NamedMotor, ...]:
+    """Motors of the list, by file name; none where it is not installed."""
     try:
         from pythrust import __version__, dataset_dir
     except ImportError:
-        hint = 'Install it: pip install "bemt[motors]"'
-        raise InputError(Fault(where, "", repr(name), "the list of motors, setuav-pythrust", hint)) from None
-    words, found = [word for word in _words(name) if len(word) > 1], []
+        return ()
+    out = []
     for file in sorted((Path(dataset_dir()) / "motors").glob("*.json")):
-        stem = _words(file.stem)
+        one = json.loads(file.read_text(encoding="utf-8"))
+        ohm, idle, mass, most = (
+            float(v) if isinstance(v := one.get(key), (int, float)) and v > 0 else None
+            for key in ("resistance", "io", "weight_g", "max_current")
+        )
+        source = f"{LIST} {__version__} (Karakaya, Apache-2.0), makers' numbers: {one['id']}"
+        mohm = None if ohm is None else 1e3 * ohm
+        maker = str(one["manufacturer"])
+        out.append(NamedMotor(f"{maker} {one['name']}", float(one["kv"]), mohm, idle, mass, source, maker, most))
+    return tuple(out)
+
+
+def named_motor(name: str, where: str = "--motor") -> NamedMotor:
+    """Motor by its name, such as ``T-Motor MN2212 920``: words of the name in any order, and its K_v as a number."""
+    known = motors_on_sale()
+    if not known:
+        hint = 'Install it: pip install "bemt[motors]"'
+        raise InputError(Fault(where, "", repr(name), f"the list of motors, {LIST}", hint))
+    words, found = [word for word in _words(name) if len(word) > 1], []
+    for one in known:
+        stem = _words(one.source.rpartition(": ")[2])
         numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
         if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):
-            one = json.loads(file.read_text(encoding="utf-8"))
-            if all(abs(float(w) / float(one["kv"]) - 1.0) < 0.02 for w in numbers):
+            if all(abs(float(w) / one.kv - 1.0) < 0.02 for w in numbers):
                 found.append((len(stem), one))
     fewest = [one for size, one in found if size == min(n for n, _ in found)]
     if len(fewest) != 1:
-        names = ", ".join(f"{one['manufacturer']} {one['name']}" for _, one in found[:8])
+        names = ", ".join(one.name for _, one in found[:8])
         got = f"{name!r}, which {'no motor has' if not found else f'{len(found)} motors have'}"
         raise InputError(Fault(where, "", got, "the name of one motor", f"Such as {names}" if names else ""))
-    one = fewest[0]
-
-    def number(key: str, factor: float = 1.0) -> float | None:
-        value = one.get(key)
-        return float(value) * factor if isinstance(value, (int, float)) and value > 0 else None
-
-    source = f"setuav-pythrust {__version__} (Karakaya, Apache-2.0), makers' numbers: {one['id']}"
-    label = f"{one['manufacturer']} {one['name']}"
-    return NamedMotor(label, float(one["kv"]), number("resistance", 1e3), number("io"), number("weight_g"), source)
+    return fewest[0]
 
 
 def _words(name: str) -> set[str]:

@@ -42,8 +42,9 @@ def choose(
         LiPo cells in series.
     kv : float or (low, high)
         Speed constant, or the range of which 72 are tried. [rev/min/V]
-    motors : path, or sequence of paths or KnownMotor
-        Real motors instead: CSV files with name,kv,resistance_mohm,no_load_A.
+    motors : path or name, or sequence of them or of KnownMotor
+        Real motors instead: CSV files with name,kv,resistance_mohm,no_load_A, or names of motors on sale, such as
+        "T-Motor MN2212 920" (extra motors).
     labels : str or sequence of str
         Propellers to try, as 10x5 or 9x4.5x3; standard sizes by default.
     blades : int or sequence of int

@@ -11,6 +11,7 @@ from bemt.base import canvas
 from bemt.base.action import as_html
 from bemt.base.errors import EXIT_OK, EXIT_UNCONVERGED
 from bemt.base.tables import csv_text, json_text, number_text, write_atomic
+from bemt.rotors.case.motor import LIST, motors_on_sale
 from bemt.tools.design.search import Target
 
 if TYPE_CHECKING:
@@ -107,9 +108,31 @@ def text(table: pd.DataFrame) -> str:
          number_text(r.full_thrust_N, 3), f"{r.propulsion_g:.0f}", r.why or "-"]
         for r in best_of_each(table).head(SHOWN).itertuples()
     ]  # fmt: skip
-    width = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
-    lines += ["  ".join(cell.ljust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in [head, *rows]]
-    return "\n".join(lines) + "\n"
+    lines += _columns([head, *rows])
+    return "\n".join([*lines, *_on_sale(table)]) + "\n"
+
+
+def _on_sale(table: pd.DataFrame) -> list[str]:
+    """Motors on sale for the first propeller, and where they come from."""
+    t, first, found = table.attrs["target"], table.iloc[0], table.attrs["on_sale"]
+    if not t.sized or t.fluid != "air" or first.probability < table.attrs["sure"]:
+        return []
+    if not (known := len(motors_on_sale())):
+        return ["", 'Motors on sale by name: pip install "bemt[motors]"']
+    source = f"{known:,} of {LIST} (Karakaya, Apache-2.0), makers' numbers; price and stock not known"
+    if not found:
+        return ["", f"No motor on sale near that K_v and mass is sure to turn {first.label}: none of {source}"]
+    head = ["motor on sale", "kv", "g", "P(met)", "power W", "peak A", "of A", "full N"]
+    rows = [[r["motor"], f"{r['kv']:.0f}", f"{r['motor_g']:.0f}", f"{r['probability']:.0%}",
+             _banded(r["power_W"], r["u_power_W"]),
+             *(number_text(r[key], 3) for key in ("peak_A", "max_current_A", "full_thrust_N"))]
+            for r in found]  # fmt: skip
+    return ["", f"{first.label} on motors that are on sale, one of a maker ({source})", *_columns([head, *rows])]
+
+
+def _columns(rows: list[list[str]]) -> list[str]:
+    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return ["  ".join(cell.ljust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]
 
 
 def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
@@ -139,7 +162,7 @@ def _headline(table: pd.DataFrame, good: int, at: str) -> list[str]:
 def document(table: pd.DataFrame) -> dict[str, Any]:
     """Plain values, ``bemt.choose/1``; all pairs, best first."""
     return {"schema": SCHEMA, "target": vars(table.attrs["target"]), "sure": table.attrs["sure"],
-            "pairs": table.to_dict("records")}  # fmt: skip
+            "pairs": table.to_dict("records"), "on_sale": list(table.attrs["on_sale"])}  # fmt: skip
 
 
 def write(table: pd.DataFrame, out: str | Path) -> None:

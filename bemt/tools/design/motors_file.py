@@ -1,4 +1,4 @@
-"""A CSV of real motors: name, kv, resistance and no-load current."""
+"""Real motors: a CSV of name, kv, resistance and no-load current, or those on sale; and what the parts weigh."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse, system_fault
 from bemt.base.tables import number_of
+from bemt.rotors.case.motor import NamedMotor, motors_on_sale, named_motor, resistance_of_mass
 
 # What a rotor's motor, propeller, controller and arm weigh: declared laws with their spread.
 #
@@ -108,12 +109,57 @@ Drive Calculator has recorded is below 1 mohm."""
 
 @dataclass(frozen=True)
 class KnownMotor:
-    """A motor; NaN resistance or no-load current: not known."""
+    """A motor; NaN: not known."""
 
     name: str
     kv: float  # [rev/min/V]
     resistance_ohm: float = math.nan  # between two leads [ohm]
     no_load_A: float = math.nan  # [A]
+    mass_g: float = math.nan  # [g]
+    max_current_A: float = math.nan  # that the maker allows [A]
+    maker: str = ""
+
+
+def _known(one: NamedMotor) -> KnownMotor:
+    mohm, idle, mass, most = (
+        math.nan if v is None else v for v in (one.resistance_mohm, one.no_load_A, one.mass_g, one.max_current_A)
+    )
+    return KnownMotor(one.name, one.kv, 1e-3 * mohm, idle, mass, most, one.maker)
+
+
+def motors_of(given: str | os.PathLike[str] | KnownMotor) -> tuple[KnownMotor, ...]:
+    """Motors as told: one, a CSV of them, or the name of one on sale, such as ``T-Motor MN2212 920``."""
+    if isinstance(given, KnownMotor):
+        return (given,)
+    text = os.fspath(given)
+    if Path(text).suffix or Path(text).exists() or "/" in text or os.sep in text:
+        return read_motors(text)
+    return (_known(named_motor(text, "--motors")),)
+
+
+NEAR_KV, NEAR_MASS = (0.75, 1.4), (0.5, 2.5)
+"""Motors that are tried, over the K_v with an even chance and over the mass of the law [1]."""
+TRIED = 48
+WINDING = 0.44
+"""Winding of those on sale over `resistance_of_mass`, which holds all losses: median of 7,880, 0.24 to 1.2 for 80 %."""
+
+
+def on_sale(kv: float, mass_g: float, current_A: float) -> list[KnownMotor]:
+    """Motors on sale near a K_v [rev/min/V] and a mass [g] that stand a current, the nearest first, `TRIED` at most.
+
+    Near is the winding too, to what is usual: the best of many sheets would be the one with the largest mistake.
+    """
+    far = []
+    for one in motors_on_sale():
+        if None in (one.mass_g, one.resistance_mohm, one.no_load_A, one.max_current_A):
+            continue
+        assert one.mass_g is not None and one.resistance_mohm is not None and one.max_current_A is not None
+        by, heavier = one.kv / kv, one.mass_g / mass_g
+        near = NEAR_KV[0] <= by <= NEAR_KV[1] and NEAR_MASS[0] <= heavier <= NEAR_MASS[1]
+        if near and one.max_current_A >= current_A:
+            usual = 1e3 * WINDING * float(resistance_of_mass(one.kv, one.mass_g))
+            far.append((math.hypot(4.0 * math.log(by), math.log(heavier), math.log(one.resistance_mohm / usual)), one))
+    return [_known(one) for _, one in sorted(far, key=lambda pair: pair[0])[:TRIED]]
 
 
 HEAD_HINT = f"The first line is {','.join(COLUMNS)}"

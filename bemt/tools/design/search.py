@@ -40,7 +40,7 @@ from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V
 from bemt.rotors.case.motor import SCATTER, SCATTER_MASS, resistance_of_mass, usual_resistance
 from bemt.rotors.case.unknowns import DRIVE, ESC_DROP
 from bemt.tools.design import motors_file, rotor_loads
-from bemt.tools.design.motors_file import KnownMotor, read_motors
+from bemt.tools.design.motors_file import KnownMotor
 from bemt.tools.design.rotor_loads import LoadScatter, RotorLoads
 
 if TYPE_CHECKING:
@@ -139,7 +139,8 @@ def choose(
     A row per pair, best first; ``propulsion_g`` is the mass of one rotor's motor, propeller, controller and arm,
     ``at_N`` the thrust of the power, ``why`` says why it is not the first. Pairs that meet the target with the
     probability `sure` come first: the smallest within 5 % of the least power, the one with the least power, then by
-    power. `motors` may be a CSV with ``name,kv,resistance_mohm,no_load_A``.
+    power. `motors` may be a CSV with ``name,kv,resistance_mohm,no_load_A`` or names of motors on sale; without it up to
+    three of those for the first propeller are in ``table.attrs["on_sale"]``.
 
     >>> found = choose(8.0, 3, labels=["10x4.5", "9x6", "8x4"], kv=(700, 1500))
     >>> found.label.iloc[0], bool(found.probability.iloc[0] >= 0.9)
@@ -156,7 +157,7 @@ def choose(
     target = dataclasses.replace(target, max_diameter_in=None if math.isinf(most) else most)
     kvs = np.geomspace(min(ends), max(ends), 72) if min(ends) < max(ends) else np.array(ends[:1])
     given = [motors] if isinstance(motors, (str, os.PathLike)) else motors
-    known = tuple(m for one in given for m in ((one,) if isinstance(one, KnownMotor) else read_motors(one)))
+    known = tuple(m for one in given for m in motors_file.motors_of(one))
     target = dataclasses.replace(target, sized=not known)
     machines = known or tuple(KnownMotor(f"{v:.0f} rev/min/V", float(v)) for v in kvs)
     names = _several(labels) or _standard(target, counts)
@@ -168,7 +169,34 @@ def choose(
     table = _ranked(pd.DataFrame(rows), sure)
     table["why"] = _reasons(table, target, sure)
     table.attrs |= {"target": target, "sure": sure}
+    table.attrs["on_sale"] = _on_sale(table, loads, spreads, target, sure) if target.sized else ()
     return table
+
+
+MAKERS = 3
+"""Motors on sale that are named, each of another maker."""
+
+
+def _on_sale(
+    table: pd.DataFrame, loads: Sequence[RotorLoads], spreads: Sequence[LoadScatter], target: Target, sure: float
+) -> tuple[dict[str, Any], ...]:
+    """The most usual motors on sale for the first propeller that are sure of the target and stand their current."""
+    first = table.iloc[0]
+    if first.probability < sure or target.fluid != "air":
+        return ()
+    one = next(x for x in loads if x.label == first.label)
+    even = table.kv[(table.label == first.label) & (table.probability >= 0.5)].min()
+    theirs, u = dataclasses.replace(target, sized=False), rotor_loads.nearest(one, spreads)
+    found: dict[str, dict[str, Any]] = {}
+    for motor in motors_file.on_sale(math.sqrt(even * first.kv), first.motor_g, 0.8 * first.peak_A):
+        if motor.maker in found:
+            continue
+        row = _rows(one, u, (motor,), theirs)[0] | {"maker": motor.maker, "max_current_A": motor.max_current_A}
+        if row["probability"] >= sure and not row["peak_A"] > motor.max_current_A:
+            found[motor.maker] = row
+        if len(found) == MAKERS:
+            break
+    return tuple(found.values())
 
 
 def _several(value: Any) -> tuple[Any, ...]:
@@ -383,7 +411,7 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     at, asked = np.full((1, 1), target.at_N), np.full((1, 1), target.thrust_N)
     for _ in range(4 if target.rest_kg else 1):  # a heavier motor lifts itself as well
         n = float(np.nan_to_num(loads.speed_for(asked[0, :1])[0], nan=loads.rpm[-1]))
-        parts = _parts(loads, target, n, float(asked[0, 0]))
+        parts = _parts(loads, target, n, float(asked[0, 0]), machines[0].mass_g if len(machines) == 1 else math.nan)
         own_kg = float(parts.total - (0.5 * parts.arm if target.coaxial else 0.0))  # two rotors on one arm
         if target.rest_kg:
             heavier = np.exp(min(float(parts.u) / own_kg, 1.0) * z[2])
@@ -422,12 +450,13 @@ def _rows(loads: RotorLoads, u: LoadScatter, machines: Sequence[KnownMotor], tar
     ]  # fmt: skip
 
 
-def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float) -> motors_file.Masses:
-    """Mass of one rotor's parts for the thrust asked for at a speed."""
+def _parts(loads: RotorLoads, target: Target, rpm: float, thrust_N: float, motor_g: float) -> motors_file.Masses:
+    """Mass of one rotor's parts for the thrust asked for at a speed, with a motor of which the mass may be known."""
     torque = float(loads.torque_at(np.array([rpm]))[0])
     arm = motors_file.arm_for(loads.diameter_m, target.arms) if target.arm_m is None else target.arm_m
     watts = torque * rpm * math.pi / 30.0 / EFFICIENCY
-    return motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    parts = motors_file.masses(torque, watts, thrust_N, loads.diameter_m, loads.blades, arm if target.rest_kg else 0.0)
+    return parts if math.isnan(motor_g) else dataclasses.replace(parts, motor=np.asarray(1e-3 * motor_g))
 
 
 def _ranked(table: pd.DataFrame, sure: float) -> pd.DataFrame:
