@@ -74,7 +74,7 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
 
 def is_run(record: Dataset) -> bool:
     """Whether a dataset is a run that was assembled here."""
-    return record.provenance.get("format") == "cfd_run"
+    return record.format == "cfd_run"
 
 
 def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
@@ -100,7 +100,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         raise InputError(work.told)
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
-    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
+    times = [c[1][-1] for _, r in read if r.clock == "time" and (c := clock_of(r))[1].size]
     work.end = float(min(times)) if times else math.inf
     if times and not math.isfinite(work.period):
         work.period = 1.0
@@ -120,7 +120,7 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     """The files of a run as they were read, and their columns side by side."""
     read, faults = read_run([folder / f for f in run.run.files])
     vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
-    homes = {zone_of(Path(f), str(r.provenance["format"])) for f, r in vectors}
+    homes = {zone_of(Path(f), r.format) for f, r in vectors}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
     notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
     return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
@@ -220,7 +220,7 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         if given is not None:
             values[name] = np.array([given])
         elif own and (v := work.si(quantity, own[0])) is not None:
-            values[name] = v[-1:] if own[0].record.provenance.get("clock") in ("time", "iteration") else v
+            values[name] = v[-1:] if own[0].record.clock in ("time", "iteration") else v
     return values
 
 
@@ -261,7 +261,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
 
 def _table(record: Dataset) -> bool:
     """Whether the rows of an export are runs, and no history."""
-    return record.provenance.get("clock") not in ("time", "iteration") and len(record) > 1
+    return record.clock not in ("time", "iteration") and len(record) > 1
 
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
@@ -294,11 +294,11 @@ def _conditions(
     work: OpenRun, read: Sequence[tuple[str, Dataset]], each: Array | None, drift: float | None
 ) -> dict[str, Any]:
     """What is known of how a run was made; `each` the cells of its rows, `drift` that of its thrust."""
-    clocks = {str(r.provenance.get("clock")) for _, r in read}
+    clocks = {r.clock for _, r in read}
     digits = (str(r.provenance.get("cells", "")) for _, r in read)
     cells = next((float(text) for text in digits if text.isdigit()), None)
     found = {
-        "program": " + ".join(dict.fromkeys(PROGRAMS[str(r.provenance["format"])] for _, r in read)),
+        "program": " + ".join(dict.fromkeys(PROGRAMS[r.format] for _, r in read)),
         "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
@@ -347,7 +347,7 @@ def document(d: Dataset) -> dict[str, Any]:
         for i in range(len(d))
     ]  # fmt: skip
     told = {k: d.provenance[k] for k in ("averaged", "drift", "conditions")}
-    head = {"name": str(d.provenance["file"]), "files": list(d.provenance["files"]), "points": points}
+    head = {"name": d.file, "files": list(d.provenance["files"]), "points": points}
     return head | told | {"studies": [s.document() for s in d.provenance.get("studies", ())], "notes": list(d.notes)}
 
 

@@ -195,7 +195,7 @@ def audit_of(
     def get(name: str) -> Any:
         return _one(d, name, row)
 
-    rpm = float(d["rpm"][row]) if "rpm" in d else math.nan
+    rpm = float(d.rpm[row]) if "rpm" in d else math.nan
     n, V = rpm / 60.0, _number(get("airspeed_m_s"), 0.0)
     thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
     solver, own = get("solver"), "balance_mass" in d

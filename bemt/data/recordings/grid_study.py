@@ -267,7 +267,7 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
         if len(set(cells[group][np.isfinite(cells[group])])) < len(group):
             got = f"{len(group)} runs at {_state(d, group[0])} on " + ", ".join(f"{cells[i]:,.0f}" for i in group)
             hint = "State the cells of each grid: --setup cells=N; runs on one grid are no study"
-            raise InputError(Fault(str(d.provenance.get("file", d.name)), "cells", got, "grids of unlike size", hint))
+            raise InputError(Fault(d.file or d.name, "cells", got, "grids of unlike size", hint))
         for s in filter(None, (_study(d, k, order, cells) for k in sizes)):
             studies.append(s)
             sizes[s.channel][order[0]] = s.u_relative
@@ -311,14 +311,14 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> Load
 def together(parts: Sequence[Dataset], name: str = "") -> Dataset:
     """Runs on several grids as one run with the uncertainty of its grids; the cells [1] as their set-ups state."""
     cells = [float(d.provenance.get("conditions", {}).get("cells") or math.nan) for d in parts]
-    if bare := [str(d.provenance.get("file", d.name)) for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
+    if bare := [d.file or d.name for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
         hint = "`bemt import FILES --setup cells=N` writes them into its run.toml"
         raise InputError([Fault(f, "cells", "not stated", "the cells of the grid", hint) for f in bare])
     finest = parts[int(np.argmax(cells))]
     about = {
         **{k: v for k, v in finest.provenance.items() if k != "means"},
         "file": name or " + ".join(d.name for d in parts),
-        "files": tuple(f for d in parts for f in d.provenance.get("files", (d.provenance.get("file", d.name),))),
+        "files": tuple(f for d in parts for f in d.provenance.get("files", (d.file or d.name,))),
         "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
     }  # fmt: skip
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
@@ -379,7 +379,7 @@ def of_table(record: Dataset) -> Dataset:
     if any(np.isfinite(d.u[k]).any() for k in loads):
         return record
     told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
-    about = {"format": "cfd_run", "files": (record.provenance["file"],), "averaged": {}, "drift": {}}
+    about = {"format": "cfd_run", "files": (record.file,), "averaged": {}, "drift": {}}
     about["conditions"] = told
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
     return by_grid(Dataset("cfd", record.name, values, provenance={**record.provenance, **about}, notes=record.notes),

@@ -88,7 +88,7 @@ def reduce(
     records = [recording] if isinstance(recording, Dataset) else list(recording)
     if not records:
         raise InputError(Fault("", "recordings", "none", "one or more"))
-    name = str(records[0].provenance.get("file", "") or records[0].name)
+    name = records[0].file or records[0].name
     rec = _trusted(_joined([named(record) for record in records]))
     constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
     if not set(LOADS) & rec.values.keys():
@@ -345,13 +345,13 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if {"CT", "CP"} <= series.values.keys():
         still = np.abs(np.nan_to_num(V)) <= 0.0
         with np.errstate(all="ignore"):
-            fm = np.where(still & (series["CT"] > 0) & (series["CP"] > 0), co.FM(series["CT"], series["CP"]), np.nan)
-            share = np.hypot(1.5 * series.u["CT"] / series["CT"], series.u["CP"] / series["CP"])
+            fm = np.where(still & (series.CT > 0) & (series.CP > 0), co.FM(series.CT, series.CP), np.nan)
+            share = np.hypot(1.5 * series.u["CT"] / series.CT, series.u["CP"] / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():
         with np.errstate(all="ignore"):
-            ratio = np.where(series["power_W"] > 0, series["thrust_N"] / series["power_W"], np.nan)
-            share = np.hypot(series.u["thrust_N"] / series["thrust_N"], series.u["power_W"] / series["power_W"])
+            ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
+            share = np.hypot(series.u["thrust_N"] / series.thrust_N, series.u["power_W"] / series.power_W)
         more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
     u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})

@@ -222,7 +222,7 @@ class Imported:
 
     def _next_with_a_run(self, wrote: str) -> str:
         """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
-        name = "" if wrote else str(self.runs[0].provenance["file"])
+        name = "" if wrote else self.runs[0].file
         usable = Path(name).is_file() and name.endswith(".toml")
         usable = usable or any(f.path == name and f.format == RUN for f in self.files)
         file = wrote or (name if usable else "study.toml" if self.runs[0].provenance.get("studies") else "run.toml")

@@ -146,7 +146,7 @@ class Dataset:
             found.append((f"u_by.{origin}", "an unknown origin", f"one of {', '.join(ORIGINS)}", ""))
         u |= _root_sums({key: [part[key] for part in u_by.values() if key in part] for key in values.keys() - u.keys()})
         if found:
-            file = str(self.provenance.get("file", "")) or self.name
+            file = self.file or self.name
             raise InputError([Fault(file, *fault) for fault in found])
         unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
@@ -202,6 +202,21 @@ class Dataset:
         from bemt.physics.dataset import tables
 
         return tables.to_html(self)
+
+    @property
+    def file(self) -> str:
+        """File that it was read from; empty: none."""
+        return str(self.provenance.get("file", ""))
+
+    @property
+    def format(self) -> str:
+        """Id of the reader that read it; empty: none."""
+        return str(self.provenance.get("format", ""))
+
+    @property
+    def clock(self) -> str:
+        """What its rows are counted by, ``time``, ``iteration`` or ``none``; empty: not stated."""
+        return str(self.provenance.get("clock", ""))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""

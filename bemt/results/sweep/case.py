@@ -60,7 +60,7 @@ def _runs(case: Case) -> list[tuple[str, Dataset]]:
     from bemt.data.recordings.grid_study import merged
     from bemt.data.recordings.load import import_file
 
-    return [(str(d.provenance["file"]), d) for d in merged([import_file(path) for path in case.run_paths])]
+    return [(d.file, d) for d in merged([import_file(path) for path in case.run_paths])]
 
 
 def _references(case: Case, runs: Sequence[tuple[str, Dataset]]) -> list[Reference]:
@@ -152,9 +152,9 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=(np.fmin.reduce(runs), np.fmax.reduce(runs)),
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else nan,
             duct_share=nominal.duct_share[i] if case.ducted else nan, converged=bool(nominal.converged[i]),
-            H_force_N=nominal["H_force_N"][i] if "H_force_N" in nominal else nan,
-            upper_thrust_N=nominal["upper_thrust_N"][i] if case.paired else nan,
-            lower_thrust_N=nominal["lower_thrust_N"][i] if case.paired else nan,
+            H_force_N=nominal.H_force_N[i] if "H_force_N" in nominal else nan,
+            upper_thrust_N=nominal.upper_thrust_N[i] if case.paired else nan,
+            lower_thrust_N=nominal.lower_thrust_N[i] if case.paired else nan,
             J=nominal.J[i], flags=tuple(nominal.flags[i]), **state,
         ))  # fmt: skip
         rows.append(_row(
@@ -212,7 +212,7 @@ def _recorded_rows(
         full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
-            at = points.index((get["rpm"], get["airspeed_m_s"], get["density_kg_m3"]))
+            at = points.index((full.rpm[i], full.airspeed_m_s[i], full.density_kg_m3[i]))
             u = {k: float(full.u[k][i]) for k in full.values}
             name = f"{group.kind} {printed[full.labels[i]]}" if full.labels else group.kind
             known = {k: get.get(k, math.nan) for k in (*COMPARED, "rpm", "airspeed_m_s", "density_kg_m3")}
@@ -227,7 +227,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
     """Every model against every recorded value; the error on thrust also goes into the recorded row."""
     rows, out = [], []
     for row, at, u_D in recorded:
-        errors: dict[str, Any] = {}
+        errors: dict[str, float] = {}
         measured = {r for r in COMPARED if not math.isnan(getattr(row, r))}
         measured -= {"CT"} if "thrust_N" in measured else set()
         measured -= {"CP", "power_W"} if "torque_Nm" in measured else set()
