@@ -199,7 +199,7 @@ def _groups(
 
 def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list[str]]:
     """Any table with the columns of the module notes."""
-    N, constants = len(found), found.provenance.get("constants", {})
+    N, constants = len(found), found.constants
 
     def column(*names: str) -> Array | None:
         for name in names:

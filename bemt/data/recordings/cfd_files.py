@@ -192,7 +192,7 @@ def settled(
         part = values[values.size - found.rows :]
         over = f"last {found.rows} of {values.size} rows{coarse}"
         return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
-    mean = record.provenance.get("means", {})
+    mean = record.means
     over = "as in the file"
     if values.size > 1 and mean and record.format == "fluent_transcript":
         values, over = values[np.isfinite(values)][-1:], "the last one computed"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -219,31 +219,27 @@ def audit_of(
     return audit(facts)
 
 
+_REMARK: Mapping[str, Callable[[Any], str | None]] = {
+    "program": str, "steady": {True: "MRF", False: "sliding mesh"}.get, "turbulence": str,
+    "wall": {"function": "wall functions", "scalable": "scalable wall functions",
+             "automatic": "automatic wall functions"}.get,
+    "compressible": {True: "compressible", False: "incompressible"}.get, "domain_over_D": "domain {:g} D".format,
+    "y_plus": "y+ {:g}".format, "cells": "{:.0f} cells".format,
+    "grids": lambda number: "no grid study" if number < 2 else None,
+    "u_grid": lambda u: f"u_grid {100.0 * u:.3g} %", "drift_thrust": lambda drift: f"drift {100.0 * abs(drift):.3g} %",
+    "thrust_from": lambda word: "forces integrated" if word == "forces" else None,
+}  # fmt: skip
+
+
 def remark_of(conditions: Mapping[str, Any]) -> str:
     """Set-up of a run in the set phrases that the audit of references reads.
 
     >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
     'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
     """
-    walls = {
-        "function": "wall functions",
-        "scalable": "scalable wall functions",
-        "automatic": "automatic wall functions",
-    }
-    steady, compressible = conditions.get("steady"), conditions.get("compressible")
-    known: list[tuple[Any, str]] = [
-        (conditions.get("program"), "{}"),
-        ({True: "MRF", False: "sliding mesh"}.get(steady) if steady is not None else None, "{}"),
-        (conditions.get("turbulence"), "{}"), (walls.get(str(conditions.get("wall"))), "{}"),
-        ({True: "compressible", False: "incompressible"}.get(compressible) if compressible is not None else None, "{}"),
-        (conditions.get("domain_over_D"), "domain {:g} D"), (conditions.get("y_plus"), "y+ {:g}"),
-        (conditions.get("cells"), "{:.0f} cells"),
-        ("no grid study" if conditions.get("grids", 2) < 2 and "u_grid" not in conditions else None, "{}"),
-        (100.0 * conditions["u_grid"] if "u_grid" in conditions else None, "u_grid {:.3g} %"),
-        (100.0 * abs(conditions["drift_thrust"]) if "drift_thrust" in conditions else None, "drift {:.3g} %"),
-        ("forces integrated" if conditions.get("thrust_from", "forces") == "forces" else None, "{}"),
-    ]  # fmt: skip
-    return "; ".join(form.format(value) for value, form in known if value is not None)
+    stated = {"thrust_from": "forces", **conditions}
+    names = (name for name in _REMARK if stated.get(name) is not None and not (name == "grids" and "u_grid" in stated))
+    return "; ".join(words for name in names if (words := _REMARK[name](stated[name])))
 
 
 def references_of(run: Dataset, where: str) -> list[Reference]:

@@ -151,7 +151,7 @@ def named(d: Dataset) -> Dataset:
     _speed(d, values, names, notes)
     _command(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
-    bare = d.provenance.get("headings", {}).get("power_W", "")
+    bare = d.headings.get("power_W", "")
     if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0

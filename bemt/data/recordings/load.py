@@ -111,7 +111,7 @@ def _unsettled(record: Dataset) -> list[str]:
     """One line for the loads whose mean still moves; small ones beside large ones of the same unit do not count."""
     if record.clock not in ("time", "iteration"):
         return []
-    means: Mapping[str, Mean] = record.provenance.get("means", {})
+    means: Mapping[str, Mean] = record.means
     top: dict[str, float] = {}
     for name, mean in means.items():
         unit = record.unit(name)
@@ -301,7 +301,7 @@ def _reduced(record: Dataset | None) -> Dataset | str | None:
 
 def _means(record: Dataset, reduced: Dataset | str | None) -> Mapping[str, Mean]:
     """Means of the file, and of the channels where the whole recording is one steady point."""
-    means: dict[str, Mean] = dict(record.provenance.get("means", {}))
+    means: dict[str, Mean] = dict(record.means)
     if isinstance(reduced, Dataset) and len(reduced) == 1:
         over = f"the steady rows ({len(reduction(reduced).rows[0])} of {len(record)})"
         means = {name: Mean(float(reduced[name][0]), over) for name in record.values if name in reduced} | means
@@ -326,7 +326,7 @@ def as_dataset(record: Dataset) -> Dataset:
         notes.append(reduced)
     file, form = record.file, record.format
     fit = [name for name in record.values if not channel_fault(name)]
-    means: Mapping[str, Mean] = record.provenance.get("means", {})
+    means: Mapping[str, Mean] = record.means
     whole = [k for k in fit if k in means] if record.clock in ("time", "iteration") else []
     left = [name for name in record.values if name not in (whole or fit)]
     notes += [f"ignored, no known unit: {', '.join(left)}"] if left else []

@@ -218,6 +218,21 @@ class Dataset:
         """What its rows are counted by, ``time``, ``iteration`` or ``none``; empty: not stated."""
         return str(self.provenance.get("clock", ""))
 
+    @property
+    def headings(self) -> Mapping[str, str]:
+        """Headings of the file by channel, as far as kept."""
+        return self.provenance.get("headings", {})
+
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Numbers that hold for all rows, such as ``diameter_m``."""
+        return self.provenance.get("constants", {})
+
+    @property
+    def means(self) -> Mapping[str, Any]:
+        """What stands for a channel of a history, by channel (`bemt.data.readers.samples.Mean`)."""
+        return self.provenance.get("means", {})
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
         by = {origin: dict(parts) for origin, parts in self.u_by.items()}
@@ -364,9 +379,10 @@ class Dataset:
                 inverse = np.divide(1.0, factor, out=np.full(factor.shape, np.nan), where=factor > 0)
                 add(other, one, inverse)
         if "eta" not in values and {"J", "CT", "CP"} <= values.keys():
-            values["eta"] = np.asarray(co.eta(values["J"], values["CT"], values["CP"]), dtype=float)
+            J, CT, CP = (values[name] for name in ("J", "CT", "CP"))
+            values["eta"] = eta = np.asarray(co.eta(J, CT, CP), dtype=float)
             with np.errstate(divide="ignore", invalid="ignore"):
-                u_eta = np.hypot(values["J"] * u["CT"], values["eta"] * u["CP"]) / np.abs(values["CP"])
+                u_eta = np.hypot(J * u["CT"], eta * u["CP"]) / np.abs(CP)
             u["eta"] = np.where(np.isfinite(u_eta), u_eta, np.nan)
         return replace(self, values=values, u=u)
 

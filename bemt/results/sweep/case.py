@@ -227,7 +227,7 @@ def _comparisons(recorded: list[Recorded], models: Mapping[str, Dataset]) -> tup
     """Every model against every recorded value; the error on thrust also goes into the recorded row."""
     rows, out = [], []
     for row, at, u_D in recorded:
-        errors: dict[str, float] = {}
+        errors: dict[str, Any] = {}
         measured = {r for r in COMPARED if not math.isnan(getattr(row, r))}
         measured -= {"CT"} if "thrust_N" in measured else set()
         measured -= {"CP", "power_W"} if "torque_Nm" in measured else set()
