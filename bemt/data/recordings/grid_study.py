@@ -34,7 +34,7 @@ from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text
 from bemt.data.readers.headings import CELLS
-from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
+from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
 
@@ -250,11 +250,11 @@ def _alike(d: Dataset, i: int, k: int) -> bool:
     return True
 
 
-def by_grid(d: Dataset, cells: Array) -> Dataset:
+def by_grid(d: CfdRun, cells: Array) -> CfdRun:
     """Points of a run of which some rows are one condition on several grids, as points with u of the grid.
 
     `cells` (N,) are those of each row's grid [1], NaN where not stated. One point for each condition, that of its
-    finest grid; ``provenance["studies"]`` has a `LoadStudy` for each load that was extrapolated.
+    finest grid; `studies` has a `LoadStudy` for each load that was extrapolated.
     """
     keep: list[int] = []
     studies: list[LoadStudy] = []
@@ -274,15 +274,15 @@ def by_grid(d: Dataset, cells: Array) -> Dataset:
     # a condition on one grid owes what the grid costs elsewhere
     sizes = {k: np.where(np.isfinite(u), u, np.fmax.reduce(u)) for k, u in sizes.items()}
     rows = np.array(sorted(keep), dtype=np.intp)
-    told = dict(d.provenance.get("conditions", {}))
-    told |= {"cells": float(np.nanmax(cells[rows])), "grids": max((len(s.cells) for s in studies), default=1)}
+    most = max((len(s.cells) for s in studies), default=1)
+    told = {**d.conditions, "cells": float(np.nanmax(cells[rows])), "grids": most}
     if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
-    about = {**d.provenance, "conditions": told, "studies": tuple(studies)}
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
     labels = tuple(d.labels[i] for i in rows if d.labels)
-    made = Dataset("cfd", d.name, values, u, (), about, labels, notes=d.notes)
+    made = CfdRun("cfd", d.name, values, u, (), d.provenance, labels, notes=d.notes, files=d.files, conditions=told,
+                  averaged=d.averaged, drift=d.drift, units_given=d.units_given, studies=tuple(studies))  # fmt: skip
     return with_grid_floor(made, grid, tuple(s.sentence() for s in studies))
 
 
@@ -308,9 +308,9 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> Load
     )  # fmt: skip
 
 
-def together(parts: Sequence[Dataset], name: str = "") -> Dataset:
+def together(parts: Sequence[CfdRun], name: str = "") -> CfdRun:
     """Runs on several grids as one run with the uncertainty of its grids; the cells [1] as their set-ups state."""
-    cells = [float(d.provenance.get("conditions", {}).get("cells") or math.nan) for d in parts]
+    cells = [float(d.conditions.get("cells") or math.nan) for d in parts]
     if bare := [d.file or d.name for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
         hint = "`bemt import FILES --setup cells=N` writes them into its run.toml"
         raise InputError([Fault(f, "cells", "not stated", "the cells of the grid", hint) for f in bare])
@@ -318,13 +318,15 @@ def together(parts: Sequence[Dataset], name: str = "") -> Dataset:
     about = {
         **{k: v for k, v in finest.provenance.items() if k != "means"},
         "file": name or " + ".join(d.name for d in parts),
-        "files": tuple(f for d in parts for f in d.provenance.get("files", (d.file or d.name,))),
         "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
     }  # fmt: skip
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
     joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
-    whole = Dataset("cfd", name, joined.values, joined.u, (), about, notes=notes)
+    files = tuple(f for d in parts for f in d.files)
+    whole = CfdRun("cfd", name, joined.values, joined.u, (), about, notes=notes, files=files,
+                   conditions=finest.conditions, averaged=finest.averaged, drift=finest.drift,
+                   units_given=finest.units_given)  # fmt: skip
     return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
 
 
@@ -355,7 +357,7 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
             out.append([d])
         else:
             home.append(d)
-    return [together(g) if len(g) > 1 else g[0] for g in out]
+    return [together([d for d in g if is_run(d)]) if len(g) > 1 else g[0] for g in out]
 
 
 CELL_SIZE = re.compile(r"(h|dx|(cell|mesh|grid|element)_?size)(_m)?", re.IGNORECASE)
@@ -379,8 +381,6 @@ def of_table(record: Dataset) -> Dataset:
     if any(np.isfinite(d.u[k]).any() for k in loads):
         return record
     told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
-    about = {"format": "cfd_run", "files": (record.file,), "averaged": {}, "drift": {}}
-    about["conditions"] = told
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
-    return by_grid(Dataset("cfd", record.name, values, provenance={**record.provenance, **about}, notes=record.notes),
-                   cells)  # fmt: skip
+    return by_grid(CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
+                          notes=record.notes, files=(record.file,), conditions=told), cells)  # fmt: skip

@@ -212,7 +212,7 @@ def _study(run: RunToml, insist: bool) -> list[Dataset]:
     if not insist and all(g.cells is None for g in run.grids):
         return merged([import_file(f) for f in run.files])
     found = cfd_run.assemble(run, Path(), f"{len(run.grids)} grids")
-    if not found.provenance["studies"]:
+    if not found.studies:
         got = "runs of unlike conditions: no two of them are one speed and airspeed on two grids"
         raise InputError(Fault("--out", "", got, "one condition on several grids", "Import each run by itself"))
     return [found]

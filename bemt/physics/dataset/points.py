@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +61,10 @@ _UNKNOWN = _frozen(np.nan)
 
 def _root_sums(parts: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
     return {key: _frozen(np.sqrt(np.sum(np.square(each), axis=0))) for key, each in parts.items() if each}
+
+
+def _plain(value: Any) -> Any:
+    return {key: _plain(item) for key, item in value.items()} if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,24 +226,24 @@ class Dataset:
     @property
     def headings(self) -> Mapping[str, str]:
         """Headings of the file by channel, as far as kept."""
-        return self.provenance.get("headings", {})
+        found: Mapping[str, str] = self.provenance.get("headings", {})
+        return found
 
     @property
     def constants(self) -> Mapping[str, float]:
         """Numbers that hold for all rows, such as ``diameter_m``."""
-        return self.provenance.get("constants", {})
+        found: Mapping[str, float] = self.provenance.get("constants", {})
+        return found
 
     @property
     def means(self) -> Mapping[str, Any]:
         """What stands for a channel of a history, by channel (`bemt.data.readers.samples.Mean`)."""
-        return self.provenance.get("means", {})
+        found: Mapping[str, Any] = self.provenance.get("means", {})
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
-        by = {origin: dict(parts) for origin, parts in self.u_by.items()}
-        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels, by, self.notes,
-                 dict(self.units), self.lines, dict(self.texts))  # fmt: skip
-        return (Dataset, (self.kind, self.name, *plain))
+        return partial(type(self), **{f.name: _plain(getattr(self, f.name)) for f in fields(self)}), ()
 
     @property
     def converged(self) -> NDArray[np.bool_]:

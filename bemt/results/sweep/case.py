@@ -63,6 +63,14 @@ def _runs(case: Case) -> list[tuple[str, Dataset]]:
     return [(d.file, d) for d in merged([import_file(path) for path in case.run_paths])]
 
 
+def _studies(runs: Sequence[tuple[str, Dataset]]) -> tuple[dict[str, Any], ...]:
+    if not runs:
+        return ()
+    from bemt.data.recordings.cfd_run import is_run
+
+    return tuple(s.document() for _, d in runs if is_run(d) for s in d.studies)
+
+
 def _references(case: Case, runs: Sequence[tuple[str, Dataset]]) -> list[Reference]:
     """Recorded values: references and CFD runs in the case's folder; open conditions filled in from the case."""
     own = {"rpm": case.rpm, "airspeed_m_s": case.airspeed_m_s, "density_kg_m3": case.air().rho}
@@ -180,7 +188,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
         audit=tuple(_audit(r, ready, case.ducted) for r in beside if r.source == "cfd"),
-        grid_studies=tuple(s.document() for _, d in computed for s in d.provenance.get("studies", ())),
+        grid_studies=_studies(computed),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
         references=tuple(Stated(r.quantity, r.kind, r.printed, r.value, r.u, r.channel, r.source, r.remark)

@@ -61,9 +61,8 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                     got, _, expected = str(error).partition("; expected ")
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
     refuse(faults)
-    gap_loss = case.get("duct.gap_loss") if case.ducted else None
-    if gap_loss is not None:
-        on.setdefault("tip_gap", TipGap(loss=float(gap_loss)))
+    if (duct := case.file.duct) is not None and duct.gap_loss is not None:
+        on.setdefault("tip_gap", TipGap(loss=duct.gap_loss))
     off = set(case.file.model.effects_off)
     standard = {effect.id for effect in effects.standard()}
     return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)
@@ -103,13 +102,12 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
 
 
 def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
-    duct = case.duct()
-    if duct is None:
+    duct, stated = case.duct(), case.file.duct
+    if duct is None or stated is None:
         return None
-    friction = case.get("duct.wall_friction")
-    flow = duct_flow(duct, rotor, WALL_FRICTION if friction is None else float(friction))
-    given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
-    return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
+    flow = duct_flow(duct, rotor, WALL_FRICTION if stated.wall_friction is None else stated.wall_friction)
+    given = {"stator": stated.stator and stated.stator.recovery, "lip_loss": stated.lip_loss}
+    return dataclasses.replace(flow, **{k: v for k, v in given.items() if v is not None})
 
 
 def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
