@@ -279,7 +279,7 @@ def test_a_study_in_the_folder_of_a_case_stands_for_the_runs_that_it_names(
     assert case.run_paths == (study,)
     assert {Path(r).name for r in runs} | {"study.toml"} <= {p.name for p in case.files()}
     (_, figures), *_ = study_parts([s.document() for s in import_file(study).studies])
-    assert len(figures) == 2 and "order 2.22, 7.67" in figures[0]["note"]
+    assert len(figures) == 2 and "order 2.22, 7.67" in figures[0].note
 
 
 def test_a_table_of_grids_is_kept_as_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -128,14 +128,15 @@ class CfdRun(Dataset):
                 "notes": list(self.notes)}  # fmt: skip
 
 
-def _stated(d: Dataset) -> Mapping[str, Any]:
+def stated_of(d: Dataset) -> Mapping[str, Any]:
+    """Conditions of a run as stated; {} for any other recording."""
     return d.conditions if isinstance(d, CfdRun) else {}
 
 
 def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
     """Conditions of a CFD recording as texts, each with all values that its rows have; {} where none is stated."""
     out: dict[str, tuple[str, ...]] = {}
-    for name, value in _stated(d).items():
+    for name, value in stated_of(d).items():
         if name in CONDITIONS and value not in (None, "") and value == value:
             out[name] = (_text(value),)
     for name, cells in d.texts.items():
@@ -211,7 +212,7 @@ def _one(d: Dataset, name: str, row: int) -> Any:
             return d.texts[key][row].strip()
         if key in d and math.isfinite(d[key][row]):
             return float(d[key][row])
-    return _stated(d).get(name)
+    return stated_of(d).get(name)
 
 
 def audit_of(
@@ -272,7 +273,7 @@ def remark_of(conditions: Mapping[str, Any]) -> str:
 def references_of(run: Dataset, where: str) -> list[Reference]:
     """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
     out = []
-    remark = remark_of(_stated(run))
+    remark = remark_of(stated_of(run))
     loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
     sha256 = str(run.provenance.get("sha256", ""))
     for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):

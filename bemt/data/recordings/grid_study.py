@@ -34,7 +34,7 @@ from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text
 from bemt.data.readers.headings import CELLS
-from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, with_grid_floor
+from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, stated_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
 
@@ -308,13 +308,14 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> Load
     )  # fmt: skip
 
 
-def together(parts: Sequence[CfdRun], name: str = "") -> CfdRun:
+def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
     """Runs on several grids as one run with the uncertainty of its grids; the cells [1] as their set-ups state."""
-    cells = [float(d.conditions.get("cells") or math.nan) for d in parts]
+    cells = [float(stated_of(d).get("cells") or math.nan) for d in parts]
     if bare := [d.file or d.name for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
         hint = "`bemt import FILES --setup cells=N` writes them into its run.toml"
         raise InputError([Fault(f, "cells", "not stated", "the cells of the grid", hint) for f in bare])
-    finest = parts[int(np.argmax(cells))]
+    runs = [d for d in parts if isinstance(d, CfdRun)]  # all: they state their cells
+    finest = runs[int(np.argmax(cells))]
     about = {
         **{k: v for k, v in finest.provenance.items() if k != "means"},
         "file": name or " + ".join(d.name for d in parts),
@@ -323,7 +324,7 @@ def together(parts: Sequence[CfdRun], name: str = "") -> CfdRun:
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
     joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
-    files = tuple(f for d in parts for f in d.files)
+    files = tuple(f for d in runs for f in d.files)
     whole = CfdRun("cfd", name, joined.values, joined.u, (), about, notes=notes, files=files,
                    conditions=finest.conditions, averaged=finest.averaged, drift=finest.drift,
                    units_given=finest.units_given)  # fmt: skip
@@ -357,7 +358,7 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
             out.append([d])
         else:
             home.append(d)
-    return [together([d for d in g if is_run(d)]) if len(g) > 1 else g[0] for g in out]
+    return [together(g) if len(g) > 1 else g[0] for g in out]
 
 
 CELL_SIZE = re.compile(r"(h|dx|(cell|mesh|grid|element)_?size)(_m)?", re.IGNORECASE)

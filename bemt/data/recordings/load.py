@@ -195,7 +195,7 @@ def import_files(
     runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
     notes = _restart_notes(names, records)
     files = [_file(name, format, records.get(name), notes.get(name, []), errors.get(name)) for name in names]
-    return Imported(tuple(files), tuple(runs), to_do)
+    return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:

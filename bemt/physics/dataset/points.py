@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -391,7 +391,7 @@ class Dataset:
             u["eta"] = np.where(np.isfinite(u_eta), u_eta, np.nan)
         return replace(self, values=values, u=u)
 
-    def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Dataset:
+    def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Self:
         """Select points.
 
         Parameters

@@ -106,7 +106,7 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     if duct is None or stated is None:
         return None
     flow = duct_flow(duct, rotor, WALL_FRICTION if stated.wall_friction is None else stated.wall_friction)
-    given = {"stator": stated.stator and stated.stator.recovery, "lip_loss": stated.lip_loss}
+    given = {"stator": None if stated.stator is None else stated.stator.recovery, "lip_loss": stated.lip_loss}
     return dataclasses.replace(flow, **{k: v for k, v in given.items() if v is not None})
 
 
