@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemt.base.arrays import Array
-from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError
 from bemt.rotors.case.drive_schema import LIPO_SOC, LIPO_V, DriveTable
 
@@ -103,18 +102,6 @@ def full_speed(case: Case) -> float:
     return float(rpm[i] + (rpm[i + 1] - rpm[i]) * more[i] / (more[i] - np.nan_to_num(more[i + 1])))
 
 
-class _Listed(Documented):
-    """A motor as setuav-pythrust lists it: K_v [rev/min/V], winding [ohm], current without load [A], mass."""
-
-    id: str
-    manufacturer: str
-    name: str
-    kv: float
-    resistance: float = math.nan
-    io: float = math.nan
-    weight_g: float = math.nan
-
-
 @dataclass(frozen=True)
 class NamedMotor:
     """A motor of a maker's sheet."""
@@ -151,18 +138,23 @@ def named_motor(name: str, where: str = "--motor") -> NamedMotor:
         stem = _words(file.stem)
         numbers = [w for w in words if not any(w in s for s in stem)]  # a K_v that the name rounds
         if all(re.fullmatch(r"\d{2,5}(?:\.\d+)?", w) for w in numbers) and len(numbers) < len(words):
-            one = _Listed.from_document(json.loads(file.read_text(encoding="utf-8")), lenient=True)
-            if all(abs(float(w) / one.kv - 1.0) < 0.02 for w in numbers):
+            one = json.loads(file.read_text(encoding="utf-8"))
+            if all(abs(float(w) / float(one["kv"]) - 1.0) < 0.02 for w in numbers):
                 found.append((len(stem), one))
     fewest = [one for size, one in found if size == min(n for n, _ in found)]
     if len(fewest) != 1:
-        names = ", ".join(f"{one.manufacturer} {one.name}" for _, one in found[:8])
+        names = ", ".join(f"{one['manufacturer']} {one['name']}" for _, one in found[:8])
         got = f"{name!r}, which {'no motor has' if not found else f'{len(found)} motors have'}"
         raise InputError(Fault(where, "", got, "the name of one motor", f"Such as {names}" if names else ""))
     one = fewest[0]
-    source = f"setuav-pythrust {__version__} (Karakaya, Apache-2.0), makers' numbers: {one.id}"
-    ohm, idle, mass = (value if value > 0 else None for value in (one.resistance, one.io, one.weight_g))
-    return NamedMotor(f"{one.manufacturer} {one.name}", one.kv, None if ohm is None else 1e3 * ohm, idle, mass, source)
+
+    def number(key: str, factor: float = 1.0) -> float | None:
+        value = one.get(key)
+        return float(value) * factor if isinstance(value, (int, float)) and value > 0 else None
+
+    source = f"setuav-pythrust {__version__} (Karakaya, Apache-2.0), makers' numbers: {one['id']}"
+    label = f"{one['manufacturer']} {one['name']}"
+    return NamedMotor(label, float(one["kv"]), number("resistance", 1e3), number("io"), number("weight_g"), source)
 
 
 def _words(name: str) -> set[str]:

@@ -102,12 +102,13 @@ def _user_polars(case: Case, given: Sequence[PolarTable]) -> list[tuple[float, p
 
 
 def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
-    duct, stated = case.duct(), case.file.duct
-    if duct is None or stated is None:
+    duct = case.duct()
+    if duct is None:
         return None
-    flow = duct_flow(duct, rotor, WALL_FRICTION if stated.wall_friction is None else stated.wall_friction)
-    given = {"stator": None if stated.stator is None else stated.stator.recovery, "lip_loss": stated.lip_loss}
-    return dataclasses.replace(flow, **{k: v for k, v in given.items() if v is not None})
+    friction = case.get("duct.wall_friction")
+    flow = duct_flow(duct, rotor, WALL_FRICTION if friction is None else float(friction))
+    given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
+    return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
 
 
 def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
