@@ -38,8 +38,8 @@ FOLDER = Path(effects.__file__).parent
 HOOKS = ("blade", "inflow", "section", "momentum", "duct", "flow", "loads", "reading")
 # Effects without a value of their parameters that is the same as not having them.
 NO_OFF = {
-    "cascade", "drag_divergence", "duct", "flapping", "high_induction", "hub_loss", "post_stall", "reynolds", "swirl",
-    "tip_gap", "tip_loss",
+    "cascade", "drag_divergence", "duct", "flapping", "high_induction", "hub_loss", "mounted_backwards", "post_stall",
+    "reynolds", "swirl", "tip_gap", "tip_loss",
 }  # fmt: skip
 AIR = Air.from_density(1.225)
 each_effect = pytest.mark.parametrize("name", list(CATALOGUE))

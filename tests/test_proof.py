@@ -501,12 +501,12 @@ def test_parameters_are_scored_where_both_sides_name_them() -> None:
     assert rows["90 % interval holds the truth"].hits == 1
 
 
-def test_risk_listens_to_the_surest_first() -> None:
-    sure = score.judge(entry("single", "untwist"), answer("named", "untwist"))
-    unsure = score.judge(entry("null"), replace(answer("named", "nacelle"), probability=0.6))
-    curve = score.risk_coverage([unsure, sure], (0.5, 1.0))
-    assert [point.risk for point in curve] == [0.0, 0.5]
-    assert score._percent(curve[1].risk) == "50.0 %"
+def test_reliability_sets_what_was_printed_beside_what_was_there() -> None:
+    there = score.judge(entry("single", "untwist"), replace(answer("named", "untwist"), inclusion={"untwist": 0.95}))
+    gone = score.judge(entry("null"), replace(answer("named", "nacelle"), inclusion={"nacelle": 0.97, "duct": 0.01}))
+    rows = score.reliability([there, gone], (0.0, 0.5, 1.0))
+    assert [(r.n, r.there) for r in rows] == [(1, 0), (2, 1)]
+    assert rows[1].stated == pytest.approx(0.96)
 
 
 def test_a_recommended_run_is_tried_on_the_truth() -> None:

@@ -13,7 +13,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.data.recordings.slips import Level, outlier_runs
 from bemt.judge.diagnose import repeats
 from bemt.judge.diagnose.blade import PLAIN, CalibratedBlade, calibrated, prior_of
-from bemt.judge.diagnose.noise import in_time
+from bemt.judge.diagnose.noise import in_time, loading
 from bemt.judge.diagnose.nuisance import nuisances
 from bemt.judge.diagnose.problem import Part, Problem, SpeedCurve
 from bemt.judge.diagnose.record import CHANNELS, Record, concatenated, dense, merged, owners
@@ -237,14 +237,17 @@ def _with_noise(problem: Problem) -> Problem:
     label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
     label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
     run, place = in_time(X)
+    fell = loading(problem)[1]
+    sided = (fell != 0.5) | np.all(fell == 0.5)  # the first reading of a run has no history
     shares: dict[str, float] = {}
     for c, name in enumerate(CHANNELS[:2]):
-        mine = rows[(problem.channel == c) & (label[problem.point] >= 0)]
+        mine = rows[(problem.channel == c) & (label[problem.point] >= 0) & sided]
         # readings that are those of the model to the last digit are a plan, not a measurement
         if not np.any(np.abs(problem.residual[mine]) > 1e-9 * full[mine]):
             continue
         points, size = problem.point[mine], np.where(problem.y[mine] < 0, -1.0, 1.0) * problem.scale[mine]
-        fixed = repeats.projected_out(label[points], size, problem.f0[mine], full[mine], run[points], place[points])
+        fixed = repeats.projected_out(label[points], size, problem.f0[mine], full[mine], run[points], place[points],
+                                       fell[mine])  # fmt: skip
         told = np.where(known[mine], sigma[mine], 0.0) if known[mine].any() else None
         found = repeats.noise_sizes(problem.residual[mine], problem.y[mine], full[mine], fixed, told)
         if found is None or not any(found[:2]):

@@ -23,6 +23,7 @@ from bemt.base.arrays import Array
 from bemt.base.gaussian.kernels import alike, modes, smooth
 from bemt.base.gaussian.whitening import Conditional, Whitener, conditional, whitener
 from bemt.judge.diagnose.record import CHANNELS
+from bemt.judge.diagnose.repeats import fell
 
 if TYPE_CHECKING:
     from bemt.judge.diagnose.problem import Problem
@@ -66,7 +67,7 @@ _RIVAL_SIZES = (0.03, 0.12)
 # A balance or mount that stays behind while its load falls (hysteresis as ISO 376 and OIML R 60 define it, decreasing
 # less increasing load; not checked): shares of the largest reading, length over the load, least fall that is one, and
 # fewest points of either kind.
-_BEHIND, _BEHIND_LENGTH, _FALL, _FEW = (0.01, 0.04), 0.5, 0.002, 4
+_BEHIND, _BEHIND_LENGTH, _FEW = (0.01, 0.04), 0.5, 4
 
 
 # What every law of the flow depends on, and the spread below which a variable hardly changes it: natural logarithms of
@@ -261,32 +262,41 @@ def rivals(problem: Problem, told: Collection[str] = ()) -> tuple[SmoothAlternat
 
 
 def _behind(problem: Problem, groups: Sequence[tuple[int, ...]]) -> Iterator[SmoothAlternative]:
-    """Readings of a balance or mount that stays behind while the load falls, by groups of channels."""
-    (load, falling), free, c = _loading(problem), problem.free, problem.channel
+    """Readings of a balance or mount that stays behind while the load falls, by groups of channels.
+
+    What went before the first reading of a run is not known: as likely as not the load fell to there.
+    """
+    (load, falling), free, c = loading(problem), problem.free, problem.channel
     for group in groups:
-        mine = free & np.isin(c, group) & falling
-        here = free & np.isin(c, group) & (c < 2)
-        if min(np.count_nonzero(mine), np.count_nonzero(here & ~falling)) < _FEW * len(group):
+        here = free & np.isin(c, group)
+        if min(np.count_nonzero(here & side) for side in (falling < 1.0, falling == 1.0)) < _FEW * len(group):
             continue
-        most = np.zeros(c.size)
+        mine = here & (falling > 0.0)
+        size = np.zeros(c.size)
         for k in group:
-            most[c == k] = np.max(np.abs(problem.y[c == k]))
-        kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine]) * np.multiply.outer(most[mine], most[mine])
+            size[c == k] = np.max(np.abs(problem.y[c == k]))
+        kernel = smooth((load[mine], _BEHIND_LENGTH)) * alike(c[mine])
+        kernel = np.multiply.outer(falling[mine], falling[mine]) * kernel + np.diag(
+            falling[mine] * (1.0 - falling[mine])
+        )
+        kernel *= np.multiply.outer(size[mine], size[mine])
         label = " and ".join(_WORDS[k] for k in group)
-        for size in _BEHIND:
-            yield SmoothAlternative(f"{label} while the load falls: {size:.0%}", mine, kernel, size)
+        for share in _BEHIND:
+            yield SmoothAlternative(f"{label} while the load falls: {share:.0%}", mine, kernel, share)
 
 
-def _loading(problem: Problem) -> tuple[Array, NDArray[np.bool_]]:
-    """Computed load of every reading over the largest of its channel, (M,), and whether it fell to there, (M,)."""
+def loading(problem: Problem) -> tuple[Array, Array]:
+    """Computed load of every reading over the largest of its channel, and the probability that it fell to there, (M,).
+
+    Speeds are no load.
+    """
     run, place = in_time(problem.covariates)
-    load, falling = np.zeros_like(problem.f0), np.zeros(problem.f0.size, dtype=bool)
+    load, falling = np.zeros_like(problem.f0), np.zeros(problem.f0.size)
     for k in np.unique(problem.channel[problem.channel < 2]):
         mine = np.flatnonzero(problem.channel == k)
         load[mine] = np.abs(problem.f0[mine]) / max(float(np.max(np.abs(problem.f0[mine]))), 1e-300)
-        order = mine[np.lexsort((place[problem.point[mine]], run[problem.point[mine]], problem.part[mine]))]
-        same = (np.diff(run[problem.point[order]]) == 0) & (np.diff(problem.part[order]) == 0)
-        falling[order[1:]] = same & (np.diff(load[order]) < -_FALL)
+        runs = run[problem.point[mine]] + (float(np.max(run)) + 1.0) * problem.part[mine]
+        falling[mine] = fell(load[mine], runs, place[problem.point[mine]])
     return load, falling
 
 

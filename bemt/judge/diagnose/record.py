@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.units import ZERO_CELSIUS
-from bemt.judge.diagnose.repeats import conditions, spread_sizes
+from bemt.judge.diagnose.repeats import conditions, fell, spread_sizes
 from bemt.physics.air import Air
 from bemt.physics.effects.base import follows
 from bemt.rotors.model import air_of_points
@@ -278,7 +278,8 @@ def thinned(record: Record, most: int = MAX_POINTS) -> Record:
     """Average alike points when there are too many, never over the ends of a run.
 
     Samples close in time stay with their neighbours; anything else with points of the same speed and wind, so that the
-    order of the rows does not matter.  Loads are averaged as coefficients: they go with the square of the speed.
+    order of the rows does not matter; where a clock tells it, rising and falling loads are two conditions.  Loads are
+    averaged as coefficients: they go with the square of the speed.
     """
     P = len(record)
     if P <= most:
@@ -288,6 +289,9 @@ def thinned(record: Record, most: int = MAX_POINTS) -> Record:
     if dense(record):
         block = _blocks(np.arange(P), record.rpm, run, size, np.inf)
     else:
+        if "time_s" in record.extra:
+            load = next(np.abs(record.measured[c]) for c in CHANNELS if c in record.measured)
+            run = 2.0 * run + (fell(load, run, record.extra["time_s"]) == 1.0)
         order = _alike(record, run)
         loose = [(same * _SAME_SPEED, size) for same in (1, 3, 10)] + [(np.inf, size * k) for k in (1, 2, 4)]
         for same, largest in loose:

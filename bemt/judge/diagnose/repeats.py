@@ -23,10 +23,29 @@ _NEAR_SPEED, _NEAR_J, _NEAR_AIR, _NEAR_LENGTH = 0.04, 0.02, 0.01, 0.01
 # Where the repeats cannot tell a share of the reading from a share of full scale: 0.5 % and 0.1 %, each within a factor
 # of about four.  Declared; load cells and torque cells of hobby stands.
 _USUAL, _SPREAD = np.log([5e-3, 1e-3]), 1.5
+# Least change of the load that has a direction, share of the largest.
+_STEP = 0.002
+# Terms over the load of what stays behind while it falls.
+_BEHIND = 3
 # No stand is better than this, whatever digits repeat.
 _BEST = np.array([2e-4, 1e-4])
 # The data must be this much likelier (natural logarithm) before stated uncertainties are enlarged.
 _DOUBT = 3.0
+
+
+def fell(load: Array, run: Array, place: Array) -> Array:
+    """Probability that the load of a point fell to there, (P,) [1].
+
+    What went before the first point of a run is not known; a smaller step than counts leaves the direction as it was.
+    """
+    order = np.lexsort((place, run))
+    first = np.diff(run[order], prepend=np.nan) != 0.0
+    step = np.diff(np.nan_to_num(load[order]), prepend=0.0)
+    counts = np.abs(step) > _STEP * float(np.max(np.nan_to_num(load), initial=0.0))
+    last = np.maximum.accumulate(np.where(first | counts, np.arange(order.size), 0))
+    out = np.empty(order.size)
+    out[order] = np.where(first, 0.5, np.where(step < 0.0, 1.0, 0.0))[last]
+    return out
 
 
 def conditions(
@@ -48,14 +67,20 @@ def conditions(
 
 
 def projected_out(
-    label: NDArray[np.intp], size: Array, model: Array, full: Array, run: Array, place: Array
+    label: NDArray[np.intp], size: Array, model: Array, full: Array, run: Array, place: Array, fell: Array
 ) -> Array:  # fmt: skip
-    """Columns of what repeats may differ by besides noise, (N, k): conditions, and gain, zero and drift of each run."""
+    """Columns of what repeats may differ by besides noise, (N, k).
+
+    Conditions; gain, zero and drift of each run; and what stays behind where the load ``fell``, since repeatability is
+    that of readings under rising load (ISO 376:2011, reversibility is apart; not checked).
+    """
     columns = [np.where(label == g, size, 0.0) for g in np.unique(label)]
     for r in np.unique(run):
         mine = run == r
         late = (place - place[mine].mean()) / max(float(np.ptp(place[mine])), 1e-12)
         columns += [np.where(mine, shape, 0.0) for shape in (model, full, full * late)]
+    share = model / np.where(full > 0.0, full, 1.0)
+    columns += [fell * full * share**k for k in range(_BEHIND)]
     return np.stack(columns, axis=1)
 
 

@@ -338,7 +338,7 @@ def proof(out: Path, digest: str | None = None) -> Proof:
         SCHEMA, __version__, key.size, key.seed, _commit(),
         digest or (out / rows.SEAL).read_text(encoding="utf-8").strip(), len(judged), tuple(scored),
         baselines=tuple(score.baselines(judged)) if made else (), strata=tuple(score.strata(judged)) if made else (),
-        risk_coverage=tuple(score.risk_coverage(judged)), confusion=score.confusion(judged),
+        reliability=tuple(score.reliability(judged)), confusion=score.confusion(judged),
         answers={} if made else score.answers(judged), misses=misses,
         seconds_median=seconds[len(seconds) // 2] if seconds else math.nan,
     )  # fmt: skip

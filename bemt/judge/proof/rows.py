@@ -130,6 +130,7 @@ class ToldAnswer(Documented):
     log_bayes: Mapping[str, float] | None = None
     nearest_signature: str | None = None
     probability: float = 0.0
+    inclusion: Mapping[str, float] = field(default_factory=dict)
     confirmed: bool = False
     whole: Mapping[str, Any] = field(default_factory=dict)  # As printed
 
@@ -182,13 +183,15 @@ class ScoreRow(Documented):
     met: bool | None  # Whether the value meets the target; None without data
 
 
-class Risk(Documented):
-    """Share of wrong claims among the surest ones, and the probability down to which these go."""
+class Reliability(Documented):
+    """Printed probabilities of effects between two limits, and how often these effects were there."""
 
-    coverage: float
-    risk: float
-    n: float
-    probability: float
+    reference: bool  # Whether the items had one
+    low: float
+    high: float
+    n: int
+    stated: float  # Mean of what was printed [1]
+    there: int  # How many of the effects were at work
 
 
 class Stratum(Documented):
@@ -232,7 +235,7 @@ class Proof(Documented):
     score: tuple[ScoreRow, ...]
     baselines: tuple[ScoreRow, ...]
     strata: tuple[Stratum, ...]
-    risk_coverage: tuple[Risk, ...]
+    reliability: tuple[Reliability, ...]
     confusion: Mapping[str, Mapping[str, int]]
     answers: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     misses: tuple[Miss, ...] = ()

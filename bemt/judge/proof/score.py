@@ -12,7 +12,7 @@ import numpy as np
 from bemt.base.page import Cell, render, table
 from bemt.base.tables import text_table
 from bemt.judge.proof.causes import CAUSES
-from bemt.judge.proof.rows import Entry, Proof, Risk, ScoreRow, Stratum, ToldAnswer, ToldLocation
+from bemt.judge.proof.rows import Entry, Proof, Reliability, ScoreRow, Stratum, ToldAnswer, ToldLocation
 
 VISIBLE = 5.0
 """Separation in standard deviations from which on a cause counts as visible. [1]"""
@@ -353,15 +353,22 @@ def baselines(judged: Sequence[Judged]) -> list[ScoreRow]:
     ]  # fmt: skip
 
 
-def risk_coverage(judged: Sequence[Judged], points: Sequence[float] = (0.25, 0.5, 0.75, 0.9, 1.0)) -> list[Risk]:
-    """Share of wrong claims against the share of claims that one listens to, the surest first."""
-    claims = sorted((j for j in judged if j.claims), key=lambda j: -j.answer.sure)
+def reliability(
+    judged: Sequence[Judged], edges: Sequence[float] = (0.0, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98, 1.0)
+) -> list[Reliability]:  # fmt: skip
+    """How often an effect was there, by the probability that was printed of it, with a reference and without.
+
+    Calibration of probabilities by what happened: DeGroot and Fienberg 1983, The Statistician 32:12 (not checked).
+    """
     out = []
-    for share in points:
-        n = max(round(share * len(claims)), 1) if claims else 0
-        if n:
-            wrong = sum(not j.right for j in claims[:n])
-            out.append(Risk(share, wrong / n, float(n), claims[n - 1].answer.sure))
+    for referenced in (True, False):
+        told = [(p, i in j.entry.causes) for j in judged if bool(j.entry.referenced) is referenced
+                for i, p in j.answer.inclusion.items()]  # fmt: skip
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            some = [(p, there) for p, there in told if low <= p < high or p == high == edges[-1]]
+            if some:
+                stated = float(np.mean([p for p, _ in some]))
+                out.append(Reliability(referenced, low, high, len(some), stated, sum(there for _, there in some)))
     return out
 
 
@@ -404,8 +411,9 @@ _HEADER = ["metric", "count", "value", "95 % (Wilson)", "target", "met"]
 def _tables(found: Proof) -> list[tuple[str, list[str], list[list[str]]]]:
     strata = [[f"above {s.low:g}" if math.isnan(s.high) else f"{s.low:g} to {s.high:g}", str(s.n),
                str(s.top1), str(s.claims), str(s.right)] for s in found.strata]  # fmt: skip
-    risk = [[_percent(r.coverage), f"{r.n:.0f}", _percent(r.risk), f"{r.probability:.3f}"]
-            for r in found.risk_coverage]  # fmt: skip
+    reliable = [["yes" if r.reference else "no", f"{r.low:g} to {r.high:g}", str(r.n), f"{r.stated:.3f}",
+                 f"{r.there / r.n:.3f}", " to ".join(f"{v:.2f}" for v in wilson(r.there, r.n))]
+                for r in found.reliability]  # fmt: skip
     confusion = [[there, ", ".join(f"{said} {n}" for said, n in sorted(row.items(), key=lambda kv: -kv[1]))]
                  for there, row in found.confusion.items()]  # fmt: skip
     kinds = ("found", "class", "none", "unknown", "insufficient", "wrong", "failed")
@@ -420,7 +428,11 @@ def _tables(found: Proof) -> list[tuple[str, list[str], list[list[str]]]]:
         ("Answers by set", ["set", *kinds], answers),
         ("Simpler rules on the same data", _HEADER, _rows(found.baselines)),
         ("Single causes by separation", ["sigma", "items", "top 1", "claims", "right claims"], strata),
-        ("Wrong claims against claims listened to", ["share", "claims", "wrong", "down to probability"], risk),
+        (
+            "Printed probability of an effect, and how often it was there",
+            ["reference", "printed", "effects", "mean", "there", "95 % (Wilson)"],
+            reliable,
+        ),
         ("What was there, and what was said", ["there", "said"], confusion),
         ("Misses", ["item", "set", "there", "plan", "sigma", "said"], misses),
     ]

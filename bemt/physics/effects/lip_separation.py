@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,14 @@ class LipSeparation(Effect):
     hysteresis are declared: once separated, the flow reattaches below onset (1 - hysteresis),
     visible only if the recording has time.
 
-    A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as V/(nD) falls,
-    and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics of Propulsion, ch. 4; not checked).
-    ``by`` = "advance" uses 1 - J / Jmax instead of the load: ``onset`` is then that share of the range from the largest
-    J of the recording to J = 0. ``by`` = "turning" uses the flow that turns into the mouth, since in flight the duct's
-    thrust is what wall and exit leave of it: the suction of a lip is rho A w^2 / 2, by momentum as of a straight duct,
-    with w = T / (rho A (V_e - V)) - V and V_e^2 = V^2 + 2 (T - T_duct) / (rho A). ``onset`` is a share of the largest
-    w^2, so that thinner air does not change it.
+    A lip also stalls because of the flow direction, at any load: the stagnation point moves outside as the velocity
+    ratio V / V_i of the inlet falls, and the suction peak is sharpest at rest (Kuchemann and Weber 1953, Aerodynamics
+    of Propulsion, ch. 4; not checked). ``by`` = "advance" uses 1 - V / V_i instead of the load: at rest, where it is 1,
+    an inviscid flow loses the same share at every speed. ``by`` = "turning" uses the flow that turns into the mouth,
+    since in flight the duct's thrust is what wall and exit leave of it: the suction of a lip is rho A w^2 / 2, by
+    momentum as of a straight duct, with V_i = V + w = T / (rho A (V_e - V)) and
+    V_e^2 = V^2 + 2 (T - T_duct) / (rho A). ``onset`` is a share of the largest w^2, so that thinner air does not
+    change it.
     """
 
     onset: float = 0.7
@@ -71,10 +73,8 @@ class LipSeparation(Effect):
             return
         suction, load = np.maximum(suction, 0.0), np.maximum(measure, 0.0) / top
         if self.by == "advance":
-            fastest = float(np.max(flow.J, initial=0.0))
-            if not fastest > 0.0:
-                return
-            load = 1.0 - np.clip(flow.J / fastest, 0.0, 1.0)
+            inlet = np.maximum(flow.V, 0.0) + gained
+            load = np.divide(gained, inlet, out=np.zeros_like(inlet), where=inlet > 0.0)
         low = np.where(self._separated(load, flow), self.onset * (1.0 - self.hysteresis), self.onset)
         span = self.width * low if self.width > 0.0 else 1.0 - low
         lost = self.loss * np.clip((load - low) / span, 0.0, 1.0) * suction
@@ -91,22 +91,31 @@ class LipSeparation(Effect):
             state[run] = gone > back
         return state
 
+    def odds(self) -> float:
+        """Each measure is as likely as the others, however many of its settings are tried."""
+        return 1.0 / sum(v["by"] == self.by for v in _variants())
+
     def variants(self) -> tuple[dict[str, str | float], ...]:
-        """Onsets and losses in ratio: by the load with hysteresis, by V/(nD), by turning at once and bit by bit."""
-        onsets, losses = (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85), (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
-        by_load: tuple[dict[str, str | float], ...] = tuple(
-            {"onset": o, "loss": k, "hysteresis": h, "width": 0.0, "by": "load"}
-            for o in onsets for k in losses for h in (0.0, 0.2)
-        )  # fmt: skip
-        by_advance: tuple[dict[str, str | float], ...] = tuple(
-            {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
-            for o in (0.1, 0.35, 0.6, 0.85) for k in losses
-        )  # fmt: skip
-        by_turning: tuple[dict[str, str | float], ...] = tuple(
-            {"onset": o, "loss": k, "hysteresis": 0.0, "width": w, "by": "turning"}
-            for o in (0.01, *onsets) for k in losses for w in (0.0, 1.0, 3.0)
-        )  # fmt: skip
-        return by_load + by_advance + by_turning
+        """Onsets and losses in ratio: by the load with hysteresis, by V/V_i, by turning at once and bit by bit."""
+        return _variants()
+
+
+@cache
+def _variants() -> tuple[dict[str, str | float], ...]:
+    onsets, losses = (0.02, 0.04, 0.08, 0.16, 0.32, 0.6, 0.85), (0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+    by_load: tuple[dict[str, str | float], ...] = tuple(
+        {"onset": o, "loss": k, "hysteresis": h, "width": 0.0, "by": "load"}
+        for o in onsets for k in losses for h in (0.0, 0.2)
+    )  # fmt: skip
+    by_advance: tuple[dict[str, str | float], ...] = tuple(
+        {"onset": o, "loss": k, "hysteresis": 0.0, "width": 0.0, "by": "advance"}
+        for o in (0.1, 0.35, 0.6, 0.85) for k in losses
+    )  # fmt: skip
+    by_turning: tuple[dict[str, str | float], ...] = tuple(
+        {"onset": o, "loss": k, "hysteresis": 0.0, "width": w, "by": "turning"}
+        for o in (0.01, *onsets) for k in losses for w in (0.0, 1.0, 3.0)
+    )  # fmt: skip
+    return by_load + by_advance + by_turning
 
 
 def _gained(loads: Loads, flow: Flow) -> Array:
