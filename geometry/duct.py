@@ -72,6 +72,9 @@ class Duct:
     diffuser_x: float | None = None  # Where the bore ends; None is a quarter of the way from rotor to exit [m]
     # Least wall thickness and the thickness at the exit; None is 2 % of the bore radius [m]
     te_thickness: float | None = None
+    # Radius of the outer wall at its widest, behind a nose round as a quarter circle; None is a lip as thick outside as
+    # inside [m]
+    outer_radius: float | None = None
     name: str = ""  # For people
 
     def __post_init__(self) -> None:
@@ -94,6 +97,9 @@ class Duct:
         faults.number("duct.te_thickness", self._te, 0.0, ri, "m")
         if self.diffuser_x is not None:
             faults.number("duct.diffuser_x", self.diffuser_x, 0.0, length, "m")
+        if self.outer_radius is not None:
+            faults.number("duct.outer_radius", self.outer_radius, ri + self.lip_radius, 10 * ri, "m",
+                          "Bore and lip lie inside of it")  # fmt: skip
         if self.lip_length > length:
             expected = f"a lip shorter than the duct, {length:g} m"
             faults.add("duct.lip_radius", f"a lip {self.lip_length:g} m long", expected, "Smaller lip_aspect?")
@@ -129,6 +135,14 @@ class Duct:
         """Axial length of the lip [m]."""
         return self.lip_aspect * self.lip_radius
 
+    @property
+    def nose(self) -> tuple[float, float]:
+        """Length and height of the outer nose, from the leading edge to the widest place [m]."""
+        if self.outer_radius is None:
+            return self.lip_length, max(self.lip_radius, self._te - self.lip_radius)
+        rise = self.outer_radius - self.inner_radius - self.lip_radius
+        return min(rise, self.length), rise
+
     def gap_over_span(self, rotor: Rotor) -> float:
         """Return tip gap over blade length [-]."""
         return self.gap / rotor.span
@@ -154,32 +168,35 @@ class Duct:
         x = np.clip(np.asarray(x, dtype=np.float64), 0.0, self.length)
         cone = self._exit - self.inner_radius
         t = np.clip((x - self.bore_end) / max(self.length - self.bore_end, 1e-12), 0.0, 1.0)
-        out: Array = self.inner_radius + cone * t + self.lip_radius * (1 - self._ellipse(x))
+        out: Array = self.inner_radius + cone * t + self.lip_radius * (1 - self._ellipse(x, self.lip_length))
         return out
 
     def outer(self, x: ArrayLike) -> Array:
         """Return the radius of the outer wall [m] at x [m]: quarter ellipse, then straight to the exit."""
         x = np.clip(np.asarray(x, dtype=np.float64), 0.0, self.length)
-        a, rise = self.lip_length, max(self.lip_radius, self._te - self.lip_radius)
+        a, rise = self.nose
         top = self.inner_radius + self.lip_radius + rise
         t = np.clip((x - a) / max(self.length - a, 1e-12), 0.0, 1.0)
-        line = top + (self._exit + self._te - top) * t - rise * (1 - self._ellipse(x))
+        line = top + (self._exit + self._te - top) * t - rise * (1 - self._ellipse(x, a))
         # Thickness grows from nothing at the nose, so the least thickness holds only behind the lip.
-        least = np.where(x >= a, self.inner(x) + self._te, -np.inf)
+        least = np.where(x >= max(a, self.lip_length), self.inner(x) + self._te, -np.inf)
         out: Array = np.maximum(line, least)
         return out
 
-    def _ellipse(self, x: Array) -> Array:
-        """Ordinate of the unit quarter ellipse: 0 at the nose, 1 behind the lip."""
-        if self.lip_length < 1e-9 * self.length:
+    def _ellipse(self, x: Array, a: float) -> Array:
+        """Ordinate of a unit quarter ellipse of the length a: 0 at the nose, 1 behind it."""
+        if a < 1e-9 * self.length:
             return np.ones_like(x)
-        out: Array = np.sqrt(np.clip(1 - (1 - np.minimum(x / self.lip_length, 1.0)) ** 2, 0.0, 1.0))
+        out: Array = np.sqrt(np.clip(1 - (1 - np.minimum(x / a, 1.0)) ** 2, 0.0, 1.0))
         return out
 
     def profile(self, n: int = 61) -> tuple[Array, Array]:
         """Return both walls as points for a solid of revolution. [m]"""
         m = max(n // 2, 5)
-        nose = self.lip_length * (1 - np.cos(np.linspace(0, np.pi / 2, m)))
+        quarter = 1 - np.cos(np.linspace(0, np.pi / 2, m))
+        nose = self.lip_length * quarter
+        if self.outer_radius is not None:
+            nose = np.concatenate([nose, self.nose[0] * quarter])
         body = np.linspace(self.lip_length, self.length, max(n - m, 5))
         x = np.unique(np.concatenate([nose, body, [self.bore_end, self._rotor]]))
         return np.stack([x, self.inner(x)], axis=1), np.stack([x, self.outer(x)], axis=1)
@@ -197,12 +214,13 @@ class Duct:
             self, inner_radius=self.inner_radius * factor, length=self.length * factor, gap=self.gap * factor,
             lip_radius=self.lip_radius * factor, exit_radius=times(self.exit_radius), rotor_x=times(self.rotor_x),
             exit_hub_radius=self.exit_hub_radius * factor, stator=stator, diffuser_x=times(self.diffuser_x),
-            te_thickness=times(self.te_thickness),
+            te_thickness=times(self.te_thickness), outer_radius=times(self.outer_radius),
         )  # fmt: skip
 
 
 def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, exit_area_ratio: float | None = None,
            exit_hub_radius: float = 0.0, rotor_x: float | None = None, stator: Stator | None = None,
+           lip_length: float | None = None, outer_radius: float | None = None, te_thickness: float | None = None,
            name: str = "") -> Duct:  # fmt: skip
     """Fit a duct round a rotor.
 
@@ -217,4 +235,8 @@ def around(rotor: Rotor, length: float, gap: float, lip_radius: float = 0.0, *, 
         faults.number("exit_area_ratio", exit_area_ratio, 0.1, 5.0)
         faults.check()
         exit_radius = math.sqrt(exit_area_ratio * rotor.annulus_area / math.pi + exit_hub_radius**2)
-    return Duct(rotor.R + gap, length, lip_radius, gap, exit_radius, exit_hub_radius, rotor_x, stator, name=name)
+    aspect = 1.0 if lip_length is None or lip_radius <= 0.0 else lip_length / lip_radius
+    return Duct(
+        rotor.R + gap, length, lip_radius, gap, exit_radius, exit_hub_radius, rotor_x, stator, aspect,
+        te_thickness=te_thickness, outer_radius=outer_radius, name=name,
+    )  # fmt: skip

@@ -290,6 +290,33 @@ def test_a_table_of_grids_is_kept_as_it_is_read(tmp_path: Path, monkeypatch: pyt
     assert "study.toml written. Next: bemt compare study.toml" in told and "no unit known" not in told
     read = [import_(name).to_dict()["runs"][0]["points"] for name in ("grids.csv", "study.toml")]
     assert read[0] == read[1]
-    sizes = "4,6000,5.0,0.0861\n2,6000,5.2,0.085\n1,6000,5.25,0.0845\n"
-    Path("sizes.csv").write_text("h [mm],rpm,thrust_N,torque_Nm\n" + sizes)
-    assert "takes their count" in import_("sizes.csv").text
+
+
+@pytest.mark.parametrize("head", ["h [mm]", "h_mm", "cell size (mm)", "Base Size [mm]", "element_size", "dx_mm"])
+def test_a_table_of_cell_sizes_is_the_study_of_their_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, head: str
+) -> None:
+    """Celik 2008: h is the cube root of volume over cells; only its ratios count."""
+    monkeypatch.chdir(tmp_path)
+    loads, h = ("7.57", "7.42", "7.05"), (1.0, 1.5, 2.25)
+    for name, column, values in (("n.csv", "cells", [8e6 / v**3 for v in h]), ("h.csv", head, h)):
+        rows = "".join(f"{v!r},6000,{T}\n" for v, T in zip(values, loads, strict=True))
+        Path(name).write_text(f"{column},rpm,thrust (N)\n{rows}")
+    by_count, by_size = (import_file(name) for name in ("n.csv", "h.csv"))
+    assert by_size["thrust_N"] == by_count["thrust_N"] and len(by_size) == 1
+    assert by_size.u["thrust_N"] == pytest.approx(by_count.u["thrust_N"], rel=1e-9)
+    (one,), (other,) = (d.studies for d in (by_size, by_count))
+    assert (one.order, one.extrapolated) == pytest.approx((other.order, other.extrapolated))
+    assert one.h == pytest.approx(other.h) and not one.cells and "cells of 1, 1.5, 2.25" in one.sentence()
+    import_("h.csv", out="study.toml")
+    assert import_file("study.toml").u["thrust_N"] == by_size.u["thrust_N"]
+    (_, (figure,)), *_ = study_parts([one.document()])
+    assert "order 2.23" in figure["note"]
+
+
+def test_a_height_is_no_size_of_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{h},6000,{T}\n" for h, T in ((100, 7.57), (150, 7.42), (225, 7.05)))
+    Path("ground.csv").write_text("h [mm],rpm,thrust (N)\n" + rows)
+    told = import_("ground.csv")
+    assert "a height, or the size of cells?" in told.text and len(import_file("ground.csv")) == 3

@@ -273,6 +273,9 @@ thickness = {[round(max(t, 0.02), 4) for t in thick]}
 tip_gap_mm = 0.8
 length_mm = {1e3 * L}
 lip_radius_mm = {182.5 * L}
+lip_length_mm = {400.0 * L}
+outer_diameter_mm = {2.0 * (bore + 210.7 * L)}
+trailing_edge_mm = {40.0 * L}
 exit_diameter_mm = {2.0 * (bore + 23.6 * L)}
 rotor_position_mm = {500.0 * L}
 [operating]

@@ -377,7 +377,7 @@ def _walls(rows: Cursor, words: list[str], x: float) -> tuple[float | None, floa
         return body, None, None
     wall, bore = outlines[1], min(bores)
     lip = int(np.argmin(wall[:, 0]))
-    inside = wall[lip:] if wall[lip:, 1].mean() < wall[: lip + 1, 1].mean() else wall[lip::-1]
+    inside, outside = sorted((wall[lip:], wall[lip::-1]), key=lambda part: float(part[:, 1].mean()))
     x_lip, (x_exit, r_exit) = wall[lip, 0], inside[-1]
     duct = {
         "inner_diameter_mm": 2e3 * bore,
@@ -385,8 +385,12 @@ def _walls(rows: Cursor, words: list[str], x: float) -> tuple[float | None, floa
         "lip_radius_mm": 1e3 * max(wall[lip, 1] - bore, 0.0),
         "rotor_position_mm": 1e3 * (x - x_lip),
         "exit_diameter_mm": 2e3 * r_exit,
+        "trailing_edge_mm": 1e3 * max(outside[-1, 1] - r_exit, 0.0),
         "exit_hub_diameter_mm": 2e3 * max(_crossings(outlines[0], x_exit - 1e-6 * abs(x_exit)), default=0.0),
     }
+    widest = outside[np.argmax(outside[:, 1])]
+    if widest[0] < 0.5 * (x_lip + x_exit):  # of a nose
+        duct["outer_diameter_mm"] = 2e3 * widest[1]
     return body, bore, duct
 
 

@@ -115,6 +115,7 @@ class OpenRun:
     notes: list[str] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     used: set[str] = field(default_factory=set)  # names of columns that became something
+    size_unit: str = ""  # of a column of cell sizes, SI; "" if not known
 
     def fault(self, at: LoadColumn | None, where: str, got: str, expected: str, hint: str = "") -> None:
         """Note a fault of a column's file, or of the run."""

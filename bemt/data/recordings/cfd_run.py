@@ -18,6 +18,7 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import Fault, InputError
 from bemt.base.tables import number_of, number_text, text_table
 from bemt.data import readers
+from bemt.data.readers.cfd import unit_of
 from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
@@ -25,7 +26,7 @@ from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of
 from bemt.data.recordings.cfd_setup import CfdRun, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
-from bemt.data.recordings.grid_study import COVERAGE, by_grid, groups, together
+from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
 __all__ = ["NO_LOAD", "assemble", "is_run", "run_at", "run_text"]
@@ -36,6 +37,7 @@ MOVING = 0.01
 LOST = 0.5
 """Drift above which there is no mean worth a point. [1]"""
 _COEFFICIENTS = ("CT", "CQ", "CP", "J")
+_GRIDS = frozenset(("cells", "cell_size"))
 _POINT = ("rpm", "airspeed_m_s", "density_kg_m3", "J")
 _KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "time_s"))
 """Names of columns that say the loads once more."""
@@ -211,6 +213,11 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
     if own := work.named("cells")[:1]:
         values["cells"] = own[0].record[own[0].name]
         work.used.add(own[0].name)
+    elif sized := [c for c in work.columns if CELL_SIZE.fullmatch(c.stem)][:1]:
+        unit = unit_of(sized[0].unit) if sized[0].unit else None
+        values["cell_size"] = (sized[0].record[sized[0].name] * (1.0 if unit is None else unit.factor)) ** -3.0
+        work.size_unit = "m" if unit is not None and unit.dimension == "length" else ""
+        work.used.add(sized[0].name)
     for name, quantity, given in (
         ("airspeed_m_s", "airspeed", head.airspeed_m_s),
         ("density_kg_m3", "density", head.density_kg_m3),
@@ -271,7 +278,8 @@ def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
         return
     names = ", ".join(dict.fromkeys(c.name for c in rest))
     state = {k: v for k, v in values.items() if k not in CHANNEL.values() and v.size == len(rest[0].record)}
-    apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if "cells" not in state and state else not state
+    stated = state and not _GRIDS & state.keys()
+    apart = any(len(g) > 1 for g in groups(Dataset("cfd", "", state))) if stated else not state
     end = f": {len(rest[0].record)} rows, of which some differ in nothing else, are no repeats" if apart else ""
     work.notes.insert(
         0, f"not used, though the rows differ in it: {names}{end}; --column airspeed=NAME says what it is"
@@ -313,9 +321,9 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     if {*sizes.values()} - {1, rows}:
         got = ", ".join(f"{k} {size}" for k, size in sizes.items())
         raise InputError(Fault(name, "", f"columns of unlike length ({got})", "files of one run"))
-    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k != "cells"}
-    each = values.get("cells")
-    conditions = _conditions(work, read, each, drift.get("thrust_N"))
+    full = {k: np.broadcast_to(v, (rows,)).copy() for k, v in values.items() if k not in _GRIDS}
+    each = values.get("cells", values.get("cell_size"))  # h^-3
+    conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
     sha256 = "+".join(str(r.provenance.get("sha256", "")) for _, r in read)
     about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
@@ -334,7 +342,7 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     slips = (f"{f.evidence}. Suggestion: {f.correction}" for f in check(made) if f.severity != "note")
     made = replace(made, notes=(*slips, *made.notes))
     if each is not None and np.unique(each).size > 1:
-        return by_grid(made, each)
+        return by_grid(made, each, None if "cells" in values else work.size_unit)
     return with_grid_floor(made, conditions.get("u_grid", math.nan))
 
 

@@ -76,7 +76,7 @@ class LoadStudy(Documented):
     """Grid study of one load at one condition; the finest grid comes first."""
 
     channel: str
-    cells: tuple[float, ...]
+    cells: tuple[float, ...]  # () where the sizes are stated
     values: tuple[float, ...]  # unit of the channel
     u_relative: float  # Standard uncertainty on the finest grid [1]
     # As in `GridStudy`, of the finest three grids
@@ -90,6 +90,13 @@ class LoadStudy(Documented):
     airspeed_m_s: float = math.nan
     density_kg_m3: float = math.nan
     J: float = math.nan
+    sizes: tuple[float, ...] = ()  # Size of the cells of each grid as stated, [m] or unknown unit
+    size_unit: str = ""  # "m", or unknown
+
+    @property
+    def h(self) -> tuple[float, ...]:
+        """Size of the cells over the finest grid's."""
+        return tuple(v / self.sizes[0] for v in self.sizes) or tuple((self.cells[0] / n) ** (1 / 3) for n in self.cells)
 
     @property
     def name(self) -> str:
@@ -104,13 +111,17 @@ class LoadStudy(Documented):
         >>> LoadStudy("thrust_N", (5.8e6, 1.7e6, 0.5e6), s.values, *told, rpm=6000.0).sentence()
         'thrust on 5.8, 1.7, 0.5 million cells at 6000 rev/min: 7.57, 7.42, 7.05 N; order 2.22, 7.672 N at cell size 0, GCI 1.68 %, u 1.5 %'
         """  # noqa: E501
-        unit, many = LOADS[self.channel], max(self.cells) >= 1e5
+        unit, many, mm = LOADS[self.channel], max(self.cells, default=0.0) >= 1e5, self.size_unit == "m"
         grids = ", ".join(f"{c / (1e6 if many else 1.0):.3g}" for c in self.cells)
+        on = f"{grids}{' million' if many else ''} cells"
+        if self.sizes:
+            sizes = ", ".join(f"{1e3 * v if mm else v:.4g}" for v in self.sizes)
+            on = f"cells of {sizes} {'mm' if mm else '(no unit)'}"
         state = "one speed" if math.isnan(self.rpm) else f"{self.rpm:g} rev/min"
         state += f", {self.airspeed_m_s:g} m/s" if self.airspeed_m_s > 0.0 else ""
         state += f", J {self.J:g}" if self.J > 0.0 else ""
         values = ", ".join(f"{v:.4g}" for v in self.values)
-        lead = f"{self.name} on {grids}{' million' if many else ''} cells at {state}: {values} {unit}".rstrip()
+        lead = f"{self.name} on {on} at {state}: {values} {unit}".rstrip()
         end = f"u {100 * self.u_relative:.1f} %" + (f" ({'; '.join(self.flags)})" if self.flags else "")
         if self.order is None or self.gci_fine is None:
             return f"{lead}; no order: three times their spread is taken, {end}"
@@ -250,11 +261,12 @@ def _alike(d: Dataset, i: int, k: int) -> bool:
     return True
 
 
-def by_grid(d: CfdRun, cells: Array) -> CfdRun:
+def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     """Points of a run of which some rows are one condition on several grids, as points with u of the grid.
 
-    `cells` (N,) are those of each row's grid [1], NaN where not stated. One point for each condition, that of its
-    finest grid; `studies` has a `LoadStudy` for each load that was extrapolated.
+    `cells` (N,) are those of each row's grid [1], NaN where not stated; h^-3 where their size h is, whose `size_unit`
+    is "m", or "" if not known (Celik 2008: only ratios of h count). One point for each condition, that of its finest
+    grid; `studies` has a `LoadStudy` for each load that was extrapolated.
     """
     keep: list[int] = []
     studies: list[LoadStudy] = []
@@ -265,17 +277,18 @@ def by_grid(d: CfdRun, cells: Array) -> CfdRun:
         if len(group) == 1:
             continue
         if len(set(cells[group][np.isfinite(cells[group])])) < len(group):
-            got = f"{len(group)} runs at {_state(d, group[0])} on " + ", ".join(f"{cells[i]:,.0f}" for i in group)
+            shown = [f"{cells[i]:,.0f}" if size_unit is None else f"h {_size(cells[i]):.4g}" for i in group]
+            got = f"{len(group)} runs at {_state(d, group[0])} on {', '.join(shown)}"
             hint = "State the cells of each grid: --setup cells=N; runs on one grid are no study"
             raise InputError(Fault(d.file or d.name, "cells", got, "grids of unlike size", hint))
-        for s in filter(None, (_study(d, k, order, cells) for k in sizes)):
+        for s in filter(None, (_study(d, k, order, cells, size_unit) for k in sizes)):
             studies.append(s)
             sizes[s.channel][order[0]] = s.u_relative
     # a condition on one grid owes what the grid costs elsewhere
     sizes = {k: np.where(np.isfinite(u), u, np.fmax.reduce(u)) for k, u in sizes.items()}
     rows = np.array(sorted(keep), dtype=np.intp)
-    most = max((len(s.cells) for s in studies), default=1)
-    told = {**d.conditions, "cells": float(np.nanmax(cells[rows])), "grids": most}
+    told = {**d.conditions, "grids": max((len(s.values) for s in studies), default=1)}
+    told |= {"cells": float(np.nanmax(cells[rows]))} if size_unit is None else {}
     if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
@@ -293,17 +306,23 @@ def _state(d: Dataset, row: int) -> str:
     )
 
 
-def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array) -> LoadStudy | None:
+def _size(cells: float) -> float:
+    return float(cells ** (-1.0 / 3.0))
+
+
+def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array, unit: str | None) -> LoadStudy | None:
     """Grid study of one load at one condition, finest grid first; None where there is none."""
     order = [i for i in order if math.isfinite(d[channel][i])]
     fine = order[:MOST]
     if len(fine) < 2 or any(d[channel][i] == 0.0 for i in fine[:2]):
         return None
     found = grid_study([float(d[channel][i]) for i in fine], ratios([float(cells[i]) for i in fine]))
+    grids = tuple(float(cells[i]) if unit is None else _size(cells[i]) for i in order)
     more = (f"{len(order)} grids: the order is that of the finest {MOST}",) if len(order) > MOST else ()
     return LoadStudy(
-        channel, tuple(float(cells[i]) for i in order), tuple(float(d[channel][i]) for i in order), found.u_relative,
+        channel, grids if unit is None else (), tuple(float(d[channel][i]) for i in order), found.u_relative,
         found.order, found.extrapolated, found.gci_fine, found.gci_coarse, found.asymptotic, (*found.flags, *more),
+        sizes=() if unit is None else grids, size_unit=unit or "",
         **{k: float(d[k][order[0]]) for k in _SAME if k in d},
     )  # fmt: skip
 
@@ -361,27 +380,36 @@ def merged(parts: Sequence[Dataset]) -> list[Dataset]:
     return [together(g) if len(g) > 1 else g[0] for g in out]
 
 
-CELL_SIZE = re.compile(r"(h|dx|(cell|mesh|grid|element)_?size)(_m)?", re.IGNORECASE)
+CELL_SIZE = re.compile(r"((cell|mesh|grid|element|base)[_ ]?(size|spacing)|dx|h)(_m)?", re.IGNORECASE)
 """Columns of a size of cells in a table of grids."""
+HEIGHT, LOWEST = re.compile(r"h(_m)?", re.IGNORECASE), 0.01
+"""Of these, one that may be a height over ground as well, and a height at which no rotor turns [m]."""
+OF_CFD = re.compile(r"grid|mesh|solver|turbulence|y_?plus|cfd", re.IGNORECASE)
+"""Other columns by which a table is one of CFD."""
 
 
 def of_table(record: Dataset) -> Dataset:
-    """Somebody's table with a column of cells, as a run on the finest grids; any other recording as it is.
+    """Somebody's table with a column of cells or of their size, as a run on the finest grids; any other as it is.
 
     Rows of one condition on several grids are no repeats. A table that states its uncertainties keeps its rows.
     """
-    cells = next((record[k] for k in record.values if CELLS.search(k)), np.empty(0))
-    size = "" if cells.size else next((k for k in record.values if CELL_SIZE.fullmatch(k)), "")
+    column = next((k for k in record.values if CELLS.search(k)), None)
+    counts = column is not None
+    column = column or next((k for k in record.values if CELL_SIZE.fullmatch(k)), None)
     d = named(record)
-    loads, counts = [k for k in LOADS if k in d], record[size] if size else cells
-    if not loads or np.unique(counts[np.isfinite(counts)]).size < 2 or len(groups(d)) == len(d):
+    loads = [k for k in LOADS if k in d]
+    if column is None or not loads or len(groups(d)) == len(d):
         return record
-    if size:
-        note = f"{size}: a size of cells? A grid study takes their count, in a column headed cells (it goes with h^-3)"
-        return replace(record, notes=(*record.notes, note))
-    if any(np.isfinite(d.u[k]).any() for k in loads):
+    cells = record[column]
+    if np.unique(cells[np.isfinite(cells)]).size < 2 or any(np.isfinite(d.u[k]).any() for k in loads):
         return record
+    unit = "m" if column.endswith("_m") else ""
+    low = bool(unit) and np.nanmax(cells) < LOWEST
+    if HEIGHT.fullmatch(column) and not low and not any(OF_CFD.search(k) for k in (*record.texts, *record.values)):
+        note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size, or "
+        return replace(record, notes=(*record.notes, f"{note}beside one that names the grid"))
     told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
-    return by_grid(CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
-                          notes=record.notes, files=(record.file,), conditions=told), cells)  # fmt: skip
+    made = CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
+                  notes=record.notes, files=(record.file,), conditions=told)  # fmt: skip
+    return by_grid(made, cells) if counts else by_grid(made, cells**-3.0, unit)

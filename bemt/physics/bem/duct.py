@@ -44,9 +44,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bemt.base.arrays import Array
-from bemt.physics.bem.duct_stream import jet_area
+from bemt.physics.bem.residual import RE_HELD, RE_LEFT
 
 if TYPE_CHECKING:
     from geometry.duct import Duct
@@ -61,10 +62,11 @@ _LIP_R_D_HIGH = np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.12, 0
 _LIP_K_HIGH = np.array([0.50, 0.43, 0.36, 0.31, 0.26, 0.22, 0.20, 0.15, 0.09, 0.06, 0.03])
 
 # Outer wall behind its widest place: the stream follows it up to the first angle and has left it at the second, where
-# it neither squeezes the jet nor gives its pressure back: base pressure (Hoerner 1965, Fluid-Dynamic Drag, ch. 3; not
-# checked; the two angles are declared).
+# it neither squeezes the jet nor gives its pressure back: base pressure (the two angles are declared).
 _BOATTAIL = math.radians(18.0), math.radians(24.0)
-BASE_PRESSURE = 0.15
+# A stream that has left the outer nose squeezes the jet less: share of what a wall does that it has left altogether.
+# Set on the torque of nozzle 19A at pitch 1.0, whose error then changes least with the load; no other pitch, no thrust.
+_UNSQUEEZED = 0.2
 
 # Steps in which the core of a swirling jet settles; each takes off most of what is left.
 _CORE_STEPS = 12
@@ -122,38 +124,64 @@ class DuctFlow:
     area: float = float("nan")  # Swept annulus, pi (R^2 - Rhub^2) [m2]
     # Radius of the body in the exit plane; NaN leaves out what swirl does to the jet [m]
     exit_hub: float = float("nan")
+    length: float = 0.0  # Of the duct [m]
+    # V / V_j, rising, and the drag of an outer wall that the stream leaves at its nose over 1/2 rho V^2 [m2]; () if the
+    # shape is not known
+    nose_drag: tuple[tuple[float, float], ...] = ()
+    nose_capture: float = 0.0  # What `capture` gains then [1]
 
-    def jet_speed(self, w: Array, V: Array) -> Array:
+    def left(self, V: Array, viscosity: ArrayLike) -> Array:
+        """Share of the stream that leaves the outer nose at a kinematic viscosity [m2/s]; as the kernel's. [1]"""
+        Re = np.abs(V) * self.length / np.maximum(viscosity, 1e-12)
+        return np.asarray(np.interp(Re, (RE_LEFT, RE_HELD), (1.0, 0.0)))
+
+    def drag(self, V: Array, jet: Array, viscosity: ArrayLike) -> Array:
+        """Drag of the outer wall over the density, at jets [m/s] and a kinematic viscosity [m2/s]. [m4/s2]"""
+        area: Array | float = self.drag_area
+        if self.nose_drag:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                nu = np.where(jet > 0.0, V / jet, 0.0)
+            area = area + self.left(V, viscosity) * np.interp(nu, *np.transpose(self.nose_drag))
+        return np.asarray(0.5 * V * np.abs(V) * area)
+
+    def jet_speed(self, w: Array, V: Array, viscosity: ArrayLike = 0.0) -> Array:
         """Speed of the jet far behind for a mean speed w through the disk; as the kernel's. [m/s]"""
+        capture = self.capture + self.nose_capture * self.left(V, viscosity)
         y = w / (self.wake_ratio * self.contraction)
         with np.errstate(divide="ignore", invalid="ignore"):
             bend = np.where(V > 0.0, self.bend * V / np.hypot(y, V), 0.0)
-        return np.asarray(V + (y - self.capture / self.contraction * V) * (1.0 + bend))
+        return np.asarray(V + (y - capture / self.contraction * V) * (1.0 + bend))
 
-    def balance(self, w: Array, V: Array) -> tuple[Array, Array]:
+    def balance(self, w: Array, V: Array, viscosity: ArrayLike) -> tuple[Array, Array]:
         """Thrust over density and swept area, and the duct's share of it, at a speed through the disk; no swirl."""
-        jet = self.jet_speed(w, V)
-        T = w * (jet - V) - 0.5 * V * np.abs(V) * self.drag_area / self.area
+        jet = self.jet_speed(w, V, viscosity)
+        T = w * (jet - V) - self.drag(V, jet, viscosity) / self.area
         own = 0.5 * (jet**2 - V**2 + self.wall_loss * w**2 + self.lip_loss * (w - V) ** 2)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(T), np.asarray(1.0 - own / T)
 
-    def share_at(self, thrust: Array, V: Array) -> Array:
-        """Share of the duct at a thrust over density [m4/s2] and an airspeed [m/s], (P,); NaN where none is left."""
+    def share_at(self, thrust: Array, V: Array, viscosity: ArrayLike = 1.5e-5) -> Array:
+        """Share of the duct at a thrust over density [m4/s2], an airspeed [m/s] and a kinematic viscosity [m2/s], (P,).
+
+        NaN where none is left.
+        """
         wanted = np.asarray(thrust) / self.area
-        low = self.wake_ratio * self.capture * np.abs(V)  # the rotor adds nothing
+        capture = self.capture + self.nose_capture * self.left(V, viscosity)
+        low = self.wake_ratio * capture * np.abs(V)  # the rotor adds nothing
         high = low + 4.0 * np.sqrt(np.abs(wanted)) + 1e-9
-        lost = self.balance(low, V)[0] > wanted
+        lost = self.balance(low, V, viscosity)[0] > wanted
         for _ in range(60):
             w = 0.5 * (low + high)
-            above = self.balance(w, V)[0] > wanted
+            above = self.balance(w, V, viscosity)[0] > wanted
             low, high = np.where(above, low, w), np.where(above, w, high)
-        return np.where(lost, np.nan, self.balance(0.5 * (low + high), V)[1])
+        return np.where(lost, np.nan, self.balance(0.5 * (low + high), V, viscosity)[1])
 
-    def total(self, rho: Array, V: Array, out: Array) -> tuple[Array, Array, Array]:
+    def total(self, rho: Array, V: Array, mu: Array, out: Array) -> tuple[Array, Array, Array]:
         """Thrust of rotor, stator and duct together."""
         mdot, jet, stator = out[:, 2], out[:, 3], out[:, 4]
-        T = jet - mdot * V - 0.5 * rho * V * np.abs(V) * self.drag_area
+        with np.errstate(divide="ignore", invalid="ignore"):
+            V_jet = np.where(mdot > 0.0, jet / mdot, np.nan)
+        T = jet - mdot * V - rho * self.drag(V, V_jet, mu / rho)
         with np.errstate(divide="ignore", invalid="ignore"):
             v_exit = np.where(mdot > 0.0, np.copysign(mdot / (rho * self.area * self.wake_ratio), jet), np.nan)
         return T - self._swirl_drag(rho, mdot, jet, out[:, 10], out[:, 11]), stator, v_exit
@@ -194,11 +222,19 @@ def hydraulic_diameter(duct: Duct, rotor: Rotor) -> float:
 
 def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) -> DuctFlow:
     """Momentum numbers of a duct around a rotor, with the friction coefficient of its walls [1]."""
+    from bemt.physics.bem.duct_stream import BASE_PRESSURE, NOSE_NU, jet_area  # which an open rotor does not need
+
     duct.check(rotor)
     hydraulic = hydraulic_diameter(duct, rotor)
     outer = duct.inner_radius + duct.lip_radius
     jet = jet_area(duct, rotor.Rhub)
     left, base = _boattail(duct)
+    nose: tuple[tuple[float, float], ...] = ()
+    if duct.outer_radius is not None and wall_friction > 0.0:  # of a known shape, in a stream with a boundary layer
+        facing = math.pi * (duct.outer_radius**2 - float(duct.exit_radius or 0.0) ** 2)  # with the trailing edge
+        behind = BASE_PRESSURE * max(facing - left * base, 0.0)
+        area = duct.inner_radius**2
+        nose = tuple((nu, behind + lost * area) for nu, lost in zip(NOSE_NU, jet.nose, strict=True))
     return DuctFlow(
         wake_ratio=duct.exit_area / rotor.annulus_area,
         wall_loss=wall_friction * 4.0 * duct.length / hydraulic,
@@ -212,6 +248,9 @@ def duct_flow(duct: Duct, rotor: Rotor, wall_friction: float = WALL_FRICTION) ->
         bend=(1.0 - left) * jet.bend,
         area=rotor.annulus_area,
         exit_hub=duct.exit_hub_radius,
+        length=duct.length,
+        nose_drag=nose,
+        nose_capture=_UNSQUEEZED * (1.0 - left) * (jet.at_rest - jet.in_stream) if nose else 0.0,
     )
 
 

@@ -21,6 +21,10 @@ The mean speed q through the exit is c_0 V_j at rest and c_V V where the rotor a
     V_j = V + (y - c_V / c_0 V) (1 + bend V / sqrt(y^2 + V^2))        y = q / c_0
 
 which follows the solved flow within 0.5 %.
+
+At light load the flow goes round the outer nose, and its suction there carries the drag of the rest of the wall.  A
+boundary layer that leaves the nose puts base pressure in the place of that suction (the leading edge's suction lost;
+Kuechemann and Weber 1953, ch. 4, not checked): `JetArea.nose` has what is lost.
 """
 
 from __future__ import annotations
@@ -46,6 +50,11 @@ _STEPS, _TOL = 200, 1e-9
 _SLOWEST = 0.15
 # Noses of hubs over their radius, tails beyond the exit over the radius there: declared.
 NOSE, TAIL = 1.5, 3.0
+# Fall of pressure behind a wall that the stream has left, over 1/2 rho V^2 (Hoerner 1965, Fluid-Dynamic Drag, ch. 3;
+# not checked).
+BASE_PRESSURE = 0.15
+# Speed ratios V / V_j at which the suction of the outer nose is kept; there is none in a slower stream.
+NOSE_NU = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 # Outside of these no duct is known; the potential flow of a shape that closes its own exit.
 _RANGE = (0.5, 1.5)
 _FAR = np.polynomial.legendre.leggauss(3)
@@ -55,18 +64,21 @@ _NEAR = np.polynomial.legendre.leggauss(10)
 class JetArea(NamedTuple):
     """Area of the jet far behind over the exit's: ``at_rest``, and ``in_stream`` where the rotor adds nothing.
 
-    ``bend`` is how far the jet's speed between the two is from a straight line; see the head of the module.
+    ``bend`` is how far the jet's speed between the two is from a straight line; see the head of the module. ``nose``
+    is the drag over 1/2 rho V^2 times the bore's radius squared of an outer nose whose suction is lost, at `NOSE_NU`; ()
+    where the outer wall is not stated.
     """
 
     at_rest: float
     in_stream: float
     bend: float
+    nose: tuple[float, ...]
 
 
 def jet_area(duct: Duct, hub_radius: float) -> JetArea:
     """Jet area over exit area, and the bend of the jet's speed over the flow through the exit. [1]"""
     walls = (duct.length, duct.lip_radius, duct.lip_length, duct.exit_radius, duct.exit_hub_radius, duct.rotor_x,
-             duct.bore_end, duct.te_thickness, hub_radius)  # fmt: skip
+             duct.bore_end, duct.te_thickness, hub_radius, duct.outer_radius)  # fmt: skip
     over_bore = tuple(round(float(v or 0.0) / duct.inner_radius, 9) for v in walls)
     return _solved(*over_bore)
 
@@ -74,17 +86,18 @@ def jet_area(duct: Duct, hub_radius: float) -> JetArea:
 @lru_cache(maxsize=512)
 def _solved(
     length: float, lip: float, lip_length: float, exit_radius: float, exit_hub: float, rotor_x: float, bore_end: float,
-    te: float, hub: float,
+    te: float, hub: float, outer: float,
 ) -> JetArea:  # fmt: skip
     duct = Duct(1.0, length, lip, 0.0, exit_radius, exit_hub, rotor_x, None, lip_length / lip if lip > 0.0 else 1.0,
-                bore_end, te)  # fmt: skip
+                bore_end, te, outer or None)  # fmt: skip
     stream = Stream.around(duct, hub)
     in_stream, at_rest = (float(np.clip(stream.through(nu) / duct.exit_area, *_RANGE)) for nu in (1.0, 0.0))
     nu = np.array(_NU)
     y = np.array([stream.through(v) for v in _NU]) / duct.exit_area / at_rest
     straight = y - in_stream / at_rest * nu
     off, per = 1.0 - nu - straight, straight * nu / np.hypot(y, nu)
-    return JetArea(at_rest, in_stream, float(np.clip(off @ per / (per @ per), -0.5, 0.5)))
+    nose = tuple(stream.lost(v) for v in NOSE_NU) if outer else ()
+    return JetArea(at_rest, in_stream, float(np.clip(off @ per / (per @ per), -0.5, 0.5)), nose)
 
 
 class Stream(NamedTuple):
@@ -95,6 +108,8 @@ class Stream(NamedTuple):
     sheet_in_stream: Array  # Mean velocity on the sheet in a stream of 1, no jet, (S, 2)
     sheet_of_sheet: Array  # The same of each panel alone, (S, S, 2)
     settled: Array  # Panels far behind, (S,)
+    nose: Array  # Speed along the panels of the outer nose in a stream of 1 and of each panel of the sheet, (K, 1 + S)
+    nose_area: Array  # What these panels close of the view from ahead, (K,)
 
     @classmethod
     def around(cls, duct: Duct, hub: float) -> Stream:
@@ -122,7 +137,9 @@ class Stream(NamedTuple):
         by_walls[:, 0, 0] += 1.0
         by_walls[:, 1:] += _velocity(on, sheet)
         settled = on[:, 0] - x[0] > _SETTLED * radius
-        return cls(float(found[n, 0]), found[n, 1:], by_walls[:, 0], by_walls[:, 1:], settled)
+        nose = slice(int(np.argmin(wall[:, 0])), int(np.argmax(wall[:, 1])))
+        area = np.pi * np.diff(wall[:, 1] ** 2)[nose]
+        return cls(float(found[n, 0]), found[n, 1:], by_walls[:, 0], by_walls[:, 1:], settled, found[nose], area)
 
     def strength(self, nu: float) -> Array:
         """Strength of the sheet's panels in a stream of ``nu`` with a jet of 1, (S,)."""
@@ -140,6 +157,11 @@ class Stream(NamedTuple):
     def through(self, nu: float) -> float:
         """Volume flow through the exit in a stream of ``nu`` with a jet of 1."""
         return float(2.0 * np.pi * (nu * self.exit_in_stream + self.exit_of_sheet @ self.strength(nu)))
+
+    def lost(self, nu: float) -> float:
+        """Suction of the outer nose beyond base pressure, over 1/2 rho V^2, in a stream of ``nu`` with a jet of 1."""
+        speed = self.nose[:, 0] * nu + self.nose[:, 1:] @ self.strength(nu)
+        return float(np.maximum((speed / nu) ** 2 - 1.0 - BASE_PRESSURE, 0.0) @ self.nose_area)
 
 
 def _wall(duct: Duct) -> Array:

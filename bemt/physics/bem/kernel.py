@@ -30,11 +30,15 @@ from bemt.physics.bem.residual import (
     N_BRIDGE,
     N_DUCTED,
     N_LEAK,
+    N_LEFT,
+    N_LENGTH,
     N_NUM,
     N_STATOR,
     N_STREAM,
     N_SWIRL,
     N_WAKE,
+    RE_HELD,
+    RE_LEFT,
     Y_BRAKE,
     Y_RING,
     ducted_rotor,
@@ -220,7 +224,11 @@ def _guess_ducted(w, n_pad, fx):
 def _point(element, guess, lookup, w, point, st, tab, par, out, radial):
     """Solve every station of one operating point and integrate."""
     wide()
-    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], par[12],
+    # share of the stream that has left the nose of a duct
+    gone = (RE_HELD - abs(point[P_V]) * par[N_LENGTH] * point[P_RHO] / point[P_MU]) / (RE_HELD - RE_LEFT)
+    gone = gone if gone < 1.0 else 1.0
+    stream = par[N_STREAM] + (gone * par[N_LEFT] if gone > 0.0 else 0.0)
+    fx = (par[0], par[1], par[2], par[3], par[4], par[5], par[6], par[7], par[8], par[9], par[10], par[11], stream,
           par[13])  # fmt: skip
     o = N_NUM
     mach2 = par[o + 10] / (point[P_SOUND] * point[P_SOUND])

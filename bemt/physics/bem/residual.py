@@ -58,8 +58,12 @@ from bemt.physics.bem.vecmath import inlined, log, sincos
 
 # Indices of the numbers that effects and duct may set (array ``num``).
 N_TIP, N_HUB, N_SWIRL, N_BRIDGE, N_DUCTED, N_WAKE, N_LIP, N_STATOR, N_GAP, N_LEAK, N_FAR, N_WALL, N_STREAM = range(13)
-N_BEND = 13
-N_NUM = 14
+N_BEND, N_LEFT, N_LENGTH = 13, 14, 15
+N_NUM = 16
+
+# Reynolds numbers of V and a duct's length between which the stream comes to follow the outer nose at light load:
+# NeuralFoil on the section of nozzle 19A at -8 deg, cd 0.094, 0.091, 0.036 and 0.018 at 2e5, 4e5, 5e5 and 1e6.
+RE_LEFT, RE_HELD = 4e5, 6e5
 
 _EPS = 1e-9
 _TWO_PI = 2.0 * math.pi

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -251,7 +251,7 @@ def _enclosed(duct: DuctFlow | None, numbers: Mapping[str, float] | None) -> Duc
         return duct
     from bemt.physics.bem.duct import DuctFlow
 
-    return replace(duct or DuctFlow(1.0), **numbers)
+    return replace(duct or DuctFlow(1.0), **dict[str, Any](numbers))
 
 
 def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
@@ -268,6 +268,8 @@ def _numbers(bake: RotorBuild, duct: DuctFlow | None) -> Array:
         num[res.N_WAKE] = 1.0 / (duct.wake_ratio * duct.contraction)
         num[res.N_STREAM] = duct.capture / duct.contraction - 1.0
         num[res.N_BEND] = duct.bend
+        num[res.N_LEFT] = duct.nose_capture / duct.contraction
+        num[res.N_LENGTH] = duct.length
         num[res.N_WALL] = duct.wall_loss
         num[res.N_LIP] = duct.lip_loss
         num[res.N_STATOR] = duct.stator
@@ -407,7 +409,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
     n = rpm / 60.0
     D = prep.D
     if prep.duct is not None:
-        T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, out))
+        T, T_stator, V_exit = (v * nan for v in prep.duct.total(rho, V, points[:, K.P_MU], out))
         T_duct = T - T_rotor - T_stator
         mass = out[:, K.O_MASS] * nan
     else:

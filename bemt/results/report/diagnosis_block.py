@@ -240,10 +240,9 @@ def study_parts(studies: Sequence[Mapping[str, Any]]) -> list[Part]:
     """Grid studies: a picture each, values over the size of the cells down to zero, and what they say."""
     figures = []
     for s in map(LoadStudy.from_document, studies):
-        h = [(s.cells[0] / n) ** (1.0 / 3.0) for n in s.cells]
+        h, words = list(s.h), [f"{v:,.4g}{'' if s.sizes else ' cells'}" for v in s.sizes or s.cells]
         unit = f" [{LOADS[s.channel]}]" if LOADS[s.channel] else ""
         u = [s.u_relative * abs(s.values[0]), *[math.nan] * (len(h) - 1)]
-        words = [f"{n:,.0f} cells" for n in s.cells]
         grids = Trace("grids; on the finest its u", h, s.values, u, COLOURS["cfd"], points=True, labels=words)
         traces = [grids]
         if s.order is not None and s.extrapolated is not None:

@@ -162,13 +162,18 @@ def build_duct(case: CaseFile, path: Path, rotor: Rotor) -> Duct | None:
         ratio = math.pi * ((0.5e-3 * duct.exit_diameter_mm) ** 2 - hub**2) / rotor.annulus_area
     assert ratio is not None  # a rule of the file
 
+    def metres(value: float | None, times: float = 1e-3) -> float | None:
+        return None if value is None else value * times
+
     def make() -> Duct:
         vanes = duct.stator
         turned = 0.0 if vanes is None else math.radians(rotor.rotation * vanes.angle_deg)  # their tails with the swirl
         stator = None if vanes is None else Stator(vanes.blades, vanes.chord_mm * 1e-3, beta=0.5 * math.pi + turned)
         return around(
             rotor, duct.length_mm * 1e-3, gap, (duct.lip_radius_mm or 0.0) * 1e-3, exit_area_ratio=ratio,
-            exit_hub_radius=hub, rotor_x=None if x is None else x * 1e-3, stator=stator, name=case.name,
+            exit_hub_radius=hub, rotor_x=metres(x), stator=stator, lip_length=metres(duct.lip_length_mm),
+            outer_radius=metres(duct.outer_diameter_mm, 0.5e-3), te_thickness=metres(duct.trailing_edge_mm),
+            name=case.name,
         )  # fmt: skip
 
     return _as_input(path.as_posix(), "", make)

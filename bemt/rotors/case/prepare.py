@@ -108,7 +108,8 @@ def _duct_flow(case: Case, rotor: Rotor) -> DuctFlow | None:
     friction = case.get("duct.wall_friction")
     flow = duct_flow(duct, rotor, WALL_FRICTION if friction is None else float(friction))
     given = {"stator": case.get("duct.stator.recovery"), "lip_loss": case.get("duct.lip_loss")}
-    return dataclasses.replace(flow, **{k: float(v) for k, v in given.items() if v is not None})
+    stated: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
+    return dataclasses.replace(flow, **stated)
 
 
 def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
@@ -135,10 +136,14 @@ def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
     at = float(duct.rotor_x or 0.0) * mm
     places = (min(at, 0.15 * duct.length * mm), max(at, 0.6 * duct.length * mm))
     found += [
-        Assumption("duct.exit_hub_diameter_mm", 0.0, (0.0, widest), False, "not stated; it ends there, or is the hub"),
+        Assumption("duct.exit_hub_diameter_mm", 0.0, (0.0, widest), True, "not stated; it ends there, or is the hub"),
         Assumption("duct.lip_radius_mm", 0.0, (0.0, round_), False, "not stated; sharp to well rounded"),
         Assumption("duct.rotor_position_mm", at, places, False, "not stated; 15 to 60 % of the length"),
     ]
+    thin, thick = float(duct.te_thickness or 0.0), duct.nose[1]
+    outside = tuple(2e3 * (duct.inner_radius + duct.lip_radius + rise) for rise in (thin, thick))
+    why = "not stated; a wall of the trailing edge's thickness, to a lip as thick outside as inside"
+    found.append(Assumption("duct.outer_diameter_mm", outside[1], outside, False, why))
     if duct.stator is not None:
         why = "not stated; share of the swirl's dynamic pressure"
         found.append(Assumption("duct.stator.recovery", STATOR_RECOVERY, (0.6, 1.0), False, why))

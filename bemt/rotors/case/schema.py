@@ -213,6 +213,13 @@ class DuctTable(Table):
     tip_gap_mm: float | None = entry("gap between blade tip and wall", _GAP)
     length_mm: float = entry("length from inlet to exit", "mm", 1, 10_000, _metres("length_mm", 0.999), required=True)
     lip_radius_mm: float | None = entry("radius of the inlet lip; sharp if omitted", "mm", 0, 1000)
+    lip_length_mm: float | None = entry("axial length of the lip's ellipse; its radius if omitted", "mm", 0.1, 10_000)
+    outer_diameter_mm: float | None = entry(
+        "largest diameter of the outer wall; a lip as thick outside as inside if omitted", "mm", 10, 8000
+    )
+    trailing_edge_mm: float | None = entry(
+        "thickness of the wall at the exit; 2 % of the bore's radius if omitted", "mm", 0, 500
+    )
     lip_loss: float | None = entry("loss coefficient of the inlet lip", "", 0, 1, _percent("lip_loss", 1.5))
     wall_friction: float | None = entry("skin friction coefficient of the walls", "", 0, 0.05)
     gap_loss: float | None = entry("pressure rise lost over itself, per tip gap over blade height", "", 0, 5)

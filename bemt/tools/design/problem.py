@@ -315,7 +315,7 @@ class BladeProblem:
         area = 2.0 * math.pi * s.r * s.dr
         w, v_t = e[_AXIAL], e[_SWIRL]
         mass = rho * np.abs(w) * area
-        jet = mass * flow.jet_speed(w, V[:, None])
+        jet = mass * flow.jet_speed(w, V[:, None], float(self.need.air.mu) / rho)
         stator = flow.stator * 2.0 * rho * np.maximum(v_t, 0.0) ** 2 * area
         return np.stack([mass, jet, stator, 4.0 * v_t**2 * s.dr / s.r, 4.0 * mass * v_t**2])
 
@@ -324,7 +324,8 @@ class BladeProblem:
         assert self.flow is not None
         out = np.zeros((V.size, N_OUT))
         out[:, [O_MASS, O_JET, O_STATOR, O_SPIN, O_WHIRL]] = sums.T
-        return np.asarray(self.flow.total(np.full(V.size, float(self.need.air.rho)), V, out)[0])
+        rho, mu = (np.full(V.size, float(v)) for v in (self.need.air.rho, self.need.air.mu))
+        return np.asarray(self.flow.total(rho, V, mu, out)[0])
 
     def _stress(
         self, k: int, omega: float, s: Stations, e: Array, by_c: Array | None, by_b: Array | None
