@@ -311,7 +311,7 @@ def test_a_table_of_cell_sizes_is_the_study_of_their_counts(
     import_("h.csv", out="study.toml")
     assert import_file("study.toml").u["thrust_N"] == by_size.u["thrust_N"]
     (_, (figure,)), *_ = study_parts([one.document()])
-    assert "order 2.23" in figure["note"]
+    assert "order 2.23" in figure.note
 
 
 def test_a_height_is_no_size_of_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
