@@ -142,7 +142,7 @@ def compare_run(
     A file that is no run, or of another rotor, is refused.
     """
     given = path if isinstance(path, Dataset) else None
-    name = os.fspath(path) if not isinstance(path, Dataset) else str(path.provenance.get("file", path.name))
+    name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
     points, imported = cfd_points(name, given)
     notes = list(points.notes)
