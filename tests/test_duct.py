@@ -7,7 +7,8 @@ faults: no separation, no friction, its own pressure integral lies 4 % below its
 X-22A: NASA TN D-4142, full scale, as digitised (``shared/data/x22a``); sections and exit are not known: assumed.
 Ka 4-70 in nozzle 19A: Oosterveld (1970), regression in water (``shared/data/ducted_marine``); the nozzle is taken as
 lip, bore and cone of its ordinates, the blades as face-pitch sections of half their thickness as camber; its torque
-is 2 to 8 % too large here, see docs/duct.md.
+is 1 to 6 % too large here, see docs/duct.md. Its outer ordinates are not in the folder: widest at 0.2107 L, 0.04 L thick
+at the exit (Oosterveld 1970, from memory, not checked).
 76 mm fan: a hobbyist's bench (``shared/data/jmajew``), its blade is not known.
 """
 

@@ -248,7 +248,7 @@ def x22a(data: Path, folder: Path, angle: int) -> Known:
 
 
 def nozzle_19a(data: Path, folder: Path, pitch: float) -> Known:
-    """Ka 4-70 of a pitch over diameter in nozzle 19A, in air."""
+    """Ka 4-70 of a pitch over diameter in nozzle 19A, in air; the outer wall as in tests/test_duct.py."""
     D, L = 0.24, 0.12
     g = [[float(v) for v in r.values()] for r in rows(data / "ducted_marine" / "ka4-55_geometry.csv")]
     blade, thick = [], []

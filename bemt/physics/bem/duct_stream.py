@@ -65,8 +65,8 @@ class JetArea(NamedTuple):
     """Area of the jet far behind over the exit's: ``at_rest``, and ``in_stream`` where the rotor adds nothing.
 
     ``bend`` is how far the jet's speed between the two is from a straight line; see the head of the module. ``nose``
-    is the drag over 1/2 rho V^2 times the bore's radius squared of an outer nose whose suction is lost, at `NOSE_NU`; ()
-    where the outer wall is not stated.
+    is the drag over 1/2 rho V^2 times the bore's radius squared of an outer nose whose suction is lost, at `NOSE_NU`;
+    () where the outer wall is not stated.
     """
 
     at_rest: float
