@@ -7,8 +7,8 @@ faults: no separation, no friction, its own pressure integral lies 4 % below its
 X-22A: NASA TN D-4142, full scale, as digitised (``shared/data/x22a``); sections and exit are not known: assumed.
 Ka 4-70 in nozzle 19A: Oosterveld (1970), regression in water (``shared/data/ducted_marine``); the nozzle is taken as
 lip, bore and cone of its ordinates, the blades as face-pitch sections of half their thickness as camber; its torque
-is 1 to 6 % too large here, see docs/duct.md. Its outer ordinates are not in the folder: widest at 0.2107 L, 0.04 L thick
-at the exit (Oosterveld 1970, from memory, not checked).
+is 1 to 6 % too large here, see docs/duct.md. Its outer ordinates are not in the folder: widest at 0.2107 L, 0.04 L
+thick at the exit (Oosterveld 1970, from memory, not checked).
 76 mm fan: a hobbyist's bench (``shared/data/jmajew``), its blade is not known.
 """
 
@@ -25,6 +25,7 @@ import numpy as np
 import pytest
 
 from bemt.base.arrays import Array
+from bemt.base.errors import InputError
 from bemt.physics.air import Air
 from bemt.physics.bem import duct as duct_model
 from bemt.physics.bem import solver
@@ -419,3 +420,17 @@ def test_a_turned_wind_on_a_ducted_rotor_has_no_answer(project: Path) -> None:
     loads, _, ok = respond(model.prepared, (*model.effects, ObliqueInflow(30.0)), flow)
     assert ok.tolist() == [True, False]
     assert np.isfinite(loads.T[0]) and np.isnan(loads.T[1]) and np.isnan(loads.Q[1])
+
+
+def test_an_outer_wall_inside_of_its_lip_is_refused_by_its_key(f1_case: Any, tmp_path: Path) -> None:
+    tables = {name: (f1_case.case.folder / f"{name}.csv").read_text() for name in ("stations", "polar")}
+    text = fans.F1.replace("lip_radius_mm = 18", "lip_radius_mm = 18\nlip_length_mm = 140\nouter_diameter_mm = 330")
+    with pytest.raises(InputError) as told:
+        fans.made(tmp_path, text, **tables)
+    assert [f.where for f in told.value.faults] == ["duct.outer_diameter_mm", "duct.lip_length_mm"]
+    # a lip that is not stated stays inside of a wall that is
+    open_lip = fans.F1.replace("lip_radius_mm = 18", "outer_diameter_mm = 330")
+    case = fans.made(tmp_path, open_lip, **tables)
+    (lip,) = (item for item in duct_unknowns(case) if item.key == "duct.lip_radius_mm")
+    assert lip.values == pytest.approx((0.0, 15.0))
+    assert np.isfinite(propagate(case, case.rpm, f1_case.airspeed(np.array([0.0, 0.3]))).points.u["thrust_N"]).all()

@@ -237,7 +237,7 @@ def _with_noise(problem: Problem) -> Problem:
     label = repeats.conditions(X["rpm"], X["J"], X["density_kg_m3"], lengths, owner.astype(float))
     label[np.array([dense(p.record) for p in problem.parts])[owner]] = -1
     run, place = in_time(X)
-    fell = loading(problem)[1]
+    fell = loading(problem)[1] if "time_s" in X else np.zeros(problem.y.size)  # rows without a clock have no direction
     sided = (fell != 0.5) | np.all(fell == 0.5)  # the first reading of a run has no history
     shares: dict[str, float] = {}
     for c, name in enumerate(CHANNELS[:2]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -132,7 +133,8 @@ def duct_unknowns(case: Case) -> tuple[Assumption, ...]:
     hydraulic, mm = hydraulic_diameter(duct, case.rotor()), 1e3
     hub, exit_ = 2.0 * case.rotor().Rhub, 2.0 * float(duct.exit_radius or duct.inner_radius)
     widest = min(hub, 0.9 * exit_) * mm
-    round_ = min(0.15 * hydraulic, duct.length) * mm
+    inside = math.inf if duct.outer_radius is None else duct.outer_radius - duct.inner_radius
+    round_ = min(0.15 * hydraulic, duct.length, inside) * mm
     at = float(duct.rotor_x or 0.0) * mm
     places = (min(at, 0.15 * duct.length * mm), max(at, 0.6 * duct.length * mm))
     found += [

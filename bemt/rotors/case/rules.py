@@ -254,7 +254,12 @@ def _check_duct(out: Collector, case: CaseFile) -> None:
         out.add(f"duct.{key}", shown(getattr(duct, key)), f"at least the rotor diameter, {diameter * 1e3:.6g} mm")
     if (duct.tip_gap_mm or 0.0) > 0.1 * diameter / 2 * 1e3:
         out.add("duct.tip_gap_mm", shown(duct.tip_gap_mm), f"at most a tenth of the radius, {diameter * 50:.4g} mm")
-    for key in ("lip_radius_mm", "rotor_position_mm"):
+    stated = duct.inner_diameter_m > 0.0
+    bore = 1e3 * (duct.inner_diameter_m if stated else diameter) + (0.0 if stated else 2.0 * (duct.tip_gap_mm or 0.0))
+    least = bore + 2.0 * (duct.lip_radius_mm or 0.0)
+    if duct.outer_diameter_mm is not None and duct.outer_diameter_mm < least:
+        out.add("duct.outer_diameter_mm", shown(duct.outer_diameter_mm), f"at least bore and lip, {least:.6g} mm")
+    for key in ("lip_radius_mm", "lip_length_mm", "rotor_position_mm"):
         value = getattr(duct, key) or 0.0
         if value > duct.length_mm:
             out.add(f"duct.{key}", shown(value), f"at most length_mm, {duct.length_mm:g}")
