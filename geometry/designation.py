@@ -28,7 +28,7 @@ _RATIO = (0.1, 2.5)  # pitch over diameter of any propeller
 _USUAL_RATIO = (0.2, 1.6)  # of those whose label has no point
 _EXPECTED = "diameter x pitch in inches, such as 8x5, 10x4.7SF, 8x5x3 or 5045"
 _INCHES = re.compile(r"(?<=[\d.])\s*(?:\"|\u201d|\u2033|''|in(?:ch(?:es)?)?\b\.?)(?=\s|[x\u00d7*]|$)", re.IGNORECASE)
-_MILLIMETRES = re.compile(r"(?P<D>\d+(?:\.\d+)?)\s*(?:mm)?\s*[x\u00d7*]\s*(?P<p>\d+(?:\.\d+)?)\s*mm\b", re.IGNORECASE)
+_MILLIMETRES = re.compile(r"(\d+(?:\.\d+)?)\s*(?:mm)?\s*[x\u00d7*]\s*(\d+(?:\.\d+)?)\s*mm\b", re.IGNORECASE)
 _BLADES = re.compile(
     r"(?<![\w.])[\s(,-]*\b(\d)\s*-?\s*(?:bl?|blades?|blatt|bl\u00e4tter|pales?|palas?)\b\)?", re.IGNORECASE
 )
@@ -96,7 +96,7 @@ def parse_designation(text: str, blades_told: int | None = None) -> Designation:
     """
     where = repr(text)
     plain = _INCHES.sub("", re.sub(r"(?<=\d)\s+by\s+(?=\d)", "x", text.strip(), flags=re.IGNORECASE)).strip()
-    plain = _MILLIMETRES.sub(lambda mm: f"{float(mm['D']) / 25.4:.4g}x{float(mm['p']) / 25.4:.4g}", plain)
+    plain = _MILLIMETRES.sub(lambda mm: f"{float(mm[1]) / 25.4:.4g}x{float(mm[2]) / 25.4:.4g}", plain)
     in_words = _BLADES.search(plain)
     plain = _BLADES.sub(" ", plain, 1).strip()
     named = _sizes(plain, where)

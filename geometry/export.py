@@ -12,10 +12,10 @@ import re
 import shutil
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,24 @@ MANIFEST = "manifest.json"
 VOLUME_TOLERANCE = 5e-3
 FRAME = "z: shaft, towards thrust (upstream); x: pitch axis of blade 1; origin: pitch axes meet the shaft"
 READ_TOLERANCE = 2e-6  # of the size of the part, when CAD surfaces are meshed
+
+
+class Written(NamedTuple):
+    """A file as the manifest lists it."""
+
+    path: str
+    format: str
+    unit: str
+    watertight: bool | str
+    surfaces: Sequence[Mapping[str, object]]
+    solids: list[str] | None = None
+    faces: list[str] | None = None
+
+    def document(self, work: Path) -> dict[str, Any]:
+        """Plain values, with what is in the file."""
+        data = (work / self.path).read_bytes()
+        told = {key: value for key, value in self._asdict().items() if value is not None}
+        return told | {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
 
 
 def export(
@@ -53,24 +71,22 @@ def export(
     out.mkdir(parents=True, exist_ok=True)
     work = Path(tempfile.mkdtemp(prefix=".export-", dir=out))
     try:
-        files: list[dict[str, Any]] = []
+        files: list[Written] = []
         volumes = {k: v for k, v in model.checks.items() if k.startswith("volume")}
         for word in dict.fromkeys(formats):
             files += _written(word, rotor, duct, work, name, unit, model, volumes)
-        for item in files:
-            data = (work / item["path"]).read_bytes()
-            item |= {"bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
         manifest = {
             "schema": SCHEMA, "name": name, "blades": rotor.B, "rotation": "right" if rotor.rotation > 0 else "left",
             "diameter_m": rotor.D, "hub_diameter_m": 2 * rotor.Rhub, "frame": FRAME,
             "tessellation": {"section_points": options.n, "chord_and_angle_tolerance": options.tolerance,
                              "facets_round_hub": rotor.B * -(-options.segments // rotor.B)},
             "fillet_m": options.fillet, "volumes_m3": volumes,
-            "checks_m": {k: v for k, v in model.checks.items() if not k.startswith("volume")}, "files": files,
+            "checks_m": {k: v for k, v in model.checks.items() if not k.startswith("volume")},
+            "files": [file.document(work) for file in files],
         }  # fmt: skip
         (work / MANIFEST).write_text(json.dumps(_rounded(manifest), indent=1) + "\n", encoding="utf-8")
         (out / MANIFEST).unlink(missing_ok=True)  # a manifest never speaks of files that are being replaced
-        for item in [*(entry["path"] for entry in files), MANIFEST]:
+        for item in [*(file.path for file in files), MANIFEST]:
             (out / item).parent.mkdir(parents=True, exist_ok=True)
             os.replace(work / item, out / item)
         return manifest
@@ -85,9 +101,9 @@ def export(
 
 def _written(
     word: str, rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel,
-    volumes: dict[str, Any],
-) -> list[dict[str, Any]]:  # fmt: skip
-    """Write one format; its files as the manifest lists them."""
+    volumes: dict[str, float],
+) -> list[Written]:  # fmt: skip
+    """Write one format."""
     if word == "openfoam":
         return _openfoam(model, work)
     if word == "3mf":
@@ -110,12 +126,12 @@ def _rounded(value: Any) -> Any:
     return float(f"{float(value):.9g}") if isinstance(value, (float, np.floating)) else value
 
 
-def _surfaces(model: MeshModel) -> list[dict[str, Any]]:
-    return [
-        {"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
-        for part in model.parts
-        for name in part.names
-    ]
+def _surfaces(model: MeshModel) -> list[dict[str, object]]:
+    return [_surface(part, name) for part in model.parts for name in part.names]
+
+
+def _surface(part: Mesh, name: str) -> dict[str, object]:
+    return {"name": name, "triangles": len(part.part(name)), "area_m2": part.area(name)}
 
 
 def _stl(vertices: Array, faces: NDArray[np.int64], title: str) -> str:
@@ -148,7 +164,7 @@ def _weld(vertices: Array, faces: NDArray[np.int64]) -> tuple[Array, NDArray[np.
     return vertices[first], faces[keep]
 
 
-def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> dict[str, Any]:
+def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> Written:
     """STL with one named solid per surface, or OBJ with one group per surface."""
     pieces = [f"# unit: {unit}\n# {FRAME}\n"] if kind == "obj" else []
     count = 0
@@ -169,7 +185,7 @@ def _meshes(model: MeshModel, work: Path, name: str, kind: str, unit: str) -> di
     expected = sum(part.volume for part in model.parts)
     _check_file([path], UNITS[unit], expected, len(model.parts))
     closed = True if kind == "obj" or sum(len(part.names) for part in model.parts) == 1 else "the named solids together"
-    return {"path": path.name, "format": kind, "unit": unit, "watertight": closed, "surfaces": _surfaces(model)}
+    return Written(path.name, kind, unit, closed, _surfaces(model))
 
 
 _THREE_MF = {
@@ -184,7 +200,7 @@ _THREE_MF = {
 }
 
 
-def _three_mf(model: MeshModel, work: Path, name: str) -> dict[str, Any]:
+def _three_mf(model: MeshModel, work: Path, name: str) -> Written:
     """3MF, always in millimetres: one object per solid (3MF Consortium, core specification 1.3; not checked)."""
     pieces, items = [], []
     for number, part in enumerate(model.parts, 1):
@@ -205,10 +221,10 @@ def _three_mf(model: MeshModel, work: Path, name: str) -> dict[str, Any]:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         for entry, content in (_THREE_MF | {"3D/3dmodel.model": text}).items():
             packed.writestr(zipfile.ZipInfo(entry), content, zipfile.ZIP_DEFLATED)  # no date: equal rotors, equal files
-    return {"path": path.name, "format": "3mf", "unit": "mm", "watertight": True, "surfaces": _surfaces(model)}
+    return Written(path.name, "3mf", "mm", True, _surfaces(model))
 
 
-def _openfoam(model: MeshModel, work: Path) -> list[dict[str, Any]]:
+def _openfoam(model: MeshModel, work: Path) -> list[Written]:
     folder = work / "constant" / "triSurface"
     folder.mkdir(parents=True)
     out, paths = [], []
@@ -218,9 +234,8 @@ def _openfoam(model: MeshModel, work: Path) -> list[dict[str, Any]]:
             path = folder / f"{surface}.stl"
             path.write_text(_stl(vertices, faces[group == k], surface), encoding="ascii")
             paths.append(path)
-            row = next(s for s in _surfaces(model) if s["name"] == surface)
-            out.append({"path": path.relative_to(work).as_posix(), "format": "openfoam", "unit": "m",
-                        "watertight": "together with the other surfaces", "surfaces": [row]})  # fmt: skip
+            at = path.relative_to(work).as_posix()
+            out.append(Written(at, "openfoam", "m", "together with the other surfaces", [_surface(part, surface)]))
     _check_file(paths, 1.0, sum(part.volume for part in model.parts), len(model.parts))
     return out
 
@@ -246,7 +261,7 @@ def _check_file(paths: Sequence[Path], scale: float, volume: float, bodies: int)
 
 def _step(
     rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel, volumes: dict[str, float]
-) -> dict[str, Any]:
+) -> Written:
     """Named solids; read back, each must be valid and have the volume of the mesh within 0.5 %."""
     cq = needs("cadquery", "cad")
 
@@ -275,11 +290,10 @@ def _step(
     faults.check()
     surfaces = [{"name": key, "volume_m3": value} for key, value in parts.volumes.items() if value > 0.0]
     faces = sorted({word for _, _, word in named_faces(parts, rotor, duct)}) if faced else []
-    return {"path": path.name, "format": "step", "unit": unit, "watertight": True, "surfaces": surfaces,
-            "solids": [part for _, part, _ in parts.solids], "faces": faces}  # fmt: skip
+    return Written(path.name, "step", unit, True, surfaces, [part for _, part, _ in parts.solids], faces)
 
 
-def _flow(rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel) -> dict[str, Any]:
+def _flow(rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, model: MeshModel) -> Written:
     """Air round the parts, in a box, its faces named; read back it must be one valid solid of the same volume."""
     cq = needs("cadquery", "cad")
 
@@ -298,9 +312,8 @@ def _flow(rotor: Rotor, duct: Duct | None, work: Path, name: str, unit: str, mod
     if len(back) != 1 or not back[0].isValid() or abs(back[0].Volume() / air.Volume() - 1.0) > 1e-4:
         got = f"{len(back)} solids when read back"
         raise GeometryError([(path.name, got, "one valid solid of the same volume", "")])
-    return {"path": path.name, "format": "flow", "unit": unit, "watertight": True,
-            "surfaces": [{"name": "flow", "volume_m3": air.Volume() * 1e-9}], "solids": ["flow"],
-            "faces": sorted({word for _, word in faces})}  # fmt: skip
+    surfaces = [{"name": "flow", "volume_m3": air.Volume() * 1e-9}]
+    return Written(path.name, "flow", unit, True, surfaces, ["flow"], sorted({word for _, word in faces}))
 
 
 def _write_step(whole: Any, path: Path, unit: str) -> None:

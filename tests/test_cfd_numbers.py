@@ -319,7 +319,7 @@ def test_a_run_with_everything_known_has_a_number() -> None:
     whole, known = combined(lines)
     parts = [item.u_relative for item in lines]
     assert whole == known == pytest.approx(math.sqrt(sum(p * p for p in parts)))
-    assert whole > max(0.012, 0.002, au.MEASURED["turbulence"])
+    assert whole > max(0.012, 0.002, au.TURBULENCE)
 
 
 def test_the_thesis_is_found_out() -> None:

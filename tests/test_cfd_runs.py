@@ -326,7 +326,7 @@ def test_the_start_up_is_cut_and_a_run_that_moves_says_so(put: Callable[..., Pat
     k = np.arange(1.0, 301.0)
     put("thrust.out", rfile("thrust", T * (1.0 + 0.001 * k), None))
     run = run_of(["thrust.out"], {"rpm": RPM}, **UNITS)
-    drift = run.provenance["drift"]["thrust_N"]
+    drift = run.drift["thrust_N"]
     assert drift == pytest.approx(0.059 / 1.27, rel=0.02) and any("not settled: thrust" in n for n in run.notes)
     assert run.u["thrust_N"][0] > drift * T
     put("thrust.out", rfile("thrust", T * np.exp(-k / 30.0), None))

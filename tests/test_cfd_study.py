@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from bemt.base.errors import InputError
 from bemt.data.readers.cfd import unique
 from bemt.data.recordings.cfd_options import run_from, write_run
 from bemt.data.recordings.cfd_run import assemble, run_at
-from bemt.data.recordings.cfd_setup import grid_floor
+from bemt.data.recordings.cfd_setup import CfdRun, grid_floor
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.grid_study import are_grids, by_grid, together
 from bemt.data.recordings.load import as_dataset, import_file, import_files
@@ -151,7 +152,7 @@ def runs(tmp_path: Path) -> list[str]:
 
 def is_the_study(found: Dataset) -> None:
     assert len(found) == 1
-    thrust = next(s for s in found.provenance["studies"] if s.channel == "thrust_N")
+    thrust = next(s for s in found.studies if s.channel == "thrust_N")
     assert thrust.order == pytest.approx(2.22, abs=0.005)
     assert thrust.extrapolated == pytest.approx(7.671, abs=0.001)
     assert found["thrust_N"][0] == pytest.approx(7.57, rel=1e-4)
@@ -205,7 +206,7 @@ def test_what_is_stated_counts_beside_a_case(project: Path, tmp_path: Path) -> N
 
 
 def test_a_condition_on_one_grid_owes_what_the_grid_costs_elsewhere() -> None:
-    d = Dataset("cfd", "a", {"rpm": [6e3] * 4, "airspeed_m_s": [0, 0, 0, 9.0], "thrust_N": [7.05, 7.42, 7.57, 4.0]})
+    d = CfdRun("cfd", "a", {"rpm": [6e3] * 4, "airspeed_m_s": [0, 0, 0, 9.0], "thrust_N": [7.05, 7.42, 7.57, 4.0]})
     found = by_grid(d, np.array([0.5e6, 1.7e6, 5.8e6, 5.8e6]))
     assert found["thrust_N"] == pytest.approx([7.57, 4.0])
     assert found.u["thrust_N"] / found["thrust_N"] == pytest.approx([0.0146, 0.0146], abs=3e-4)
@@ -216,7 +217,7 @@ def test_a_condition_on_one_grid_owes_what_the_grid_costs_elsewhere() -> None:
     [((7.05, 7.6, 7.4), "oscillatory"), ((7.0, 7.1, 7.4), "divergent"), ((5.0, 7.56, 7.57), "implausible")],
 )
 def test_grids_that_do_not_converge_are_worth_three_times_their_spread(values: tuple[float, ...], word: str) -> None:
-    d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": list(values)})
+    d = CfdRun("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": list(values)})
     found = by_grid(d, np.array([1e6, 8e6, 64e6]))
     assert any(word in note for note in found.notes)
     spread = (max(values) - min(values)) / values[2]
@@ -226,8 +227,8 @@ def test_grids_that_do_not_converge_are_worth_three_times_their_spread(values: t
 @pytest.mark.parametrize("order", [1.0, 1.7, 2.0])
 def test_the_order_and_the_limit_of_a_power_law_come_back(order: float) -> None:
     cells = np.array([0.4e6, 1.5e6, 7e6])
-    d = Dataset("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": 7.0 * (1.0 - 30.0 * cells ** (-order / 3.0))})
-    (study,) = by_grid(d, cells).provenance["studies"]
+    d = CfdRun("cfd", "a", {"rpm": [6e3] * 3, "thrust_N": 7.0 * (1.0 - 30.0 * cells ** (-order / 3.0))})
+    (study,) = by_grid(d, cells).studies
     assert study.order == pytest.approx(order, rel=1e-6)
     assert study.extrapolated == pytest.approx(7.0, rel=1e-6)
 
@@ -235,10 +236,10 @@ def test_the_order_and_the_limit_of_a_power_law_come_back(order: float) -> None:
 def test_one_grid_keeps_the_floor_and_runs_of_unlike_conditions_are_no_study(tmp_path: Path, runs: list[str]) -> None:
     one, two, _ = (import_file(r) for r in runs)
     assert one.u["thrust_N"][0] / one["thrust_N"][0] == pytest.approx(grid_floor("thrust_N", False), rel=1e-3)
-    fast = Dataset("cfd", "b", {**two.values, "rpm": two["rpm"] * 1.1}, provenance=dict(two.provenance))
+    fast = replace(two, name="b", values={**two.values, "rpm": two["rpm"] * 1.1})
     assert are_grids([one, two]) and not are_grids([one, fast]) and not are_grids([one, one])
     with pytest.raises(InputError, match="not stated"):
-        together([one, Dataset("cfd", "c", two.values)])
+        together([one, CfdRun("cfd", "c", two.values)])
 
 
 @pytest.mark.parametrize(
@@ -252,9 +253,9 @@ def test_what_is_neither_a_run_nor_grids_is_refused(tmp_path: Path, wrong: str) 
 
 
 def test_numbers_that_no_grid_gives_are_no_study() -> None:
-    d = Dataset("cfd", "a", {"rpm": [6e3] * 2, "thrust_N": [0.0, 7.5], "torque_Nm": [0.1, math.nan]})
+    d = CfdRun("cfd", "a", {"rpm": [6e3] * 2, "thrust_N": [0.0, 7.5], "torque_Nm": [0.1, math.nan]})
     found = by_grid(d, np.array([1e6, 8e6]))
-    assert found.provenance["studies"] == ()
+    assert found.studies == ()
     assert found.u["thrust_N"][0] == pytest.approx(7.5 * grid_floor("thrust_N", False))
 
 
@@ -277,8 +278,8 @@ def test_a_study_in_the_folder_of_a_case_stands_for_the_runs_that_it_names(
     study = write_run(run_from(runs), str(tmp_path / "study.toml"))
     assert case.run_paths == (study,)
     assert {Path(r).name for r in runs} | {"study.toml"} <= {p.name for p in case.files()}
-    (_, figures), *_ = study_parts([s.document() for s in import_file(study).provenance["studies"]])
-    assert len(figures) == 2 and "order 2.22, 7.67" in figures[0]["note"]
+    (_, figures), *_ = study_parts([s.document() for s in import_file(study).studies])
+    assert len(figures) == 2 and "order 2.22, 7.67" in figures[0].note
 
 
 def test_a_table_of_grids_is_kept_as_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -304,13 +305,13 @@ def test_a_table_of_cell_sizes_is_the_study_of_their_counts(
     by_count, by_size = (import_file(name) for name in ("n.csv", "h.csv"))
     assert by_size["thrust_N"] == by_count["thrust_N"] and len(by_size) == 1
     assert by_size.u["thrust_N"] == pytest.approx(by_count.u["thrust_N"], rel=1e-9)
-    (one,), (other,) = (d.provenance["studies"] for d in (by_size, by_count))
+    (one,), (other,) = (d.studies for d in (by_size, by_count))
     assert (one.order, one.extrapolated) == pytest.approx((other.order, other.extrapolated))
     assert one.h == pytest.approx(other.h) and not one.cells and "cells of 1, 1.5, 2.25" in one.sentence()
     import_("h.csv", out="study.toml")
     assert import_file("study.toml").u["thrust_N"] == by_size.u["thrust_N"]
     (_, (figure,)), *_ = study_parts([one.document()])
-    assert "order 2.23" in figure["note"]
+    assert "order 2.23" in figure.note
 
 
 def test_a_height_is_no_size_of_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

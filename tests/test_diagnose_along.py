@@ -34,9 +34,9 @@ def loads(model: Model, noise: float = 0.0) -> BladeLoads:
     """What a rotor carries, as a recording."""
     s = solver.solve(model.prep, 55000.0, 0.0, AIR, radial=True)
     dr = model.prep.st[:, 1]
-    r = np.broadcast_to(s.radial["r"], (1, dr.size))[0]
+    r = np.broadcast_to(s.radial.r, (1, dr.size))[0]
     wobble = 1.0 + noise * np.random.default_rng(3).standard_normal((2, dr.size))
-    return BladeLoads("made", r, s.radial["dT"][0] / dr * wobble[0], s.radial["dQ"][0] / dr * wobble[1])
+    return BladeLoads("made", r, s.radial.dT[0] / dr * wobble[0], s.radial.dQ[0] / dr * wobble[1])
 
 
 def test_a_rotor_beside_itself_needs_no_explanation(project: Path, tmp_path: Path) -> None:

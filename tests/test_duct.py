@@ -176,10 +176,10 @@ def test_mass_flow_speed_and_area_are_one(f1: Model) -> None:
 
     V = np.array([0.0, 5.0, 13.0])
     s = solver.solve(f1.prep, 4898.98, V, Air.from_density(1.225), radial=True)
-    through = (1.225 * s.radial["w"] * 2.0 * np.pi * s.radial["r"] * f1.prep.st[:, 1]).sum(axis=1)
+    through = (1.225 * s.radial.w * 2.0 * np.pi * s.radial.r * f1.prep.st[:, 1]).sum(axis=1)
     assert np.allclose(s.mass_flow, through, rtol=1e-9)
     assert np.allclose(s.mass_flow, 1.225 * f1.exit_area_m2 * s.V_exit, rtol=1e-9)
-    spin = (2.0 * s.radial["v_t"] * s.radial["w"] * s.radial["r"] ** 2 * f1.prep.st[:, 1]).sum(axis=1)
+    spin = (2.0 * s.radial.v_t * s.radial.w * s.radial.r**2 * f1.prep.st[:, 1]).sum(axis=1)
     assert np.allclose(s.Q, 2.0 * np.pi * 1.225 * spin, rtol=1e-9)
 
 
@@ -194,8 +194,8 @@ def test_kernel_and_balance_see_one_stream_leave_the_nose(f1: Model) -> None:
     assert left[0] == left[1] == 1.0 > left[2] > left[3] > left[4] == 0.0
     prep = solver.prepare(f1.rotor, f1.polars, f1.effects, duct)
     s = solver.solve(prep, 40000.0, V, air, radial=True)
-    w = s.radial["w"]
-    step = 1.225 * w * 2.0 * np.pi * s.radial["r"] * prep.st[:, 1]
+    w = s.radial.w
+    step = 1.225 * w * 2.0 * np.pi * s.radial.r * prep.st[:, 1]
     leaves = duct.jet_speed(w, V[:, None], nu)
     jet = (step * leaves).sum(axis=1) / s.mass_flow
     assert s.converged.all() and np.allclose(s.T, s.mass_flow * (jet - V) - 1.225 * duct.drag(V, jet, nu), rtol=1e-9)

@@ -331,7 +331,7 @@ def test_a_nacelle_slows_the_root_most() -> None:
     rotor = trials()["static, cruise, transonic"].rotor
     prep = [solver.prepare(rotor, [(0.7, section_table())], e) for e in ((), (effects.catalogue()["nacelle"](),))]
     free, behind = (solver.solve(p, 6000.0, 8.0, AIR, radial=True) for p in prep)
-    lost = free.radial["w"][0] - behind.radial["w"][0]
+    lost = free.radial.w[0] - behind.radial.w[0]
     assert np.all(np.diff(8.0 * (1.0 - prep[1].st[:, K.S_AXIAL_FACTOR])) < 0.0), "the deficit falls outboard"
     assert lost[0] > 5.0 * lost[-2] and behind.T > free.T
 

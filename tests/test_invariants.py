@@ -70,8 +70,8 @@ def test_threads_do_not_matter(ready: solver.Prepared, batch: solver.Solution, t
 def test_radial_output_does_not_matter_and_sums_up(ready: solver.Prepared, batch: solver.Solution) -> None:
     s = solver.solve(ready, RPM, V, AIR, radial=True)
     assert same(s, batch)
-    assert np.allclose(s.radial["dT"].sum(axis=1), s.T_rotor, rtol=1e-12, atol=1e-12 * abs(s.T_rotor).max())
-    assert np.allclose(s.radial["dQ"].sum(axis=1), s.Q, rtol=1e-12, atol=1e-12 * abs(s.Q).max())
+    assert np.allclose(s.radial.dT.sum(axis=1), s.T_rotor, rtol=1e-12, atol=1e-12 * abs(s.T_rotor).max())
+    assert np.allclose(s.radial.dQ.sum(axis=1), s.Q, rtol=1e-12, atol=1e-12 * abs(s.Q).max())
 
 
 def test_a_second_preparation_is_the_same(ready: solver.Prepared, batch: solver.Solution, polar: Polar) -> None:
@@ -186,11 +186,11 @@ def test_energy_is_not_made(ducted: bool) -> None:
         prep = solver.prepare(rotor, [(0.7, linear_polar(cd=cd))], duct=duct, n_stations=20, mach_max=0.6)
         s = solver.solve(prep, 4000.0, rng.uniform(0.0, 25.0, 40), AIR, radial=True)
         r = s.radial
-        UT = 4000.0 * np.pi / 30.0 * r["r"]
+        UT = 4000.0 * np.pi / 30.0 * r.r
         # on the blade: drag takes energy, lift neither takes nor gives
-        dT, dD = r["dT"], 0.5 * AIR.rho * r["W"] ** 2 * r["cd"] * prep.st[:, 2] * B * prep.st[:, 1]
-        gap = r["dQ"] / r["r"] * (UT - r["v_t"]) - dT * r["w"] - dD * r["W"]
-        assert np.abs(gap).max() < 1e-9 * np.abs(dD * r["W"]).max()
+        dT, dD = r.dT, 0.5 * AIR.rho * r.W**2 * r.cd * prep.st[:, 2] * B * prep.st[:, 1]
+        gap = r.dQ / r.r * (UT - r.v_t) - dT * r.w - dD * r.W
+        assert np.abs(gap).max() < 1e-9 * np.abs(dD * r.W).max()
         if not ducted:
             area = np.pi * (rotor.R**2 - rotor.Rhub**2)
             push = s.T > 0

@@ -56,7 +56,7 @@ def run(
 def test_ideal_hover_has_figure_of_merit_one() -> None:
     w = 8.0
     s = run(uniform_rotor(w))
-    assert np.allclose(s.radial["w"], w, rtol=1e-5)
+    assert np.allclose(s.radial.w, w, rtol=1e-5)
     assert s.T[0] == pytest.approx(2.0 * AIR.rho * AREA * w**2, rel=1e-5)
     assert s.T[0] * np.sqrt(s.T[0] / (2.0 * AIR.rho * AREA)) / s.P[0] == pytest.approx(1.0, abs=1e-5)
     assert s.V_exit[0] == pytest.approx(2.0 * w, rel=1e-5)
@@ -73,7 +73,7 @@ def test_actuator_disk_in_flight(V: float) -> None:
 
 def test_swirl_costs_its_own_kinetic_energy_and_nothing_else() -> None:
     s = run(uniform_rotor(8.0, swirl=True), effects=(Swirl(),))
-    w, v_t, dT, dQ, r = (s.radial[k][0] for k in ("w", "v_t", "dT", "dQ", "r"))
+    w, v_t, dT, dQ, r = (getattr(s.radial, k)[0] for k in ("w", "v_t", "dT", "dQ", "r"))
     assert np.allclose(w, 8.0, rtol=1e-5)
     # lift does no work on the flow that the blade meets, so the shaft pays for push and spin
     assert np.allclose(dQ * OMEGA, dT * w + dQ / r * v_t, rtol=1e-10)
@@ -88,7 +88,7 @@ def test_swirl_costs_its_own_kinetic_energy_and_nothing_else() -> None:
 def test_duct_carries_its_share_at_rest(sigma_w: float) -> None:
     w = 12.0
     s = run(uniform_rotor(w, ducted=sigma_w), duct=DuctFlow(sigma_w))
-    assert np.allclose(s.radial["w"], w, rtol=1e-5)
+    assert np.allclose(s.radial.w, w, rtol=1e-5)
     assert s.T[0] == pytest.approx(AIR.rho * AREA * w**2 / sigma_w, rel=1e-5)
     assert s.T_rotor[0] / s.T[0] == pytest.approx(1.0 / (2.0 * sigma_w), rel=1e-5)
     assert s.V_exit[0] == pytest.approx(w / sigma_w, rel=1e-5)
@@ -131,7 +131,7 @@ def test_zero_chord_does_nothing(ducted: bool, V: float) -> None:
     assert out.Q[0] == 0.0
     if not ducted:
         assert out.T[0] == 0.0
-        assert np.allclose(out.radial["w"], V, atol=1e-12)
+        assert np.allclose(out.radial.w, V, atol=1e-12)
 
 
 def test_many_blades_tend_to_the_disk_without_tip_loss() -> None:

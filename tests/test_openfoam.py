@@ -366,7 +366,7 @@ def test_vanes_of_a_sector_stand_still_and_turn_their_tails_with_the_swirl(proje
     case = load_case(project / "cases" / "ds30").replaced(vanes)
     s, parts = settings_of(case, Run(), COARSE)
     turned, _ = settings_of(case.replaced({"duct.stator.angle_deg": 13.0, "rotor.spinner_mm": 19.0}), Run(), COARSE)
-    assert "stator" in s.surfaces and parts["tail"] is None and s.body is not None
+    assert "stator" in s.surfaces and parts.tail is None and s.body is not None
     for each in (s, turned):
         assert each.body is not None and mrf_zone(each)[1] > each.body.high
     assert turned.rotor.high == pytest.approx(s.rotor.high + 0.019)

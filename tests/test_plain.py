@@ -48,9 +48,9 @@ def test_the_readable_method_gives_the_kernel_s_loads(V: float, B: int) -> None:
     ours, kernel = both(V, B=B)
     assert ours.T == pytest.approx(kernel.T[0], rel=1e-6, abs=1e-6)
     assert ours.Q == pytest.approx(kernel.Q[0], rel=1e-6, abs=1e-8)
-    np.testing.assert_allclose(ours.phi, kernel.radial["phi"][0], atol=1e-6)
-    np.testing.assert_allclose(ours.F, kernel.radial["F"][0], atol=1e-5)
-    np.testing.assert_allclose(ours.W, kernel.radial["W"][0], rtol=1e-6)
+    np.testing.assert_allclose(ours.phi, kernel.radial.phi[0], atol=1e-6)
+    np.testing.assert_allclose(ours.F, kernel.radial.F[0], atol=1e-5)
+    np.testing.assert_allclose(ours.W, kernel.radial.W[0], rtol=1e-6)
 
 
 def test_the_readable_method_balances_momentum() -> None:

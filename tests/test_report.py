@@ -486,22 +486,22 @@ def test_plots_keep_their_numbers_and_leave_out_what_is_not_one() -> None:
         [Mark(math.nan, "nowhere"), Mark(1.5, "here")],
     )
     out = figure(plot)
-    assert out is not None and [t["name"] for t in out["traces"]] == ["a"]
+    assert out is not None and [t.name for t in out.traces] == ["a"]
     page = render("bemt.results.report", "report.html", pages=[{"id": "a", "name": "a", "title": "a", "top": [],
                   "sections": [("a", [("figures", [out])])]}], title="", lead="", foot="")  # fmt: skip
     ((head, *rows),) = tables(page)
     assert [[float(v) for v in row[1:4]] for row in rows] == [[0.0, 1.0, 0.1], [2.0, 3.0, 0.1]]
     assert "here" in page and "nowhere" not in page
-    places = [tuple(map(float, p.split(",")))[1:] for p in out["at"].split()]
-    lines = [d for kind, d in out["traces"][0]["paths"] if kind == "dot"]
+    places = [tuple(map(float, p.split(",")))[1:] for p in out.at.split()]
+    lines = [d for kind, d in out.traces[0].paths if kind == "dot"]
     assert len(places) == len(lines) == 2 and places[0][0] < places[1][0] and places[0][1] > places[1][1]
 
 
 def test_a_rotor_in_the_viewer_is_small_and_keeps_its_shape(made: tuple[Book, Path]) -> None:
     found = made[0].cases[0].surfaces
     packed = viewer(found)
-    assert len(packed["mesh"]) < 300_000
-    for one, mesh in zip(found, json.loads(packed["mesh"]), strict=True):
+    assert len(packed.mesh) < 300_000
+    for one, mesh in zip(found, json.loads(packed.mesh), strict=True):
         back = np.frombuffer(base64.b64decode(mesh["data"]), "<i2").reshape(mesh["rows"], mesh["columns"], 3) / 32767
         assert np.linalg.norm(back, axis=-1).max() < 1.0001, "turned anyhow, it stays in the window"
         a, b = (np.diff(points.reshape(-1, 3), axis=0) for points in (back, one.points))
@@ -515,8 +515,8 @@ def test_one_outlier_does_not_flatten_the_axis() -> None:
     plot = Plot("t", "ratio [-]", "", [near, far], y_names=["case"], x_limits=(0.4, 2.0))
     shown, alone = figure(plot), figure(replace(plot, traces=[near]))
     assert shown is not None and alone is not None
-    assert shown["traces"][0] == alone["traces"][0], "the others stand where they stand without it"
-    assert [t.words for t in shown["traces"][1]["words"]] == ["0.10"], "and it is named at the edge"
+    assert shown.traces[0] == alone.traces[0], "the others stand where they stand without it"
+    assert [t.words for t in shown.traces[1].words] == ["0.10"], "and it is named at the edge"
 
 
 @pytest.mark.parametrize(
@@ -534,7 +534,7 @@ def test_escaping_leaves_nothing_that_acts() -> None:
     assert "<img" not in page and "<svg" not in page and "<script" not in page and "abc" in page
     harm = figure(Plot("t", "x [m]", "y [N]", [Trace("=cmd|' /C calc'!A0", [1.0], [2.0], labels=["@SUM(1)"])]))
     assert harm is not None
-    rows = list(csv.reader(io.StringIO(unquote(harm["csv"].partition(",")[2]))))
+    rows = list(csv.reader(io.StringIO(unquote(harm.csv.partition(",")[2]))))
     assert not any(cell[:1] in "=+-@" for row in rows for cell in row if cell), "no formula for a spreadsheet"
 
 

@@ -124,13 +124,13 @@ def test_the_unstalled_root_is_taken() -> None:
         rotor = Rotor(from_stations(r, np.full(12, 0.03), np.full(12, beta), R, 0.05), 3)
         prep = solver.prepare(rotor, [(0.7, polar)], (), n_stations=10)
         s = solver.solve(prep, 6000.0, V, Air.from_density(1.2), radial=True)
-        drop = s.radial["alpha"] > np.radians(17.0)  # right behind the sudden stall
+        drop = s.radial.alpha > np.radians(17.0)  # right behind the sudden stall
         for k in range(10):
             # falling alpha over rising V: once attached, a station stays attached
             assert np.all(np.diff(drop[:, k].astype(int)) <= 0)
             several += 0 < drop[:, k].sum() < V.size
         # stalled stations: no attached balance exists at the angle of largest lift
-        UT = 6000.0 * np.pi / 30.0 * s.radial["r"]
+        UT = 6000.0 * np.pi / 30.0 * s.radial.r
         phi = beta - np.radians(12.0)
         cn = 1.2566 * np.cos(phi) - 0.01 * np.sin(phi)
         q = 0.25 * prep.st[:, 4]

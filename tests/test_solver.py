@@ -246,13 +246,13 @@ def test_momentum_and_blade_agree_at_every_station(rotor: Rotor, polar: Polar, s
     V = np.concatenate([np.linspace(0.0, 22.0, 60), [-1.0, -2.0, -30.0]])
     s = solver.solve(prep, 6000.0, V, AIR, radial=True)
     r, dr = s.radial, prep.st[:, 1]
-    y = r["w"] / np.where(s.V == 0.0, 1e-9, s.V)[:, None]
+    y = r.w / np.where(s.V == 0.0, 1e-9, s.V)[:, None]
     momentum = y > 0.62
     assert momentum.mean() > 0.8
-    ring = 2.0 * AIR.rho * 2.0 * np.pi * r["r"] * dr * r["F"] * np.abs(r["w"])
-    size = np.abs(r["dT"]).max()
-    assert np.abs(ring * (r["w"] - s.V[:, None]) - r["dT"])[momentum].max() < 1e-11 * size
-    assert np.abs(ring * r["v_t"] - r["dQ"] / r["r"])[momentum].max() < 1e-11 * size
+    ring = 2.0 * AIR.rho * 2.0 * np.pi * r.r * dr * r.F * np.abs(r.w)
+    size = np.abs(r.dT).max()
+    assert np.abs(ring * (r.w - s.V[:, None]) - r.dT)[momentum].max() < 1e-11 * size
+    assert np.abs(ring * r.v_t - r.dQ / r.r)[momentum].max() < 1e-11 * size
 
 
 def test_bernoulli_and_blade_agree_at_every_station_of_a_fan(rotor: Rotor, polar: Polar) -> None:
@@ -260,22 +260,22 @@ def test_bernoulli_and_blade_agree_at_every_station_of_a_fan(rotor: Rotor, polar
     V = np.linspace(0.0, 30.0, 60)
     s = solver.solve(prep, 6000.0, V, AIR, radial=True)
     r, dr = s.radial, prep.st[:, 1]
-    area = 2.0 * np.pi * r["r"] * dr
+    area = 2.0 * np.pi * r.r * dr
     V_ = s.V[:, None]
-    y = r["w"] / DUCT.wake_ratio / DUCT.contraction
+    y = r.w / DUCT.wake_ratio / DUCT.contraction
     jet = V_ + (y - DUCT.capture / DUCT.contraction * V_) * (1.0 + DUCT.bend * V_ / np.hypot(y, V_))
-    sucked, turned = np.maximum(r["w"] - V_, 0.0), np.maximum(r["v_t"], 0.0)
-    push = jet * np.abs(jet) + DUCT.wall_loss * r["w"] ** 2 - V_**2 + DUCT.lip_loss * sucked**2
+    sucked, turned = np.maximum(r.w - V_, 0.0), np.maximum(r.v_t, 0.0)
+    push = jet * np.abs(jet) + DUCT.wall_loss * r.w**2 - V_**2 + DUCT.lip_loss * sucked**2
     push -= 4.0 * DUCT.stator * turned**2
-    size = np.abs(r["dT"]).max()
-    assert np.abs(0.5 * AIR.rho * area * push - r["dT"]).max() < 1e-11 * size
-    assert np.abs(2.0 * AIR.rho * area * r["w"] * r["v_t"] - r["dQ"] / r["r"]).max() < 1e-11 * size
+    size = np.abs(r.dT).max()
+    assert np.abs(0.5 * AIR.rho * area * push - r.dT).max() < 1e-11 * size
+    assert np.abs(2.0 * AIR.rho * area * r.w * r.v_t - r.dQ / r.r).max() < 1e-11 * size
     # one mass flow: through the disk, in the exit plane and in the momentum of the jet
-    mass = (AIR.rho * area * r["w"]).sum(axis=1)
+    mass = (AIR.rho * area * r.w).sum(axis=1)
     assert np.allclose(mass, s.mass_flow, rtol=1e-12)
     assert np.allclose(mass, AIR.rho * rotor.annulus_area * DUCT.wake_ratio * s.V_exit, rtol=1e-9)
     drag = 0.5 * AIR.rho * s.V**2 * DUCT.drag_area
-    assert np.allclose((AIR.rho * area * r["w"] * (jet - V_)).sum(axis=1) - drag, s.T, rtol=1e-11, atol=1e-9)
+    assert np.allclose((AIR.rho * area * r.w * (jet - V_)).sum(axis=1) - drag, s.T, rtol=1e-11, atol=1e-9)
     assert np.allclose(s.T, s.T_rotor + s.T_stator + s.T_duct)
 
 
@@ -283,11 +283,11 @@ def test_bernoulli_and_blade_agree_at_every_station_of_a_fan(rotor: Rotor, polar
 @pytest.mark.parametrize("V", [0.0, 6.0, 12.0])
 def test_loss_factor_is_the_documented_one(rotor: Rotor, sheets: str, V: float) -> None:
     prep = solver.prepare(rotor, [(0.7, linear_polar())], (Swirl(), TipLoss(0.9, sheets)), n_stations=30)
-    r = {k: v[0] for k, v in solver.solve(prep, 6000.0, V, AIR, radial=True).radial.items()}
-    q = (2.0 * r["w"] - V) / r["w"] if sheets == "wake" else np.ones(30)
-    phi = np.arctan(np.tan(r["phi"]) * q**1.5)
-    f = 0.9 * 0.5 * rotor.B * (rotor.R - r["r"]) / (r["r"] * np.sin(phi))
-    assert np.allclose(r["F"], 2.0 / np.pi * np.arccos(np.exp(-f)), rtol=1e-6, atol=2e-9)
+    r = solver.Radial(*(v[0] for v in solver.solve(prep, 6000.0, V, AIR, radial=True).radial))
+    q = (2.0 * r.w - V) / r.w if sheets == "wake" else np.ones(30)
+    phi = np.arctan(np.tan(r.phi) * q**1.5)
+    f = 0.9 * 0.5 * rotor.B * (rotor.R - r.r) / (r.r * np.sin(phi))
+    assert np.allclose(r.F, 2.0 / np.pi * np.arccos(np.exp(-f)), rtol=1e-6, atol=2e-9)
 
 
 # Use ----------------------------------------------------------------------------------------------------------------
@@ -402,8 +402,8 @@ def test_a_failed_station_is_a_nan_with_words(rotor: Rotor, polar: Polar) -> Non
     assert np.isnan([s.T, s.Q, s.P, s.CT, s.CP, s.V_exit, s.T_rotor]).all()
     place = prep.stations.r[3] / rotor.R
     assert s.flags[0] == (f"not converged at r/R {place:.2f}: {solver.REASONS[kernel.NOT_FINITE]}",)
-    assert np.isnan(s.radial["dT"][:, 3]).all()
-    assert np.isfinite(s.radial["dT"][:, [2, 4]]).all()
+    assert np.isnan(s.radial.dT[:, 3]).all()
+    assert np.isfinite(s.radial.dT[:, [2, 4]]).all()
     T, Q, ok = solver.solve_point(broken, 5000.0, 0.0, AIR)
     assert math.isnan(T) and math.isnan(Q) and not ok
 
@@ -453,8 +453,8 @@ def test_many_stations_and_few(rotor: Rotor, polar: Polar) -> None:
     for part in (slice(0, 1), slice(3, 10), slice(60, 68), slice(60, 125), slice(100, 150)):
         some = Stations(*(v[part] for v in whole))
         t = solver.solve(solver.prepare(rotor, [(0.7, polar)], effects, stations=some), 6000.0, 4.0, AIR, radial=True)
-        assert np.allclose(t.radial["dT"], s.radial["dT"][:, part], rtol=1e-9, atol=1e-12)
-        assert t.T[0] == pytest.approx(s.radial["dT"][0, part].sum(), rel=1e-9)
+        assert np.allclose(t.radial.dT, s.radial.dT[:, part], rtol=1e-9, atol=1e-12)
+        assert t.T[0] == pytest.approx(s.radial.dT[0, part].sum(), rel=1e-9)
 
 
 def test_the_face_takes_a_rotor_and_gives_a_dataset(rotor: Rotor, polar: Polar) -> None:

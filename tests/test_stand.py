@@ -26,7 +26,7 @@ from bemt.base.errors import InputError
 from bemt.judge.proof import items, loop, prove, rows
 from bemt.tools.stand import drivers, hand, sealed, session
 from bemt.tools.stand.drivers import rcbenchmark, serial
-from bemt.tools.stand.guard import Guard, Limits
+from bemt.tools.stand.guard import Guard, Limits, Order
 from bemt.tools.stand.verbs import Stand, Stopped
 
 LIMITS = Limits(1800.0, 4000.0, current_A=5e3, vibration_m_s2=50.0)
@@ -194,7 +194,7 @@ def test_the_ramp_is_kept_up_and_not_down() -> None:
             pass
 
     guard = Guard(Wire(), Limits(2000.0, 1000.0))
-    guard.order({"go": 5000.0})
+    guard.order(Order(go=5000.0))
     began = time.monotonic()
     for _ in range(10):
         time.sleep(0.01)
@@ -203,7 +203,7 @@ def test_the_ramp_is_kept_up_and_not_down() -> None:
     assert 1050.0 < guard.us <= 1000.0 + 1000.0 * (time.monotonic() - began) + 20.0
     guard.stop("enough")
     assert guard.us == 1000.0 == Wire.said[-1]
-    guard.order({"go": 1500.0})
+    guard.order(Order(go=1500.0))
     guard.tick()
     assert guard.us == 1000.0, "a stop is for good"
 

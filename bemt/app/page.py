@@ -25,7 +25,7 @@ ABOUT = (
 def made(label: str, chord: float, pitch: float) -> bemt.Propeller:
     """Propeller of a label; a chord over radius (0: not measured) or a share of its pitch is taken as measured."""
     found = bemt.propeller(label)
-    changes: dict[str, Any] = {}
+    changes: dict[str, float] = {}
     if chord > 0.0:
         changes["blade.max_chord_over_R"] = chord
     if pitch != 1.0:
@@ -65,8 +65,8 @@ def told(name: str) -> str:
     return next(p.help for action in (bemt.estimate, bemt.drive) for p in parameters(action) if p.name == name)
 
 
-def asked(st: Any) -> tuple[bemt.Propeller, dict[str, float]]:
-    """What the user sets: the propeller and its point."""
+def asked(st: Any) -> tuple[bemt.Propeller, float, float, tuple[float, int] | None]:
+    """What the user sets: the propeller, rev/min, m/s, and K_v and cells of a motor."""
     with st.sidebar:
         st.header("Propeller")
         label = st.text_input("Label", "10x5", help=told("label"))
@@ -81,13 +81,11 @@ def asked(st: Any) -> tuple[bemt.Propeller, dict[str, float]]:
         motor = st.checkbox("With a motor")
         kv = st.slider("K_v [rev/min/V]", 100, 4000, 900, 10, disabled=not motor, help=told("kv"))
         cells = st.slider("LiPo cells", 1, 12, 3, disabled=not motor, help=told("cells"))
-    point = {"rpm": float(rpm), "airspeed_m_s": float(airspeed)}
-    return made(label, chord if known else 0.0, pitch), point | ({"kv": kv, "cells": cells} if motor else {})
+    return made(label, chord if known else 0.0, pitch), float(rpm), float(airspeed), (kv, cells) if motor else None
 
 
-def answer(st: Any, propeller: bemt.Propeller, point: dict[str, float]) -> None:
-    """The numbers at the point, with flags beside them."""
-    rpm, V = point["rpm"], point["airspeed_m_s"]
+def answer(st: Any, propeller: bemt.Propeller, rpm: float, V: float, motor: tuple[float, int] | None) -> None:
+    """The numbers at a point, with flags beside them."""
     one = propeller.solve(rpm, V)
     cells = st.columns(3)
     for cell, name, key, unit in zip(cells, ("Thrust", "Shaft power", "Torque"), ("thrust_N", "power_W", "torque_Nm"),
@@ -96,8 +94,8 @@ def answer(st: Any, propeller: bemt.Propeller, point: dict[str, float]) -> None:
         cell.metric(name, f"{value:.3g} ± {float(one.u[key][0]):.2g} {unit}" if np.isfinite(value) else "no solution")
     for flag in one.flags[0]:
         st.warning(flag)
-    if "kv" in point:
-        found = bemt.drive(propeller, kv=point["kv"], cells=int(point["cells"]), airspeed_m_s=V)
+    if motor is not None:
+        found = bemt.drive(propeller, kv=motor[0], cells=motor[1], airspeed_m_s=V)
         st.subheader("With this motor, full throttle")
         st.code(found.text, language=None)
 
@@ -153,10 +151,9 @@ def main() -> None:
     st.title("Propellers with uncertainty")
     st.caption(ABOUT)
     try:
-        propeller, point = asked(st)
-        answer(st, propeller, point)
+        propeller, rpm, V, motor = asked(st)
+        answer(st, propeller, rpm, V, motor)
         measured = recording(st, propeller)
-        rpm, V = point["rpm"], point["airspeed_m_s"]
         left, right = st.columns(2)
         with left:
             over = propeller.solve(np.linspace(0.3, 1.3, 14) * rpm, V)

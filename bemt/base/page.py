@@ -40,14 +40,23 @@ def num(value: Any, digits: int = 4, signed: bool = False, none: str = "-") -> C
     return Cell(text, float(value), True)
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> dict[str, Any] | None:
-    """Make the values of a table; None without rows."""
+@dataclass(frozen=True)
+class Table:
+    """A table."""
+
+    head: list[tuple[str, bool]]  # Words of a column, and whether it is of numbers
+    rows: list[list[Cell]]
+    sort: bool  # Whether a reader may sort it
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], sort: bool = True) -> Table | None:
+    """Make a table; None without rows."""
     body = [[cell if isinstance(cell, Cell) else Cell(str(cell)) for cell in row] for row in rows]
     if not body:
         return None
     units = [re.sub(r"\[[^]]*\]", lambda unit: unit[0].replace(" ", "\u00a0"), words) for words in head]
     numbers = [any(row[k].number for row in body) for k in range(len(head))]
-    return {"head": list(zip(units, numbers, strict=True)), "rows": body, "sort": sort}
+    return Table(list(zip(units, numbers, strict=True)), body, sort)
 
 
 def _clean(value: Any) -> Any:

@@ -401,25 +401,26 @@ def _rank(document: Any, path: list[int | str]) -> tuple[int, ...]:
 def _faults_of(model: type[Table], error: Any, at: _Place) -> Iterable[tuple[str, str, str, str]]:
     """Our words for one error of pydantic."""
     kind = None if at.field is None else at.field.annotation
-    if error["type"] == _FAULTS:
+    what, value = error["type"], error["input"]
+    if what == _FAULTS:
         for where, got, wanted, hint in error["ctx"]["faults"]:
             yield (at.where + where).removeprefix("."), got, wanted, hint
-    elif error["type"] == "extra_forbidden" and at.owner is not None:
+    elif what == "extra_forbidden" and at.owner is not None:
         known = "one of " + ", ".join(at.owner.named())
         yield at.where, "an unknown key", known, _stray_hint(str(at.path[-1]), at.owner, model)
     elif at.field is None:
-        yield at.where, shown(error["input"]), error["msg"], ""
-    elif error["type"] == "missing":
+        yield at.where, shown(value), error["msg"], ""
+    elif what == "missing":
         yield at.where, "nothing", expected(kind, limits_of(at.field), at.name), ""
     elif at.indexed:
         kind = next(get_args(part)[0] for part in _parts(kind) if get_origin(part) is tuple)
         limits, table = limits_of(at.field), f"a table [[{at.name}]]"
         wanted = table if next(_models(kind), None) else expected(kind, limits)
-        yield at.where, shown(error["input"]), wanted, _hint(at.where, error["input"], kind, limits)
+        yield at.where, shown(value), wanted, _hint(at.where, value, kind, limits)
     else:
         limits = limits_of(at.field)
-        hint = _hint(at.where, error["input"], kind, limits)
-        yield at.where, shown(error["input"]), expected(kind, limits, at.name), hint
+        hint = _hint(at.where, value, kind, limits)
+        yield at.where, shown(value), expected(kind, limits, at.name), hint
 
 
 def _models(annotation: Any) -> Iterator[type[Table]]:

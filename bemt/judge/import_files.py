@@ -119,8 +119,8 @@ def import_(
                                 column=told["column"], sign=told["sign"])  # fmt: skip
     found = load.import_files(names, format, choice, made, insist)
     if out is not None and found.runs:
-        own = tuple(found.runs[-1].provenance["files"])
-        made = made.model_copy(update={"run": made.run.model_copy(update={"files": own})})
+        own = made.run.model_copy(update={"files": found.runs[-1].files})
+        made = made.model_copy(update={"run": own})
         wrote = cfd_options.write_run(made, os.fspath(out)).as_posix()
     document = found.document()
     if case is not None:

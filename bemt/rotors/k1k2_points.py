@@ -144,18 +144,17 @@ def _from_uiuc_table(path: Path, table: Any) -> tuple[list[Rows], list[str]]:
 def _from_apc(found: apc.ApcPerformance) -> list[Rows]:
     s = found.series
     made = MeasuredPropeller(found.name, "APC", "APC, computed", found.diameter_m, found.pitch_m, found.blades)
-    return [(made, s["rpm"], s["J"], s["CT"])]
+    return [(made, s.rpm, s.J, s.CT)]
 
 
 def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
     """Power laws at `LAW_M_TIP`, in the air that the table states for them."""
-    c = found.values
     names = found.texts.get("Name", ("",) * len(found))
     nothing = np.full(len(found), np.nan)
     rows: list[Rows] = []
     for i, name in enumerate(names):
-        D, pitch = c["diameter_m"][i], c["pitch_m"][i]
-        a, b = c["thrust_law_N"][i], c["thrust_exponent"][i]
+        D, pitch = found.diameter_m[i], found.pitch_m[i]
+        a, b = found.thrust_law_N[i], found.thrust_exponent[i]
         if not (D > 0 and pitch > 0 and a > 0 and b > 1.0):
             continue
         blades = _BLADES.search(name)
@@ -164,11 +163,11 @@ def _from_drivecalc(path: Path, found: Dataset) -> list[Rows]:
             D, pitch, int(blades[1]) if blades else 2, ducted=_DUCTED.search(name) is not None,
         )  # fmt: skip
         rpm = np.array(LAW_M_TIP) * Air.from_density().a_sound / (np.pi * D) * 60.0
-        limit = c.get("max_rpm", nothing)[i]
+        limit = found.values.get("max_rpm", nothing)[i]
         rpm = rpm[rpm <= limit] if limit > 0 else rpm
         n = rpm / 60.0
         T = a * (rpm / 1000.0) ** b
-        CT = np.asarray(co.CT(T, _density(c, i), n, D))
+        CT = np.asarray(co.CT(T, _density(found.values, i), n, D))
         rows.append((made, rpm, np.zeros_like(rpm), CT))
     return rows
 
@@ -200,7 +199,7 @@ def _groups(
 
 def _from_table(path: Path, found: Dataset) -> tuple[list[Rows], list[str], list[str]]:
     """Any table with the columns of the module notes."""
-    N, constants = len(found), found.provenance.get("constants", {})
+    N, constants = len(found), found.constants
 
     def column(*names: str) -> Array | None:
         for name in names:
@@ -258,7 +257,7 @@ def _file(path: Path) -> tuple[list[Rows], list[str], list[str]]:
         return _from_apc(found), [], [f"{path}: computed by the vendor, not measured"]
     if isinstance(found, (uiuc.UiucStatic, uiuc.UiucLine, uiuc.UiucGeometry, uiuc.UiucThickness)):
         return *_from_uiuc_table(path, found), []
-    if isinstance(found, Dataset) and found.provenance.get("format") == "drivecalc" and "thrust_law_N" in found:
+    if isinstance(found, Dataset) and found.format == "drivecalc" and "thrust_law_N" in found:
         return _from_drivecalc(path, found), [], [f"{path}: power laws fitted by others, not measurements"]
     if isinstance(found, Dataset):
         return _from_table(path, found)

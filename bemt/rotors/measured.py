@@ -88,9 +88,9 @@ class MeasuredRotor:
 _SENSED = ("J", "alpha_deg", "Re", "f", "top", "T")
 
 
-def packed(rotors: list[MeasuredRotor]) -> dict[str, Any]:
+def packed(rotors: list[MeasuredRotor]) -> dict[str, Array]:
     """Arrays of the shipped file, a row for each propeller."""
-    out: dict[str, Any] = {"latents": np.array(NAMES)}
+    out = {"latents": np.array(NAMES)}
     for name in ("name", "family", "volume"):
         out[name] = np.array([getattr(one, name) for one in rotors])
     for name in ("diameter_in", "pitch_in", "chord", "camber", "offset_deg", "excess", "size"):

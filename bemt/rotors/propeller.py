@@ -329,13 +329,13 @@ class Propeller:
         density = None if density_kg_m3 is None else number("density_kg_m3", density_kg_m3)
         air = self.case.air(None if density is None else {"air.density_kg_m3": density})
         prep = self._model.prep
-        at = {key: value[0] for key, value in solver.solve(prep, n, V, air, radial=True).radial.items()}
+        at = solver.Radial(*(v[0] for v in solver.solve(prep, n, V, air, radial=True).radial))
         width, chord = prep.st[:, K.S_DR], prep.st[:, K.S_CHORD]
         return pd.DataFrame({
-            "r_m": at["r"], "chord_m": chord, "beta_deg": np.degrees(prep.st[:, K.S_BETA]),
-            "alpha_deg": np.degrees(at["alpha"]), "cl": at["cl"], "cd": at["cd"], "Re": at["Re"], "M": at["M"],
-            "axial_m_s": at["w"], "swirl_m_s": at["v_t"], "thrust_per_radius_N_m": at["dT"] / width,
-            "torque_per_radius_Nm_m": at["dQ"] / width,
+            "r_m": at.r, "chord_m": chord, "beta_deg": np.degrees(prep.st[:, K.S_BETA]),
+            "alpha_deg": np.degrees(at.alpha), "cl": at.cl, "cd": at.cd, "Re": at.Re, "M": at.M,
+            "axial_m_s": at.w, "swirl_m_s": at.v_t, "thrust_per_radius_N_m": at.dT / width,
+            "torque_per_radius_Nm_m": at.dQ / width,
         })  # fmt: skip
 
     @worded

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -122,12 +122,12 @@ class Validity:
         >>> Validity.of_rotors([one, Validity.of_rotor(0.2, 3, 0.6, [0.0], [2e4], 0.3)]).Re
         (20000.0, 90000.0)
         """
-        found = [asdict(one) for one in rotors]
+        found = list(rotors)
 
         def ends(name: str) -> tuple[Any, Any]:
-            return min(one[name][0] for one in found), max(one[name][1] for one in found)
+            return min(getattr(one, name)[0] for one in found), max(getattr(one, name)[1] for one in found)
 
-        fastest = max(one["M_tip"] for one in found)
+        fastest = max(one.M_tip for one in found)
         return Validity(
             ends("diameter_m"), ends("x"), ends("Re"), fastest, ends("blades"), ends("pitch_over_D")
         )  # fmt: skip

@@ -34,6 +34,8 @@ from bemt.physics.dataset import Dataset
 
 KIND = "apc"
 SOURCE = "APC Propellers (Landing Products), published data file"
+_PE0_COLUMNS = ("station", "chord", "pitch quoted", "pitch le-te", "sweep", "thickness", "twist", "max-thick")
+_PE0_MORE = {"zhigh": 0.0, "pitch prather": math.nan}
 _PER3_COLUMNS = "v j pe ct cp pwr torque thrust pwr torque thrust thr/pwr mach reyn fom".split()
 _TOKEN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:NaN|Inf(?:inity)?)|\*+", re.IGNORECASE)
 
@@ -151,8 +153,8 @@ def _pe0_columns(source: SourceText) -> tuple[int, list[str]]:
     source.refuse("", "no station table", "a header line that begins STATION CHORD", "Is this the PERF.PE0 file?")
 
 
-def _pe0_rows(source: SourceText, at: int, names: list[str]) -> dict[str, Array]:
-    """Station table up to the first blank line after it."""
+def _pe0_rows(source: SourceText, at: int, names: list[str]) -> list[Array]:
+    """Columns `_PE0_COLUMNS` and `_PE0_MORE` of the station table up to the first blank line after it."""
     rows: dict[int, list[float]] = {}
     for index, line in enumerate(source.lines[at:], at + 1):
         tokens = line.split()
@@ -170,24 +172,23 @@ def _pe0_rows(source: SourceText, at: int, names: list[str]) -> dict[str, Array]
     if len(rows) < 3:
         if not source.faults:
             source.add(at, number_of(len(rows), "station"), "three or more", "Is the file cut off?")
-        return {}
+        return []
     table = {name: data[:, i] for i, name in enumerate(names)}
-    wanted = ("station", "chord", "pitch quoted", "pitch le-te", "sweep", "thickness", "twist", "max-thick")
-    if missing := [name for name in wanted if name not in table]:
-        source.add(at, f"no column {', '.join(missing)}", f"columns {', '.join(wanted)}")
-        return {}
-    r, chord = table["station"], table["chord"]
-    twist = np.degrees(np.arctan2(table["pitch le-te"], 2 * math.pi * r))
+    if missing := [name for name in _PE0_COLUMNS if name not in table]:
+        source.add(at, f"no column {', '.join(missing)}", f"columns {', '.join(_PE0_COLUMNS)}")
+        return []
+    r, chord, _, le_te, _, t_c, twist_deg, thickness = columns = [table[name] for name in _PE0_COLUMNS]
+    twist = np.degrees(np.arctan2(le_te, 2 * math.pi * r))
     tests = [
         (np.diff(r, prepend=0.0) <= 0, "radii that do not ascend", "ascending radii [in]"),
         (chord <= 0, "a chord that is not positive", "positive chords [in]"),
-        (np.abs(table["thickness"] * chord - table["max-thick"]) > 0.002, "MAX-THICK", "thickness ratio x chord"),
-        (np.abs(twist - table["twist"]) > 0.5, "TWIST", "atan(LE-TE pitch/(2 pi r)) [deg]"),
+        (np.abs(t_c * chord - thickness) > 0.002, "MAX-THICK", "thickness ratio x chord"),
+        (np.abs(twist - twist_deg) > 0.5, "TWIST", "atan(LE-TE pitch/(2 pi r)) [deg]"),
     ]
     for bad_rows, got, expected in tests:
         for i in np.flatnonzero(bad_rows)[:1]:
             source.add(lines[i], got, expected, "Have columns shifted, or units changed?")
-    return table
+    return [*columns, *(table.get(name, np.full_like(r, absent)) for name, absent in _PE0_MORE.items())]
 
 
 def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
@@ -195,39 +196,37 @@ def read_pe0(path: str | os.PathLike[str]) -> ApcBlade:
     source = load_text(path)
     name, (diameter_in, pitch_in, blades_named) = _designation(source)
     at, names = _pe0_columns(source)
-    table = _pe0_rows(source, at, names)
-    tail: dict[str, float] = {}
+    columns = _pe0_rows(source, at, names)
+    tail = []
     for key, low, high in (("RADIUS", 1.0, 30.0), ("HUBTRA", 0.0, 15.0), ("BLADES", 2, 12)):
         match = re.search(rf"^\s*{key}:\s*(\S+)", source.text, re.MULTILINE)
         value = number(match[1]) if match else None
         if value is None or not low <= value <= high:
             got = f"{key}: {match[1]}" if match else f"no line {key}:"
             source.add(key, got, f"a number from {low:g} to {high:g}", "Is the file cut off?")
-        tail[key] = math.nan if value is None else value
-    R = tail["RADIUS"]
+        tail.append(math.nan if value is None else value)
+    R, Rhub, blades = tail
     if abs(2 * R - diameter_in) > 0.03 * diameter_in:
         expected = f"the diameter of {name}, {diameter_in:g} in"
         source.add("RADIUS", f"{2 * R:g} in", expected, "Do name and data belong together?")
-    if table and table["station"][-1] > 1.01 * R:
-        got = f"a station at {table['station'][-1]:g} in"
+    if columns and columns[0][-1] > 1.01 * R:
+        got = f"a station at {columns[0][-1]:g} in"
         source.add("RADIUS", got, f"stations up to {R:g} in", "Have units changed?")
     source.check()
-    inch, zero = units.INCH, np.zeros_like(table["station"])
+    r, chord, quoted, _, sweep, t_c, twist_deg, _, z_high, prather = columns
+    inch = units.INCH
     version = re.search(r"^\s*(v\d{4}\S*)", source.text, re.MULTILINE)
     sections = re.findall(r"^\s*AIRFOIL\d+:\s*([\d.]+)\s*,\s*(\S.*?)\s*(?:\(|$)", source.text, re.MULTILINE)
     notes = tuple(re.findall(r"^\s*NOTE:\s*(.*?)\s*$", source.text, re.MULTILINE))
     remark = (
-        f"{number_of(len(names), 'column')}; blade number by the name {blades_named}"
-        if blades_named != tail["BLADES"]
-        else ""
+        f"{number_of(len(names), 'column')}; blade number by the name {blades_named}" if blades_named != blades else ""
     )
     return ApcBlade(
         name=name, version=version[1] if version else "", diameter_m=diameter_in * inch, pitch_m=pitch_in * inch,
-        radius_m=R * inch, hub_radius_m=tail["HUBTRA"] * inch, blades=int(tail["BLADES"]), r_m=table["station"] * inch,
-        chord_m=table["chord"] * inch, beta_rad=np.radians(table["twist"]), t_c=table["thickness"],
-        sweep_m=table["sweep"] * inch, z_high_m=table.get("zhigh", zero) * inch,
-        pitch_quoted_m=table["pitch quoted"] * inch, pitch_prather_m=table.get("pitch prather", zero * math.nan) * inch,
-        airfoils=tuple((float(r) * inch, section) for r, section in sections), notes=notes,
+        radius_m=R * inch, hub_radius_m=Rhub * inch, blades=int(blades), r_m=r * inch, chord_m=chord * inch,
+        beta_rad=np.radians(twist_deg), t_c=t_c, sweep_m=sweep * inch, z_high_m=z_high * inch,
+        pitch_quoted_m=quoted * inch, pitch_prather_m=prather * inch,
+        airfoils=tuple((float(at_r) * inch, section) for at_r, section in sections), notes=notes,
         provenance={"source": SOURCE, **source.about, "remark": remark},
     )  # fmt: skip
 

@@ -25,6 +25,7 @@ from bemt.data.readers.unit_text import (
     weight_of,
 )
 
+_RPM = units.UNITS["rpm"]
 _PURE = re.compile(
     r"(CT|CP|CQ|KT|KQ|10KQ|CT_total|KT_total|KT_nozzle|KT_propeller|J|eta0?|FM|Re|M_tip|run|tip_Mach|Mach|throttle|sigma"
     r"|[A-Za-z]\w*?/(?![NAVWKCF]\b)[A-Z]|[A-Za-z]\w*_over_[A-Za-z]|[xyz]/c|\w+_ratio|CT_rotor|CP_rotor|CQ_rotor"
@@ -342,7 +343,7 @@ def _by_words(text: str) -> Heading | None:
         for name, dimension in quantities(words):
             if not unit:
                 if name == "rpm" and "rpm" in words:
-                    return Heading(text, "rpm", units.UNITS["rpm"])
+                    return Heading(text, "rpm", _RPM)
                 if set(words) == {"throttle"} and not re.search(r"[\s_]", bare):
                     return Heading(text, "throttle", units.Unit("", "none", 1.0))
                 continue
@@ -403,7 +404,7 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
         name, stated = ending
         return (name, stated, "") if isinstance(stated, units.Unit) else (name, None, stated)
     if re.fullmatch(r"(e[_ ]?)?rpm(_\w)?", core, re.IGNORECASE):  # before suffixes: rpm_A is no current
-        return core, units.UNITS["rpm"], ""
+        return core, _RPM, ""
     if (by_suffix := _by_suffix(core, text)) is not None:
         return by_suffix
     rotor, pure = "rotor convention" in text, units.Unit("", "none", 1.0)
@@ -414,8 +415,8 @@ def _without_brackets(core: str, text: str) -> tuple[str, units.Unit | None, str
     if re.fullmatch(r"\w+/[NAVWKCF]", core):
         return text, None, f"{core!r} is a ratio, or a quantity and its unit: write the unit in brackets"
     if re.fullmatch(r"rpm([_ ]\w+)?|\w+[_ ]rpm", core, re.IGNORECASE):
-        return core, units.UNITS["rpm"], ""
-    return ("rpm", units.UNITS["rpm"], "") if unit_of(core) == units.UNITS["rpm"] else (text, None, "")  # U/min, 1/min
+        return core, _RPM, ""
+    return ("rpm", _RPM, "") if unit_of(core) == _RPM else (text, None, "")  # U/min, 1/min
 
 
 def _small(first: str, text: str) -> str:
@@ -427,7 +428,7 @@ def _heading(text: str) -> Heading:
     if doubt := either(text):
         return Heading(text, slug(text), None, doubt)
     if _ELECTRICAL.fullmatch(text):
-        return Heading(text, "electrical_rpm", units.UNITS["rpm"])
+        return Heading(text, "electrical_rpm", _RPM)
     base, unit, doubt = _name_and_unit(text)
     word = _WORDS.get(base.lower().replace("_", " "))
     if word and word[1] == "acceleration" and doubt.startswith("'g'"):

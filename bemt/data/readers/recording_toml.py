@@ -357,7 +357,7 @@ def _join(runs: list[Dataset], files: Sequence[str]) -> Dataset:
     }
     about = {
         "file": whole.name, "sha256": "+".join(run.provenance["sha256"] for run in runs), "format": KIND,
-        "headings": {k: v for run in runs for k, v in run.provenance.get("headings", {}).items()},
+        "headings": {k: v for run in runs for k, v in run.headings.items()},
     }  # fmt: skip
     return replace(
         whole, values={**whole.values, "run": np.repeat(np.arange(1.0, len(runs) + 1.0), [len(run) for run in runs])},

@@ -145,21 +145,23 @@ class _Row:
 def _reference(row: _Row) -> Reference | None:
     """Read one row; None with faults appended when it cannot be used."""
     before = len(row.source.faults)
-    quantity, kind, source = row.cells["quantity"], row.cells["kind"], row.cells["source"]
+    quantity, kind, source, remark, text, unit, uncertainty = (
+        row.cells[column] for column in ("quantity", "kind", "source", "remark", "value", "unit", "uncertainty")
+    )
     value = row.number("value", "a finite number")
     factor = math.nan
     if quantity not in QUANTITIES:
         row.fault("quantity", f"quantity {quantity!r}", f"one of {', '.join(QUANTITIES)}", _near(quantity, QUANTITIES))
     else:
-        factor, fault = _unit_factor(quantity, row.cells["unit"])
+        factor, fault = _unit_factor(quantity, unit)
         if fault:
             row.fault("unit", *fault)
         _, _, low, high = QUANTITIES[quantity]
         if not math.isnan(value * factor) and not low <= value * factor <= high:
-            got = f"{quantity} = {value:g} {row.cells['unit']}"
+            got = f"{quantity} = {value:g} {unit}"
             row.fault("value", got, f"{low:g} to {high:g} in SI units", "Is the unit right?")
     u = math.nan
-    if row.cells["uncertainty"].lower() != "unknown":
+    if uncertainty.lower() != "unknown":
         u = row.number("uncertainty", 'a standard uncertainty in the unit of the value, or "unknown"')
         if u <= 0:
             row.fault("uncertainty", f"uncertainty = {u:g}", "a positive number", 'Write "unknown" if nobody stated it')
@@ -179,8 +181,8 @@ def _reference(row: _Row) -> Reference | None:
     if len(row.source.faults) > before:
         return None
     return Reference(
-        quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, row.cells["remark"],
-        f"{row.cells['value']} {row.cells['unit']}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
+        quantity, value * factor, u * factor, QUANTITIES[quantity][1], kind, source, remark,
+        f"{text} {unit}".removesuffix(" -"), where=f"{row.source.name}:{row.line}",
         sha256=row.source.sha256,
         **conditions,
     )  # fmt: skip

@@ -71,7 +71,7 @@ def _column(values: Array, rows: int) -> Array:
 
 def channels_of(d: Dataset) -> dict[str, Channel]:
     """Columns of a part of a file, to be named anew in the whole."""
-    means = d.provenance.get("means", {})
+    means = d.means
     return {name: Channel(v, d.unit(name), means.get(name)) for name, v in d.values.items()}
 
 

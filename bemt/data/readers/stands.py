@@ -107,11 +107,15 @@ def _name(stem: str) -> dict[str, str]:
 def _check_table(build: Builder) -> None:
     """Units are not in the file: see that its own products agree with them."""
     c = {name: channel.values for name, channel in build.channels.items()}
-    if {"voltage_V", "current_A", "electrical_power_W"} <= c.keys():
-        _ratio(build, c["voltage_V"] * c["current_A"], c["electrical_power_W"], "pin", "v x a", 0.05)
-    if {"thrust_N", "electrical_power_W", "efficacy_N_W"} <= c.keys():
+    thrust = c["thrust_N"]
+    volts, amps, power, efficacy, throttle = (
+        c.get(name) for name in ("voltage_V", "current_A", "electrical_power_W", "efficacy_N_W", "throttle")
+    )
+    if volts is not None and amps is not None and power is not None:
+        _ratio(build, volts * amps, power, "pin", "v x a", 0.05)
+    if power is not None and efficacy is not None:
         with np.errstate(divide="ignore", invalid="ignore"):
-            _ratio(build, c["thrust_N"] / c["electrical_power_W"], c["efficacy_N_W"], "theff", "th/pin", 0.01)
+            _ratio(build, thrust / power, efficacy, "theff", "th/pin", 0.01)
     for name in [n for n in c if "_err_" in n or n.endswith("err_rpm") or n == "err_rpm"]:
         build.flag(np.flatnonzero(c[name] < 0.0), f"{name} is negative")
         main = name.replace("_err_", "_").replace("err_rpm", "rpm")
@@ -119,9 +123,9 @@ def _check_table(build: Builder) -> None:
             usual = float(np.nanmedian(c[name]))
             wide = np.flatnonzero(c[name] > 20.0 * max(usual, 1e-12))
             build.flag(wide, f"stated error of {main} above 20 times its median")
-    build.flag(np.flatnonzero(c["thrust_N"] < 0.0), "thrust_N is negative")
-    if "throttle" in c:
-        build.flag(np.flatnonzero(np.diff(c["throttle"], prepend=-np.inf) <= 0.0), "throttle does not rise")
+    build.flag(np.flatnonzero(thrust < 0.0), "thrust_N is negative")
+    if throttle is not None:
+        build.flag(np.flatnonzero(np.diff(throttle, prepend=-np.inf) <= 0.0), "throttle does not rise")
 
 
 def _ratio(build: Builder, expected: np.ndarray, got: np.ndarray, name: str, formula: str, tolerance: float) -> None:
@@ -140,11 +144,11 @@ def _ratio(build: Builder, expected: np.ndarray, got: np.ndarray, name: str, for
 
 def _check_raw(build: Builder) -> None:
     c = {name: channel.values for name, channel in build.channels.items()}
-    telemetry = c.get("ESCT_RPM")
+    telemetry, rpm = c.get("ESCT_RPM"), c["rpm"]
     if telemetry is not None:
-        good = (telemetry > 0) & (c["rpm"] > 0)
+        good = (telemetry > 0) & (rpm > 0)
         if np.count_nonzero(good) >= 3:
-            ratio = c["rpm"][good] / telemetry[good]
+            ratio = rpm[good] / telemetry[good]
             usual = float(np.median(ratio))
             if float(np.max(np.abs(ratio / usual - 1.0))) < 1e-3:
                 pairs = 100.0 / usual

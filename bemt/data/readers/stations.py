@@ -143,7 +143,8 @@ def read_stations(path: Path, R: float) -> BladeStations:
         source.add(table.lines[i], "another number of cells", f"{table.width}, as in line {top}")
     places = [by_name[name][0] for name in wanted]
     decimal = decimal_mark(table)
-    thick, left = _thickness(table, by_name["thickness"], decimal)
+    thicknesses = by_name["thickness"]
+    thick, left = _thickness(table, thicknesses, decimal)
     columns = []
     for place in places:
         values = table.numbers(place.at, decimal)[0]
@@ -167,14 +168,14 @@ def read_stations(path: Path, R: float) -> BladeStations:
         beta = np.degrees(np.arctan2(beta, 2.0 * np.pi * x))
     _limits(source, places, (x, c, beta), R)
     source.check()
-    if thick is not None and not by_name["thickness"][0].share:
+    if thick is not None and not thicknesses[0].share:
         thick = thick / c
     if thick is not None and not (THICKNESSES[0] <= thick.min() and thick.max() <= THICKNESSES[1]):
-        heading, reach = by_name["thickness"][0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
+        heading, reach = thicknesses[0].heading, f"{thick.min():.3g} to {thick.max():.3g} of the chord"
         why = f"{reach}; a section has 0.01 to 0.5. Per cent is t/c %, a length t_mm"
         left = [*left, f"column {heading!r} not used: {why}"]
         thick = None
-    used = {p.at for p in places} | {c.at for c in by_name["thickness"]}
+    used = {p.at for p in places} | {c.at for c in thicknesses}
     left += [f"column {h!r} not used" for j, h in enumerate(table.headings) if j not in used and h.strip()]
     return BladeStations(np.minimum(x, 1.0), c, np.radians(beta), thick, tuple(left))
 

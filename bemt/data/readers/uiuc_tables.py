@@ -120,8 +120,8 @@ def sniff(head: bytes | str) -> bool:
     return role_of(head) is not None
 
 
-def _parse(source: SourceText, role: str) -> tuple[dict[str, Array], tuple[int, ...]]:
-    """Read the table of one file; every row that is not exactly its columns of finite numbers is a fault."""
+def _parse(source: SourceText, role: str) -> tuple[tuple[Array, ...], tuple[int, ...]]:
+    """Columns of a file, lines of its rows; every row that is not exactly its columns of finite numbers is a fault."""
     at, found = _header(source.text)
     columns = _COLUMNS[role]
     if found != role:
@@ -151,7 +151,7 @@ def _parse(source: SourceText, role: str) -> tuple[dict[str, Array], tuple[int, 
         source.add("", "no rows", "one row or more")
     source.check()
     data = np.array([*rows.values()], dtype=float)
-    return {name: data[:, i] for i, name in enumerate(columns)}, tuple(rows)
+    return tuple(data.T.copy()), tuple(rows)
 
 
 def _order_flags(x: Array, name: str) -> tuple[tuple[str, ...], ...]:
@@ -163,8 +163,7 @@ def _order_flags(x: Array, name: str) -> tuple[tuple[str, ...], ...]:
 def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
     """Read one geometry file."""
     source = load_text(path)
-    table, rows = _parse(source, "geom")
-    r_R, c_R, beta = table.values()
+    (r_R, c_R, beta), rows = _parse(source, "geom")
     for i in np.flatnonzero(np.diff(r_R) <= 0):
         source.add(f"{rows[i + 1]}:1", f"r/R = {r_R[i + 1]:g} after {r_R[i]:g}", "ascending r/R", "Sort rows")
     if len(r_R) < 3 or r_R[-1] < 0.9:
@@ -180,11 +179,10 @@ def read_geometry(path: str | os.PathLike[str]) -> UiucGeometry:
 def read_static(path: str | os.PathLike[str]) -> UiucStatic:
     """Read one static run (header ``RPM CT CP``); rows stay in the recorded order, flagged where rpm goes back."""
     source = load_text(path)
-    table, rows = _parse(source, "static")
+    (rpm, CT, CP), rows = _parse(source, "static")
     name = parse_file_name(Path(path).stem)
     run = name.run if name and name.role == "static" else ""
-    flags = _order_flags(table["RPM"], "rpm")
-    return UiucStatic(source.name, source.sha256, rows, flags, table["RPM"], table["CT"], table["CP"], run)
+    return UiucStatic(source.name, source.sha256, rows, _order_flags(rpm, "rpm"), rpm, CT, CP, run)
 
 
 def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLine:
@@ -196,14 +194,13 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
         got = NO_SPEED if speed is None else f"rpm {speed:g}"
         hint = "Name the file <family>_<size>_<run>_<rpm>.txt"
         source.add("", got, "rpm from 100 to 200000 as the last number of the name", hint)
-    table, rows = _parse(source, "line")
+    (J, CT, CP, *more), rows = _parse(source, "line")
     assert speed is not None  # told by _parse
-    J, CT, CP = table["J"], table["CT"], table["CP"]
     with np.errstate(divide="ignore", invalid="ignore"):
         ideal = np.where(CP != 0, J * CT / CP, np.nan)
         # four times the rounding of the printed digits (J 0.001, CT and CP 0.0001)
         slack = 4 * (0.0005 + np.abs(J / CP) * 5e-5 + np.abs(ideal) * 5e-5 / np.abs(CP) + np.abs(CT / CP) * 5e-4)
-    eta = table.get("eta", ideal)
+    eta = more[0] if more else ideal
     odd = np.abs(eta - ideal) > slack
     bad = np.flatnonzero(odd & (np.abs(eta - ideal) > 0.05 + 0.1 * np.abs(ideal)))
     if len(bad) > max(2, len(J) // 4):
@@ -219,5 +216,5 @@ def read_line(path: str | os.PathLike[str], rpm: float | None = None) -> UiucLin
 def read_thickness(path: str | os.PathLike[str]) -> UiucThickness:
     """Read one thickness file (header ``r/R t/c``)."""
     source = load_text(path)
-    table, rows = _parse(source, "thick")
-    return UiucThickness(source.name, source.sha256, rows, _order_flags(table["r/R"], "r/R"), *table.values())
+    (r_R, t_c), rows = _parse(source, "thick")
+    return UiucThickness(source.name, source.sha256, rows, _order_flags(r_R, "r/R"), r_R, t_c)

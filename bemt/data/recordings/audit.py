@@ -2,8 +2,8 @@ r"""Audit of a CFD number: what its set-up does to its uncertainty, line by line
 
 A recorded CFD thrust is a measurement by an instrument whose settings can be read. Each line names one setting, what is
 known of it, and its part of the standard uncertainty of the number, relative to it, where a rule exists: published, or
-measured by this project's own OpenFOAM runs (:data:`MEASURED`). Without a rule the part is NaN, printed "unknown", and
-then so is the whole.
+measured by this project's own OpenFOAM runs (:data:`COMPRESSIBLE`). Without a rule the part is NaN, printed "unknown",
+and then so is the whole.
 
 Domain. A wall round the rotor holds its slipstream; Glauert's correction for a propeller in a closed tunnel of area C
 gives the equivalent free-stream speed
@@ -33,7 +33,7 @@ from bemt.physics.k1k2 import ZERO_THRUST_MEASURED
 
 STATUSES = ("fine", "doubtful", "fault", "not stated")
 
-MEASURED = {"compressible": 0.063, "compressible_M_tip": 0.625, "buffer_layer": 0.012, "turbulence": 0.016}
+COMPRESSIBLE, COMPRESSIBLE_M_TIP, BUFFER_LAYER, TURBULENCE = 0.063, 0.625, 0.012, 0.016
 """Relative change of static thrust of one 8x5 propeller at 20,000 rev/min, OpenFOAM, half domain [1]: compressible for
 incompressible flow (at tip Mach 0.625, isentropic gas, ``reports/cfd``; torque 7.5 %), first cell at y+ 16 for 51,
 realizable k-epsilon for k-omega SST.  The last two are differences on one grid of 249,000 cells from before the
@@ -123,7 +123,7 @@ def _compressibility(f: CfdFacts) -> Judged:
     words = f"{known}, tip Mach {M:.2f}" if math.isfinite(M) else f"{known}, tip Mach unknown"
     if math.isnan(M):
         return "not stated", words, "unknown", math.nan
-    bias = MEASURED["compressible"] * (M / MEASURED["compressible_M_tip"]) ** 2
+    bias = COMPRESSIBLE * (M / COMPRESSIBLE_M_TIP) ** 2
     if M <= M_TIP_NEGLIGIBLE:
         return "fine", words, f"thrust at most {bias:.1%} low (own runs, M^2)", bias
     told = f.compressible is False
@@ -184,7 +184,7 @@ def _wall(f: CfdFacts) -> Judged:
     if f.ducted:
         return "doubtful", words, "buffer layer; no rule measured for ducted rotors", math.nan
     says = "buffer layer: own runs at y+ 16 and 51 differ by 1.2 % in thrust, 2.4 % in torque"
-    return "doubtful", words, says, MEASURED["buffer_layer"]
+    return "doubtful", words, says, BUFFER_LAYER
 
 
 def _turbulence(f: CfdFacts) -> Judged:
@@ -193,7 +193,7 @@ def _turbulence(f: CfdFacts) -> Judged:
     if f.ducted:
         return "doubtful", f.turbulence, "no rule measured for ducted rotors", math.nan
     says = "own runs: k-omega SST and realizable k-epsilon differ by 1.6 % in thrust, 4.5 % in torque"
-    return "fine", f.turbulence, says, MEASURED["turbulence"]
+    return "fine", f.turbulence, says, TURBULENCE
 
 
 def _thrust(f: CfdFacts) -> Judged:

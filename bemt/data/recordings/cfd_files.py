@@ -104,7 +104,7 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
     for name, record in read:
         home = _home(name, record)
         at = next((k for k, (file, other) in enumerate(out) if home == _home(file, other)), None)
-        if at is None or record.provenance.get("clock") not in ("time", "iteration"):
+        if at is None or record.clock not in ("time", "iteration"):
             out.append((name, record))
             continue
         file, before = out[at]
@@ -132,7 +132,7 @@ def _joined(read: list[tuple[str, Dataset]], faults: list[Fault]) -> list[tuple[
 
 def _home(name: str, record: Dataset) -> tuple[str, str, tuple[str, ...]]:
     """What the parts of one history have in common: format, function object, columns."""
-    form = str(record.provenance["format"])
+    form = record.format
     return form, zone_of(Path(name), form), tuple(record.values)
 
 
@@ -148,7 +148,7 @@ def _other_bases(read: Sequence[tuple[str, Dataset]]) -> list[Fault]:
     """Histories that do not overlap: they are not one run."""
     faults = []
     for kind in ("time", "iteration"):
-        own = [(n, clock_of(r)[kind == "time"]) for n, r in read if r.provenance.get("clock") == kind]
+        own = [(n, clock_of(r)[kind == "time"]) for n, r in read if r.clock == kind]
         own = [(n, clock) for n, clock in own if clock.size > 1]
         for (a, x), (b, y) in zip(own, own[1:], strict=False):
             shared = min(x[-1], y[-1]) - max(x[0], y[0])
@@ -162,7 +162,7 @@ def settled(
     values: Array, record: Dataset, period: float, revolutions: int | None, end: float = math.inf
 ) -> Settled | str:
     """Settled part of a history: whole revolutions by time, else the last fifth; text: why there is none."""
-    clock = record.provenance.get("clock")
+    clock = record.clock
     coarse = ""
     if clock == "time":
         time = record[record.provenance["time_channel"]]
@@ -192,8 +192,8 @@ def settled(
         part = values[values.size - found.rows :]
         over = f"last {found.rows} of {values.size} rows{coarse}"
         return Settled(np.array([found.mean]), (found.drift or 0.0) * abs(found.mean), float(np.std(part)), over)
-    mean = record.provenance.get("means", {})
+    mean = record.means
     over = "as in the file"
-    if values.size > 1 and mean and record.provenance["format"] == "fluent_transcript":
+    if values.size > 1 and mean and record.format == "fluent_transcript":
         values, over = values[np.isfinite(values)][-1:], "the last one computed"
     return Settled(np.array(values, dtype=float), math.nan, 0.0, over)

@@ -73,7 +73,7 @@ class LoadColumn:
 
 def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
     """Columns of one file that may be loads or say something of them."""
-    form = str(record.provenance["format"])
+    form = record.format
     home = zone_of(Path(file), form) if several else ""
     clock = {*record.provenance.get("clock_channels", "").split("\t"), record.provenance.get("time_channel", "")}
     out = []
@@ -98,7 +98,7 @@ def columns_of(file: str, record: Dataset, several: bool) -> list[LoadColumn]:
 
 def _recorded(found: list[LoadColumn]) -> list[LoadColumn]:
     """Columns without what a transcript tells of the same quantity: somebody computed that at some moment."""
-    written = [c for c in found if c.record.provenance["format"] != "fluent_transcript"]
+    written = [c for c in found if c.record.format != "fluent_transcript"]
     return written or found
 
 
@@ -245,7 +245,7 @@ class OpenRun:
         values, record = self.si("rpm", own[0]), own[0].record
         if values is None:
             return np.array([math.nan])
-        found = None if record.provenance.get("clock") == "time" else settled(values, record, math.nan, None)
+        found = None if record.clock == "time" else settled(values, record, math.nan, None)
         return np.abs(found.values if isinstance(found, Settled) else values[-1:])
 
     def _another_speed(self, own: Sequence[LoadColumn], rpm: float) -> None:
@@ -253,7 +253,7 @@ class OpenRun:
         stated = [c for c in own if unit_of(c.unit) is not None]
         for c in stated or own:
             v = np.unique(c.record[c.name])
-            if stated or (v.size > 1 and c.record.provenance.get("clock") == "none"):
+            if stated or (v.size > 1 and c.record.clock == "none"):
                 got = f"--rpm {rpm:g}, where {c.name} has {', '.join(f'{x:g}' for x in v[:4])}"
                 usual = "Leave out --rpm" if stated else '--unit rpm=rpm, or --unit rpm="rad/s", says its unit'
                 return self.fault(c, c.name, got, "one source of the speed", usual)

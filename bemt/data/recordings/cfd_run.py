@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -23,13 +23,13 @@ from bemt.data.readers.cfd_run import RunToml
 from bemt.data.readers.headings import channel_of
 from bemt.data.recordings.cfd_files import EXPORT, PROGRAMS, Settled, cfd_files, clock_of, read_run, settled, zone_of
 from bemt.data.recordings.cfd_loads import CHANNEL, OpenRun, by_zone, columns_of, counted_zones, other_than_loads
-from bemt.data.recordings.cfd_setup import with_grid_floor
+from bemt.data.recordings.cfd_setup import CfdRun, with_grid_floor
 from bemt.data.recordings.channels import moves
 from bemt.data.recordings.check import check
 from bemt.data.recordings.grid_study import CELL_SIZE, COVERAGE, by_grid, groups, together
 from bemt.physics.dataset import Dataset
 
-__all__ = ["NO_LOAD", "assemble", "document", "is_run", "run_at", "run_text"]
+__all__ = ["NO_LOAD", "assemble", "is_run", "run_at", "run_text"]
 
 NO_LOAD = "a thrust or a torque"
 MOVING = 0.01
@@ -44,7 +44,7 @@ _KNOWN = frozenset((*_COEFFICIENTS, "KT", "KQ", "10KQ", "eta", "eta0", "FM", "ti
 _BESIDE = {"force.dat": "moment.dat", "moment.dat": "force.dat"}  # files that OpenFOAM writes beside each other
 
 
-def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = None) -> Dataset | None:
+def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = None) -> CfdRun | None:
     """Run of a run.toml, a folder or an export at a stated speed; None for anything that is no CFD."""
     at = Path(path)
     told = {k: v for k, v in (("rpm", rpm), ("airspeed_m_s", airspeed_m_s)) if v is not None}
@@ -74,9 +74,9 @@ def run_at(path: str, rpm: float | None = None, airspeed_m_s: float | None = Non
     return assemble(RunToml.model_validate({"run": {"files": tuple(map(str, files)), **told}}), Path(), path)
 
 
-def is_run(record: Dataset) -> bool:
+def is_run(record: Dataset) -> TypeGuard[CfdRun]:
     """Whether a dataset is a run that was assembled here."""
-    return record.provenance.get("format") == "cfd_run"
+    return isinstance(record, CfdRun)
 
 
 def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
@@ -87,12 +87,12 @@ def _sum(parts: Sequence[tuple[float, Settled]]) -> Settled:
     )  # fmt: skip
 
 
-def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
+def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> CfdRun:
     """Points of a run: rpm, thrust, torque, the duct's part, with u, and how each was averaged.
 
     One point, or one for each design point, from files relative to `folder`; runs of one condition on several grids
-    (``[[grids]]``, or rows of unlike cells) are one point. ``provenance``: ``conditions``, ``averaged``, ``drift``,
-    ``studies`` (`grid_study.by_grid`). InputError with everything that has to be said first: units, zones, speed.
+    (``[[grids]]``, or rows of unlike cells) are one point, with `studies` (`grid_study.by_grid`). InputError with
+    everything that has to be said first: units, zones, speed.
     """
     if run.grids:
         return _grids(run, folder, name)
@@ -102,7 +102,7 @@ def assemble(run: RunToml, folder: Path = Path(), name: str = "run") -> Dataset:
         raise InputError(work.told)
     rpm = work.speed()
     work.period = 60.0 / float(rpm[0]) if rpm.size == 1 and np.isfinite(rpm[0]) else math.nan
-    times = [c[1][-1] for _, r in read if r.provenance.get("clock") == "time" and (c := clock_of(r))[1].size]
+    times = [c[1][-1] for _, r in read if r.clock == "time" and (c := clock_of(r))[1].size]
     work.end = float(min(times)) if times else math.inf
     if times and not math.isfinite(work.period):
         work.period = 1.0
@@ -122,7 +122,7 @@ def _opened(run: RunToml, folder: Path, name: str) -> tuple[OpenRun, list[tuple[
     """The files of a run as they were read, and their columns side by side."""
     read, faults = read_run([folder / f for f in run.run.files])
     vectors = [(f, r) for f, r in read if any(n.startswith("force_") for n in r.values)]
-    homes = {zone_of(Path(f), str(r.provenance["format"])) for f, r in vectors}
+    homes = {zone_of(Path(f), r.format) for f, r in vectors}
     columns = [c for file, record in read for c in columns_of(file, record, len(homes) > 1)]
     notes = [n for _, r in read for n in r.notes if "restart" in n or "joined" in n or "left out" in n]
     return OpenRun(run, name, columns, complete=not faults, notes=notes, faults=faults), read
@@ -148,9 +148,9 @@ def _summed(work: OpenRun, quantity: str) -> dict[str, Settled]:
     return loads
 
 
-def _grids(run: RunToml, folder: Path, name: str) -> Dataset:
+def _grids(run: RunToml, folder: Path, name: str) -> CfdRun:
     """Runs on several grids, the options the same for all of them, as one study."""
-    parts: list[Dataset] = []
+    parts: list[CfdRun] = []
     faults: list[Fault] = []
     for grid in run.grids:
         at = [folder / f for f in grid.files]
@@ -167,13 +167,12 @@ def _grids(run: RunToml, folder: Path, name: str) -> Dataset:
             faults += error.faults
             continue
         if grid.cells is not None:
-            conditions = {**part.provenance["conditions"], "cells": grid.cells}
-            part = replace(part, provenance={**part.provenance, "conditions": conditions})
+            part = replace(part, conditions={**part.conditions, "cells": grid.cells})
         parts.append(part)
     if faults:
         raise InputError(list(dict.fromkeys(faults)))
     found = together(parts, name=name)
-    return replace(found, provenance={**found.provenance, "files": run.files})
+    return replace(found, files=run.files)
 
 
 def _nothing(work: OpenRun) -> None:
@@ -227,7 +226,7 @@ def _operating(work: OpenRun, rpm: Array) -> dict[str, Array]:
         if given is not None:
             values[name] = np.array([given])
         elif own and (v := work.si(quantity, own[0])) is not None:
-            values[name] = v[-1:] if own[0].record.provenance.get("clock") in ("time", "iteration") else v
+            values[name] = v[-1:] if own[0].record.clock in ("time", "iteration") else v
     return values
 
 
@@ -268,7 +267,7 @@ def _applied(work: OpenRun, rpm: Array, loads: Mapping[str, Settled]) -> _Points
 
 def _table(record: Dataset) -> bool:
     """Whether the rows of an export are runs, and no history."""
-    return record.provenance.get("clock") not in ("time", "iteration") and len(record) > 1
+    return record.clock not in ("time", "iteration") and len(record) > 1
 
 
 def _unused(work: OpenRun, values: Mapping[str, Array]) -> None:
@@ -302,11 +301,11 @@ def _conditions(
     work: OpenRun, read: Sequence[tuple[str, Dataset]], each: Array | None, drift: float | None
 ) -> dict[str, Any]:
     """What is known of how a run was made; `each` the cells of its rows, `drift` that of its thrust."""
-    clocks = {str(r.provenance.get("clock")) for _, r in read}
+    clocks = {r.clock for _, r in read}
     digits = (str(r.provenance.get("cells", "")) for _, r in read)
     cells = next((float(text) for text in digits if text.isdigit()), None)
     found = {
-        "program": " + ".join(dict.fromkeys(PROGRAMS[str(r.provenance["format"])] for _, r in read)),
+        "program": " + ".join(dict.fromkeys(PROGRAMS[r.format] for _, r in read)),
         "cells": float(each[0]) if each is not None and np.unique(each).size == 1 else cells,
         "steady": False if "time" in clocks else True if "iteration" in clocks else None, "thrust_from": "forces",
     }  # fmt: skip
@@ -315,7 +314,7 @@ def _conditions(
     return {k: v for part in (found, work.run.setup.given(), more) for k, v in part.items() if v is not None}
 
 
-def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> Dataset:
+def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]) -> CfdRun:
     name, values, averaged, drift = work.name, points.values, points.averaged, points.drift
     sizes = {k: v.size for k, v in values.items()}
     rows = max(sizes.values())
@@ -326,16 +325,15 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     each = values.get("cells", values.get("cell_size"))  # h^-3
     conditions = _conditions(work, read, values.get("cells"), drift.get("thrust_N"))
     labels = next((tuple(r.texts["name"]) for _, r in read if len(r.texts.get("name", ())) == rows), ())
-    provenance = {
-        "file": name, "format": "cfd_run", "files": tuple(work.run.run.files), "conditions": conditions,
-        "averaged": averaged, "drift": drift, "sha256": "+".join(str(r.provenance.get("sha256", "")) for _, r in read),
-        # A unit is asked for where the files state none
-        "units_given": tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit),
-    }  # fmt: skip
+    sha256 = "+".join(str(r.provenance.get("sha256", "")) for _, r in read)
+    about: dict[str, Any] = {"file": name, "format": "cfd_run", "sha256": sha256}
     if rows == 1:
-        provenance["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
-    made = Dataset("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
-                   provenance, labels, notes=tuple(dict.fromkeys(work.notes)))  # fmt: skip
+        about["means"] = {k: Mean(float(full[k][0]), over, drift.get(k)) for k, over in averaged.items()}
+    # A unit is asked for where the files state none
+    given = tuple(q for q in ("thrust", "torque") if (fact := getattr(work.run.columns, q)) and fact.unit)
+    made = CfdRun("cfd", Path(name).name, full, {k: np.broadcast_to(v, (rows,)) for k, v in points.u.items()}, (),
+                  about, labels, notes=tuple(dict.fromkeys(work.notes)), files=tuple(work.run.run.files),
+                  conditions=conditions, averaged=averaged, drift=drift, units_given=given)  # fmt: skip
     keep = np.any([np.isfinite(v) for k, v in full.items() if k not in _POINT], axis=0)
     if not keep.all():
         note = f"{number_of((~keep).sum(), 'point')} without a load left out"
@@ -348,17 +346,6 @@ def _dataset(work: OpenRun, points: _Points, read: Sequence[tuple[str, Dataset]]
     return with_grid_floor(made, conditions.get("u_grid", math.nan))
 
 
-def document(d: Dataset) -> dict[str, Any]:
-    """A run as plain values."""
-    points = [
-        {k: float(d[k][i]) for k in d.values} | {f"u_{k}": float(d.u[k][i]) for k in d.values if np.isfinite(d.u[k][i])}
-        for i in range(len(d))
-    ]  # fmt: skip
-    told = {k: d.provenance[k] for k in ("averaged", "drift", "conditions")}
-    head = {"name": str(d.provenance["file"]), "files": list(d.provenance["files"]), "points": points}
-    return head | told | {"studies": [s.document() for s in d.provenance.get("studies", ())], "notes": list(d.notes)}
-
-
 _SHOWN = {"rpm": "rev/min", "airspeed_m_s": "V [m/s]", "thrust_N": "thrust [N]", "duct_thrust_N": "of it duct [N]",
           "torque_Nm": "torque [N m]", "power_W": "power [W]", "CT": "CT", "CQ": "CQ", "CP": "CP"}  # fmt: skip
 
@@ -367,12 +354,12 @@ def _with_u(x: float, u: float) -> str:
     return number_text(x, 5) + (f" ± {number_text(u, 2)}" if math.isfinite(u) else "")
 
 
-def run_text(d: Dataset) -> str:
+def run_text(d: CfdRun) -> str:
     """A run for a terminal: points with u, what was averaged, what was decided."""
-    averaged, drifts, set_up = (d.provenance[k] for k in ("averaged", "drift", "conditions"))
+    averaged, drifts, set_up = d.averaged, d.drift, d.conditions
     names = [k for k in _SHOWN if k in d]
     rows = [[_with_u(d[k][i], d.u[k][i]) for k in names] for i in range(len(d))]
-    lines = [f"one run: {', '.join(Path(f).name for f in d.provenance['files'])}"]
+    lines = [f"one run: {', '.join(Path(f).name for f in d.files)}"]
     lines.append(text_table([_SHOWN[k] for k in names], rows, (), "  "))
     for over in dict.fromkeys(averaged.values()):
         own = [k.rsplit("_", 1)[0] for k, v in averaged.items() if v == over]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from bemt.physics.dataset import Dataset
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from bemt.data.recordings.grid_study import LoadStudy
 
 CONDITIONS = (
     "grid_level", "cells", "program", "solver", "gas", "turbulence", "domain", "domain_over_D", "sector", "steady",
@@ -62,8 +64,8 @@ def _flies(d: Dataset) -> NDArray[np.bool_]:
 
 
 def with_grid_floor(
-    d: Dataset, u_grid: float | Mapping[str, NDArray[np.float64]] = math.nan, notes: tuple[str, ...] = ()
-) -> Dataset:
+    d: CfdRun, u_grid: float | Mapping[str, NDArray[np.float64]] = math.nan, notes: tuple[str, ...] = ()
+) -> CfdRun:
     """Loads of CFD with what their grid is worth [1]: as stated or studied, (N,) a load, else the floor; notes say."""
     random = {k: v.copy() for k, v in d.u.items() if np.isfinite(v).any()}
     numerics: dict[str, NDArray[np.float64]] = {}
@@ -82,8 +84,7 @@ def with_grid_floor(
     elif not notes:
         notes = (f"u of the grid {u_grid:.2%}, as stated",)
     kept = {k: v for k, v in random.items() if k not in numerics}
-    return Dataset(d.kind, d.name, d.values, kept, d.flags, d.provenance, d.labels, parts, (*notes, *d.notes), d.units,
-                   d.lines, d.texts)  # fmt: skip
+    return replace(d, u=kept, u_by=parts, notes=(*notes, *d.notes))
 
 
 def one_grid(run: Dataset) -> tuple[Dataset, dict[str, dict[str, float]]]:
@@ -104,11 +105,38 @@ def floor_note(some_fly: bool, all_fly: bool) -> str:
     return f"no grid study: at least {sizes} ({GRID_FLOOR_SOURCE})"
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CfdRun(Dataset):
+    """Points of one CFD run, or of one condition on several grids: its files, how it was made, averaged and studied."""
+
+    files: tuple[str, ...] = ()
+    conditions: Mapping[str, Any] = field(default_factory=dict)  # As stated or read: cells, turbulence, domain, ...
+    averaged: Mapping[str, str] = field(default_factory=dict)  # What each channel is the mean of
+    drift: Mapping[str, float] = field(default_factory=dict)  # Over the averaged part, share of the mean [1]
+    units_given: tuple[str, ...] = ()  # Loads whose unit the user stated
+    studies: tuple[LoadStudy, ...] = ()
+
+    def document(self) -> dict[str, Any]:
+        """Plain values."""
+        points = [
+            {k: float(self[k][i]) for k in self.values}
+            | {f"u_{k}": float(self.u[k][i]) for k in self.values if np.isfinite(self.u[k][i])}
+            for i in range(len(self))
+        ]
+        return {"name": self.file, "files": list(self.files), "points": points, "averaged": self.averaged,
+                "drift": self.drift, "conditions": self.conditions, "studies": [s.document() for s in self.studies],
+                "notes": list(self.notes)}  # fmt: skip
+
+
+def stated_of(d: Dataset) -> Mapping[str, Any]:
+    """Conditions of a run as stated; {} for any other recording."""
+    return d.conditions if isinstance(d, CfdRun) else {}
+
+
 def conditions_of(d: Dataset) -> dict[str, tuple[str, ...]]:
     """Conditions of a CFD recording as texts, each with all values that its rows have; {} where none is stated."""
     out: dict[str, tuple[str, ...]] = {}
-    stated: Mapping[str, Any] = d.provenance.get("conditions", {})
-    for name, value in stated.items():
+    for name, value in stated_of(d).items():
         if name in CONDITIONS and value not in (None, "") and value == value:
             out[name] = (_text(value),)
     for name, cells in d.texts.items():
@@ -134,8 +162,8 @@ def _text(value: Any) -> str:
 def conditions_that_differ(a: Dataset, b: Dataset) -> dict[str, tuple[str, str]]:
     """Conditions that both recordings state and that are not the same: name to the two, in the order of importance.
 
-    >>> one = Dataset("cfd", "a", {"thrust_N": [1.0]}, provenance={"conditions": {"cells": 1e6, "solver": "SST"}})
-    >>> two = Dataset("cfd", "b", {"thrust_N": [1.1]}, provenance={"conditions": {"cells": 2e6, "solver": "SST"}})
+    >>> one = CfdRun("cfd", "a", {"thrust_N": [1.0]}, conditions={"cells": 1e6, "solver": "SST"})
+    >>> two = CfdRun("cfd", "b", {"thrust_N": [1.1]}, conditions={"cells": 2e6, "solver": "SST"})
     >>> conditions_that_differ(one, two)
     {'cells': ('1,000,000', '2,000,000')}
     """
@@ -184,7 +212,7 @@ def _one(d: Dataset, name: str, row: int) -> Any:
             return d.texts[key][row].strip()
         if key in d and math.isfinite(d[key][row]):
             return float(d[key][row])
-    return d.provenance.get("conditions", {}).get(name)
+    return stated_of(d).get(name)
 
 
 def audit_of(
@@ -195,7 +223,7 @@ def audit_of(
     def get(name: str) -> Any:
         return _one(d, name, row)
 
-    rpm = float(d["rpm"][row]) if "rpm" in d else math.nan
+    rpm = float(d.rpm[row]) if "rpm" in d else math.nan
     n, V = rpm / 60.0, _number(get("airspeed_m_s"), 0.0)
     thrust, rho = _number(get("thrust_N")), _number(get("density_kg_m3"), 1.225)
     solver, own = get("solver"), "balance_mass" in d
@@ -219,37 +247,33 @@ def audit_of(
     return audit(facts)
 
 
+_REMARK: Mapping[str, Callable[[Any], str | None]] = {
+    "program": str, "steady": {True: "MRF", False: "sliding mesh"}.get, "turbulence": str,
+    "wall": {"function": "wall functions", "scalable": "scalable wall functions",
+             "automatic": "automatic wall functions"}.get,
+    "compressible": {True: "compressible", False: "incompressible"}.get, "domain_over_D": "domain {:g} D".format,
+    "y_plus": "y+ {:g}".format, "cells": "{:.0f} cells".format,
+    "grids": lambda number: "no grid study" if number < 2 else None,
+    "u_grid": lambda u: f"u_grid {100.0 * u:.3g} %", "drift_thrust": lambda drift: f"drift {100.0 * abs(drift):.3g} %",
+    "thrust_from": lambda word: "forces integrated" if word == "forces" else None,
+}  # fmt: skip
+
+
 def remark_of(conditions: Mapping[str, Any]) -> str:
     """Set-up of a run in the set phrases that the audit of references reads.
 
     >>> remark_of({"steady": True, "turbulence": "k-omega SST", "cells": 2e6, "drift_thrust": 0.004})
     'MRF; k-omega SST; 2000000 cells; drift 0.4 %; forces integrated'
     """
-    walls = {
-        "function": "wall functions",
-        "scalable": "scalable wall functions",
-        "automatic": "automatic wall functions",
-    }
-    steady, compressible = conditions.get("steady"), conditions.get("compressible")
-    known: list[tuple[Any, str]] = [
-        (conditions.get("program"), "{}"),
-        ({True: "MRF", False: "sliding mesh"}.get(steady) if steady is not None else None, "{}"),
-        (conditions.get("turbulence"), "{}"), (walls.get(str(conditions.get("wall"))), "{}"),
-        ({True: "compressible", False: "incompressible"}.get(compressible) if compressible is not None else None, "{}"),
-        (conditions.get("domain_over_D"), "domain {:g} D"), (conditions.get("y_plus"), "y+ {:g}"),
-        (conditions.get("cells"), "{:.0f} cells"),
-        ("no grid study" if conditions.get("grids", 2) < 2 and "u_grid" not in conditions else None, "{}"),
-        (100.0 * conditions["u_grid"] if "u_grid" in conditions else None, "u_grid {:.3g} %"),
-        (100.0 * abs(conditions["drift_thrust"]) if "drift_thrust" in conditions else None, "drift {:.3g} %"),
-        ("forces integrated" if conditions.get("thrust_from", "forces") == "forces" else None, "{}"),
-    ]  # fmt: skip
-    return "; ".join(form.format(value) for value, form in known if value is not None)
+    stated = {"thrust_from": "forces", **conditions}
+    names = (name for name in _REMARK if stated.get(name) is not None and not (name == "grids" and "u_grid" in stated))
+    return "; ".join(words for name in names if (words := _REMARK[name](stated[name])))
 
 
 def references_of(run: Dataset, where: str) -> list[Reference]:
     """Points of a run as recorded values of a case: thrust, torque, the duct's part."""
     out = []
-    remark = remark_of(run.provenance.get("conditions", {}))
+    remark = remark_of(stated_of(run))
     loads = (("thrust", "thrust_N", "N"), ("torque", "torque_Nm", "N m"), ("duct_thrust", "duct_thrust_N", "N"))
     sha256 = str(run.provenance.get("sha256", ""))
     for quantity, channel, unit in (*loads, ("CT", "CT", "-"), ("CQ", "CQ", "-")):

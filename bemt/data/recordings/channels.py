@@ -151,7 +151,7 @@ def named(d: Dataset) -> Dataset:
     _speed(d, values, names, notes)
     _command(values, names, notes)
     _power(values, names, notes, d.values.get("P_W"))
-    bare = d.provenance.get("headings", {}).get("power_W", "")
+    bare = d.headings.get("power_W", "")
     if names.get("power_W") == "power_W" and _BARE_POWER.fullmatch(bare):
         notes.append("power_W: taken as shaft power; if a wattmeter read it, name the column electrical_power_W")
     none = int(np.sum(~np.isfinite(values["run"]))) if "run" in values else 0
@@ -219,16 +219,21 @@ def moves(v: Array) -> bool:
 
 def shaft_power(values: Mapping[str, Array]) -> Array | None:
     """Shaft power, torque times speed, (N,) [W]."""
-    if "torque_Nm" not in values or "rpm" not in values:
-        return None
-    return values["torque_Nm"] * values["rpm"] * units.RPM
+    torque, rpm = values.get("torque_Nm"), values.get("rpm")
+    return None if torque is None or rpm is None else torque * rpm * units.RPM
+
+
+def electrical_power(values: Mapping[str, Array]) -> Array | None:
+    """Electrical power, voltage times current, (N,) [W]."""
+    volts, amps = values.get("voltage_V"), values.get("current_A")
+    return None if volts is None or amps is None else volts * amps
 
 
 def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], bare: Array | None) -> None:
     """Electrical power from its factors, and what a bare P stands for."""
     if bare is not None and "power_W" not in values:
         shaft = shaft_power(values)
-        electric = values["voltage_V"] * values["current_A"] if {"voltage_V", "current_A"} <= values.keys() else None
+        electric = electrical_power(values)
         for name, product in (("power_W", shaft), ("electrical_power_W", electric)):
             if product is None or name in values:
                 continue
@@ -243,6 +248,6 @@ def _power(values: dict[str, Array], names: dict[str, str], notes: list[str], ba
                 break
         else:
             notes.append("P_W: shaft or electrical power? Ignored; name it power_W or electrical_power_W")
-    if {"voltage_V", "current_A"} <= values.keys() and "electrical_power_W" not in values:
-        values["electrical_power_W"] = values["voltage_V"] * values["current_A"]
+    if "electrical_power_W" not in values and (electric := electrical_power(values)) is not None:
+        values["electrical_power_W"] = electric
         names["electrical_power_W"] = "voltage_V x current_A"

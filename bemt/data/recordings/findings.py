@@ -164,7 +164,7 @@ def facts_of(
     """Gather the facts of a recording or a series."""
     rec = _without_spikes(named(source))
     raw = {k: np.where(far, np.nan, v) if (far := np.abs(v) > 1e12).any() else v for k, v in source.values.items()}
-    said, about = source.provenance.get("constants", {}), source.provenance
+    said, about = source.constants, source.provenance
     own = int(said["blades"]) if "blades" in said else None
     return Facts(
         rec.values, raw, {k: source.unit(k) for k in raw}, rec.provenance["names"], rec.lines,

@@ -34,7 +34,7 @@ from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, refuse
 from bemt.base.tables import number_text
 from bemt.data.readers.headings import CELLS
-from bemt.data.recordings.cfd_setup import CONDITIONS, conditions_of, with_grid_floor
+from bemt.data.recordings.cfd_setup import CONDITIONS, CfdRun, conditions_of, stated_of, with_grid_floor
 from bemt.data.recordings.channels import named
 from bemt.physics.dataset import Dataset, concat
 
@@ -261,12 +261,12 @@ def _alike(d: Dataset, i: int, k: int) -> bool:
     return True
 
 
-def by_grid(d: Dataset, cells: Array, size_unit: str | None = None) -> Dataset:
+def by_grid(d: CfdRun, cells: Array, size_unit: str | None = None) -> CfdRun:
     """Points of a run of which some rows are one condition on several grids, as points with u of the grid.
 
     `cells` (N,) are those of each row's grid [1], NaN where not stated; h^-3 where their size h is, whose `size_unit`
     is "m", or "" if not known (Celik 2008: only ratios of h count). One point for each condition, that of its finest
-    grid; ``provenance["studies"]`` has a `LoadStudy` for each load that was extrapolated.
+    grid; `studies` has a `LoadStudy` for each load that was extrapolated.
     """
     keep: list[int] = []
     studies: list[LoadStudy] = []
@@ -280,23 +280,22 @@ def by_grid(d: Dataset, cells: Array, size_unit: str | None = None) -> Dataset:
             shown = [f"{cells[i]:,.0f}" if size_unit is None else f"h {_size(cells[i]):.4g}" for i in group]
             got = f"{len(group)} runs at {_state(d, group[0])} on {', '.join(shown)}"
             hint = "State the cells of each grid: --setup cells=N; runs on one grid are no study"
-            raise InputError(Fault(str(d.provenance.get("file", d.name)), "cells", got, "grids of unlike size", hint))
+            raise InputError(Fault(d.file or d.name, "cells", got, "grids of unlike size", hint))
         for s in filter(None, (_study(d, k, order, cells, size_unit) for k in sizes)):
             studies.append(s)
             sizes[s.channel][order[0]] = s.u_relative
     # a condition on one grid owes what the grid costs elsewhere
     sizes = {k: np.where(np.isfinite(u), u, np.fmax.reduce(u)) for k, u in sizes.items()}
     rows = np.array(sorted(keep), dtype=np.intp)
-    told = dict(d.provenance.get("conditions", {}))
-    told |= {"grids": max((len(s.values) for s in studies), default=1)}
+    told = {**d.conditions, "grids": max((len(s.values) for s in studies), default=1)}
     told |= {"cells": float(np.nanmax(cells[rows]))} if size_unit is None else {}
     if u_thrust := [s.u_relative for s in studies if s.channel in ("thrust_N", "CT")]:
         told["u_grid"] = max(u_thrust)
     random = d.u_by.get("random", d.u)
-    about = {**d.provenance, "conditions": told, "studies": tuple(studies)}
     values, u, grid = ({k: v[rows] for k, v in table.items()} for table in (d.values, random, sizes))
     labels = tuple(d.labels[i] for i in rows if d.labels)
-    made = Dataset("cfd", d.name, values, u, (), about, labels, notes=d.notes)
+    made = CfdRun("cfd", d.name, values, u, (), d.provenance, labels, notes=d.notes, files=d.files, conditions=told,
+                  averaged=d.averaged, drift=d.drift, units_given=d.units_given, studies=tuple(studies))  # fmt: skip
     return with_grid_floor(made, grid, tuple(s.sentence() for s in studies))
 
 
@@ -328,23 +327,26 @@ def _study(d: Dataset, channel: str, order: Sequence[int], cells: Array, unit: s
     )  # fmt: skip
 
 
-def together(parts: Sequence[Dataset], name: str = "") -> Dataset:
+def together(parts: Sequence[Dataset], name: str = "") -> CfdRun:
     """Runs on several grids as one run with the uncertainty of its grids; the cells [1] as their set-ups state."""
-    cells = [float(d.provenance.get("conditions", {}).get("cells") or math.nan) for d in parts]
-    if bare := [str(d.provenance.get("file", d.name)) for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
+    cells = [float(stated_of(d).get("cells") or math.nan) for d in parts]
+    if bare := [d.file or d.name for d, n in zip(parts, cells, strict=True) if math.isnan(n)]:
         hint = "`bemt import FILES --setup cells=N` writes them into its run.toml"
         raise InputError([Fault(f, "cells", "not stated", "the cells of the grid", hint) for f in bare])
-    finest = parts[int(np.argmax(cells))]
+    runs = [d for d in parts if isinstance(d, CfdRun)]  # all: they state their cells
+    finest = runs[int(np.argmax(cells))]
     about = {
         **{k: v for k, v in finest.provenance.items() if k != "means"},
         "file": name or " + ".join(d.name for d in parts),
-        "files": tuple(f for d in parts for f in d.provenance.get("files", (d.provenance.get("file", d.name),))),
         "sha256": "+".join(str(d.provenance.get("sha256", "")) for d in parts),
     }  # fmt: skip
     notes = tuple(dict.fromkeys(t for d in parts for t in d.notes if "no grid study" not in t))
     joined = concat([replace(d, kind="cfd", u=d.u_by.get("random", d.u), u_by={}) for d in parts])
     name = name or f"{finest.name} and {len(parts) - 1} coarser"
-    whole = Dataset("cfd", name, joined.values, joined.u, (), about, notes=notes)
+    files = tuple(f for d in runs for f in d.files)
+    whole = CfdRun("cfd", name, joined.values, joined.u, (), about, notes=notes, files=files,
+                   conditions=finest.conditions, averaged=finest.averaged, drift=finest.drift,
+                   units_given=finest.units_given)  # fmt: skip
     return by_grid(whole, np.repeat(cells, [len(d) for d in parts]))
 
 
@@ -407,8 +409,7 @@ def of_table(record: Dataset) -> Dataset:
         note = f"{column}: a height, or the size of cells? A grid study takes it from a column headed cell_size, or "
         return replace(record, notes=(*record.notes, f"{note}beside one that names the grid"))
     told = {k.lower(): v[0] for k, v in record.texts.items() if k.lower() in CONDITIONS and len({*v}) == 1}
-    about = {"format": "cfd_run", "files": (record.provenance["file"],), "averaged": {}, "drift": {}}
-    about["conditions"] = told
     values = {k: v for k, v in d.values.items() if k in (*LOADS, *_SAME)}
-    made = Dataset("cfd", record.name, values, provenance={**record.provenance, **about}, notes=record.notes)
+    made = CfdRun("cfd", record.name, values, provenance={**record.provenance, "format": "cfd_run"},
+                  notes=record.notes, files=(record.file,), conditions=told)  # fmt: skip
     return by_grid(made, cells) if counts else by_grid(made, cells**-3.0, unit)

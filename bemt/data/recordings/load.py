@@ -73,9 +73,9 @@ def import_file(path: str | os.PathLike[str], format: str | None = None, choice:
         record = replace(record, provenance={**record.provenance, "adapted": type(found).__name__})
     if choice.period is not None:
         record = averaged(record, choice.period, choice.revolutions)
-    elif record.provenance["format"] in ("table", "recording"):
+    elif record.format in ("table", "recording"):
         record = of_table(record)
-    elif record.provenance.get("clock") == "time":
+    elif record.clock == "time":
         note = "mean over all rows, including start-up; give --rpm or --period-s for whole revolutions"
         record = replace(record, notes=(*record.notes, note))
     return replace(record, notes=(*record.notes, *_unsettled(record)))
@@ -109,9 +109,9 @@ def _run_in(folder: Path) -> Dataset | RunToml | None:
 
 def _unsettled(record: Dataset) -> list[str]:
     """One line for the loads whose mean still moves; small ones beside large ones of the same unit do not count."""
-    if record.provenance.get("clock") not in ("time", "iteration"):
+    if record.clock not in ("time", "iteration"):
         return []
-    means: Mapping[str, Mean] = record.provenance.get("means", {})
+    means: Mapping[str, Mean] = record.means
     top: dict[str, float] = {}
     for name, mean in means.items():
         unit = record.unit(name)
@@ -134,7 +134,7 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
     notes: dict[str, list[str]] = {}
     for path in paths:
         record = records.get(path)
-        if record is None or record.provenance.get("clock") not in ("time", "iteration"):
+        if record is None or record.clock not in ("time", "iteration"):
             continue
         for other in _earlier(Path(path), paths, records):
             text = f"next to {other}: not joined"
@@ -149,11 +149,11 @@ def _restart_notes(paths: Sequence[str], records: Mapping[str, Dataset]) -> dict
 
 def _earlier(path: Path, paths: Sequence[str], records: Mapping[str, Dataset]) -> list[str]:
     match = _RESTART.fullmatch(path.name)
-    if match and records[str(path)].provenance["format"] == "fluent_report":
+    if match and records[str(path)].format == "fluent_report":
         base = path.with_name(match[1] + (match[3] or ""))
         known = [p for p in paths if Path(p) == base]
         return known or ([str(base)] if base.is_file() else [])
-    if records[str(path)].provenance["format"] == "openfoam_forces":
+    if records[str(path)].format == "openfoam_forces":
         try:
             start = float(path.parent.name)
         except ValueError:
@@ -191,11 +191,11 @@ def import_files(
         for name, what in exports.items():
             errors[name] = str(Fault(name, "", f"{what}: {some(records.pop(name).values, 8)}", cfd_run.NO_LOAD, EXPORT))
         to_do = None
-    told = {d.provenance["file"] for d in runs}
-    runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.provenance["file"] not in told)]
+    told = {d.file for d in runs}
+    runs = [*runs, *(d for d in records.values() if cfd_run.is_run(d) and d.file not in told)]
     notes = _restart_notes(names, records)
     files = [_file(name, format, records.get(name), notes.get(name, []), errors.get(name)) for name in names]
-    return Imported(tuple(files), tuple(runs), to_do)
+    return Imported(tuple(files), tuple(d for d in runs if cfd_run.is_run(d)), to_do)
 
 
 def as_stated(files: Sequence[Any], run: Mapping[str, Any]) -> list[Any]:
@@ -212,7 +212,7 @@ def _study(run: RunToml, insist: bool) -> list[Dataset]:
     if not insist and all(g.cells is None for g in run.grids):
         return merged([import_file(f) for f in run.files])
     found = cfd_run.assemble(run, Path(), f"{len(run.grids)} grids")
-    if not found.provenance["studies"]:
+    if not found.studies:
         got = "runs of unlike conditions: no two of them are one speed and airspeed on two grids"
         raise InputError(Fault("--out", "", got, "one condition on several grids", "Import each run by itself"))
     return [found]
@@ -284,7 +284,7 @@ def _file(
         return ImportedFile(name, format, warnings=tuple(notes), error=error)
     try:
         reduced = _reduced(record)
-        found = ImportedFile(name, record.provenance["format"], record, reduced, _means(record, reduced),
+        found = ImportedFile(name, record.format, record, reduced, _means(record, reduced),
                              findings(record), (*record.notes, *notes), error)  # fmt: skip
         found.document()  # what cannot be shown is refused with its file
     except Exception as failed:
@@ -301,7 +301,7 @@ def _reduced(record: Dataset | None) -> Dataset | str | None:
 
 def _means(record: Dataset, reduced: Dataset | str | None) -> Mapping[str, Mean]:
     """Means of the file, and of the channels where the whole recording is one steady point."""
-    means: dict[str, Mean] = dict(record.provenance.get("means", {}))
+    means: dict[str, Mean] = dict(record.means)
     if isinstance(reduced, Dataset) and len(reduced) == 1:
         over = f"the steady rows ({len(reduction(reduced).rows[0])} of {len(record)})"
         means = {name: Mean(float(reduced[name][0]), over) for name in record.values if name in reduced} | means
@@ -324,10 +324,10 @@ def as_dataset(record: Dataset) -> Dataset:
         return replace(reduced, notes=(*reduced.notes, *notes))
     if isinstance(reduced, str):
         notes.append(reduced)
-    file, form = str(record.provenance.get("file", "")), str(record.provenance["format"])
+    file, form = record.file, record.format
     fit = [name for name in record.values if not channel_fault(name)]
-    means: Mapping[str, Mean] = record.provenance.get("means", {})
-    whole = [k for k in fit if k in means] if record.provenance.get("clock") in ("time", "iteration") else []
+    means: Mapping[str, Mean] = record.means
+    whole = [k for k in fit if k in means] if record.clock in ("time", "iteration") else []
     left = [name for name in record.values if name not in (whole or fit)]
     notes += [f"ignored, no known unit: {', '.join(left)}"] if left else []
     if not fit:

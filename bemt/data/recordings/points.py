@@ -216,13 +216,13 @@ class Found:
 def _clean(rec: Dataset, rest: NDArray[np.bool_], found: Found) -> dict[str, Array]:
     """Copies of the channels without readings of a speed sensor that failed."""
     data = {name: v for name, v in rec.values.items() if name not in _SKIP}
-    if "rpm" in data:
-        failed = np.flatnonzero((data["rpm"] == 0.0) & ~rest)
+    if (rpm := data.get("rpm")) is not None:
+        failed = np.flatnonzero((rpm == 0.0) & ~rest)
         found.lost += lost(rec, failed, "rpm", "reads 0 while the rotor turns: not a reading")
-        slow = np.flatnonzero((np.abs(data["rpm"]) < SLOWEST) & (data["rpm"] != 0.0))
+        slow = np.flatnonzero((np.abs(rpm) < SLOWEST) & (rpm != 0.0))
         for i in slow:
-            found.lost += lost(rec, [i], "rpm", f"{data['rpm'][i]:.3g} rev/min is not a rotor speed")
-        data["rpm"] = _without(data["rpm"], [*failed, *slow])
+            found.lost += lost(rec, [i], "rpm", f"{rpm[i]:.3g} rev/min is not a rotor speed")
+        data["rpm"] = _without(rpm, [*failed, *slow])
     return data
 
 

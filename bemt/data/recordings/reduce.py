@@ -88,9 +88,9 @@ def reduce(
     records = [recording] if isinstance(recording, Dataset) else list(recording)
     if not records:
         raise InputError(Fault("", "recordings", "none", "one or more"))
-    name = str(records[0].provenance.get("file", "") or records[0].name)
+    name = records[0].file or records[0].name
     rec = _trusted(_joined([named(record) for record in records]))
-    constants = {k: v for record in reversed(records) for k, v in record.provenance.get("constants", {}).items()}
+    constants = {k: v for record in reversed(records) for k, v in record.constants.items()}
     if not set(LOADS) & rec.values.keys():
         got = "no thrust, torque, power, current or coefficient with a unit"
         hint = "Name units in the headings or in a recording.toml" + in_one_step(records[0])
@@ -199,13 +199,13 @@ def _flow(values: Mapping[str, Array]) -> Array | None:
 def _outliers(rec: Dataset, found: Found) -> None:
     """Drop points that stand apart from four or more repeats of their own condition."""
     values, _ = _columns(found.points)
-    if "rpm" not in values:
+    if (rpm := values.get("rpm")) is None:
         return
     group = np.array([p.run for p in found.points])
     out: dict[int, str] = {}
     for name in TARED:
         if name in values:
-            for i, far, n in repeats(values[name], values["rpm"], group, _flow(values)).outliers:
+            for i, far, n in repeats(values[name], rpm, group, _flow(values)).outliers:
                 words = f"outlier: {name} is {far:.3g} robust standard deviations from the median of its {n} repeats"
                 out.setdefault(i, words)
     found.lost += [entry for i, reason in out.items() for entry in lost(rec, found.points[i].rows, "", reason)]
@@ -280,13 +280,13 @@ def _fill_scatter(
     notes: list[str],
 ) -> None:  # fmt: skip
     """Uncertainty from repeats where a point has none, and the scatter between runs."""
-    if "rpm" not in values:
+    if (rpm := values.get("rpm")) is None:
         return
     run = np.array([p.run for p in found.points])
     for name in TARED:
         if name not in values:
             continue
-        again = repeats(values[name], values["rpm"], run, _flow(values))
+        again = repeats(values[name], rpm, run, _flow(values))
         if again.dof >= 3 and again.scatter > 0.0:
             missing = ~np.isfinite(u[name])
             u[name] = np.where(missing, again.scatter * np.abs(values[name]), u[name])
@@ -296,7 +296,7 @@ def _fill_scatter(
                 else ""
             )
             notes.append(f"{name}: repeats scatter by {again.scatter:.2%} ({again.dof} degrees of freedom){use}")
-        between = session(values[name], values["rpm"], run, _flow(values))
+        between = session(values[name], rpm, run, _flow(values))
         if math.isfinite(between.scatter):
             correlated[name]["session"] = between.scatter
             words = f"{name}: runs differ by {between.scatter:.2%} at equal speed"
@@ -345,13 +345,13 @@ def _numbers(series: Dataset, air: AirOfPoints, D: float) -> Dataset:
     if {"CT", "CP"} <= series.values.keys():
         still = np.abs(np.nan_to_num(V)) <= 0.0
         with np.errstate(all="ignore"):
-            fm = np.where(still & (series["CT"] > 0) & (series["CP"] > 0), co.FM(series["CT"], series["CP"]), np.nan)
-            share = np.hypot(1.5 * series.u["CT"] / series["CT"], series.u["CP"] / series["CP"])
+            fm = np.where(still & (series.CT > 0) & (series.CP > 0), co.FM(series.CT, series.CP), np.nan)
+            share = np.hypot(1.5 * series.u["CT"] / series.CT, series.u["CP"] / series.CP)
         more["FM"], u_more["FM"] = fm, np.abs(fm * share)
     if {"thrust_N", "power_W"} <= series.values.keys():
         with np.errstate(all="ignore"):
-            ratio = np.where(series["power_W"] > 0, series["thrust_N"] / series["power_W"], np.nan)
-            share = np.hypot(series.u["thrust_N"] / series["thrust_N"], series.u["power_W"] / series["power_W"])
+            ratio = np.where(series.power_W > 0, series.thrust_N / series.power_W, np.nan)
+            share = np.hypot(series.u["thrust_N"] / series.thrust_N, series.u["power_W"] / series.power_W)
         more["efficacy_N_W"], u_more["efficacy_N_W"] = ratio, np.abs(ratio * share)
     u_more = {k: np.where(np.isfinite(v), v, np.nan) for k, v in u_more.items()}
     return replace(series, values={**series.values, **more}, u={**series.u, **u_more})

@@ -26,6 +26,7 @@ from bemt.base.averaging import Mean
 from bemt.base.errors import EXIT_INPUT, EXIT_INTERNAL, EXIT_OK
 from bemt.data.readers.cfd_run import KIND as RUN
 from bemt.data.recordings import cfd_run
+from bemt.data.recordings.cfd_setup import CfdRun
 from bemt.data.recordings.channels import named
 from bemt.data.recordings.findings import Finding
 from bemt.data.recordings.reduce import Reduction, reduction
@@ -187,13 +188,13 @@ class Imported:
     """Files as they were read, the CFD runs among them, and what would make the files one run."""
 
     files: tuple[ImportedFile, ...]
-    runs: tuple[Dataset, ...]
+    runs: tuple[CfdRun, ...]
     to_do: str | None
 
     def document(self) -> dict[str, Any]:
         """Plain values, ``bemt.import/1``."""
         return {"schema": SCHEMA, "files": [f.document() for f in self.files],
-                "runs": [cfd_run.document(d) for d in self.runs], "to_do": self.to_do}  # fmt: skip
+                "runs": [d.document() for d in self.runs], "to_do": self.to_do}  # fmt: skip
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -209,7 +210,7 @@ class Imported:
 
     def text(self, wrote: str = "") -> str:
         """For a terminal, with what to do next with recordings of a rotor."""
-        own = {name for run in self.runs for name in run.provenance["files"]}
+        own = {name for run in self.runs for name in run.files}
         shown = [f for f in self.files if f.format != RUN and f.error is None]
         lines = [f.title if f.path in own else f.text + "\n" for f in shown]
         lines += [cfd_run.run_text(run) + "\n" for run in self.runs]
@@ -222,10 +223,10 @@ class Imported:
 
     def _next_with_a_run(self, wrote: str) -> str:
         """What to do with a CFD run: in the file that was written, in one that was given, or in one to be written."""
-        name = "" if wrote else str(self.runs[0].provenance["file"])
+        name = "" if wrote else self.runs[0].file
         usable = Path(name).is_file() and name.endswith(".toml")
         usable = usable or any(f.path == name and f.format == RUN for f in self.files)
-        file = wrote or (name if usable else "study.toml" if self.runs[0].provenance.get("studies") else "run.toml")
+        file = wrote or (name if usable else "study.toml" if self.runs[0].studies else "run.toml")
         lead = f"{wrote} written. " if wrote else "" if file == name else f"With --out {file}: "
         return f"{lead}Next: bemt compare {shlex.quote(file)} --case CASE   (a case: bemt new 10x5)\n"
 

@@ -78,7 +78,7 @@ def stand_run(imported: Dataset, name: str, diameter_m: float | None = None) -> 
     false = _misread(values)
     if false.any():
         values["rpm"] = np.where(false, np.nan, values["rpm"])
-    constants = imported.provenance.get("constants", {})
+    constants = imported.constants
     rho = values.get("density_kg_m3", np.full(1, np.nan))
     density = float(np.nanmean(rho)) if np.isfinite(rho).any() else math.nan
     if not math.isfinite(density):

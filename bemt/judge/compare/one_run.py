@@ -142,7 +142,7 @@ def compare_run(
     A file that is no run, or of another rotor, is refused.
     """
     given = path if isinstance(path, Dataset) else None
-    name = os.fspath(path) if not isinstance(path, Dataset) else str(path.provenance.get("file", path.name))
+    name = os.fspath(path) if not isinstance(path, Dataset) else path.file or path.name
     made = rotor_of(case).case
     points, imported = cfd_points(name, given)
     notes = list(points.notes)
@@ -188,7 +188,7 @@ def compare_run(
     asked = called or (made.path.as_posix() if isinstance(case, Case) else os.fspath(case))
     return RunComparison(
         name, made.name, "cfd" if computed else "bench", {k: ", ".join(v) for k, v in conditions_of(imported).items()},
-        out, tuple(faults_first(lines)), known, dict(imported.provenance.get("averaged", {})),
+        out, tuple(faults_first(lines)), known, dict(imported.averaged) if is_run(imported) else {},
         tuple(dict.fromkeys(notes)), _sentence(out, "CFD" if computed else "Recording", open_units(imported)),
         _next(out, lines, name, asked),
     )  # fmt: skip
@@ -264,10 +264,9 @@ def _slip(name: str, loads: Sequence[BothLoads], unit_open: bool) -> tuple[float
 
 def open_units(imported: Dataset) -> frozenset[str]:
     """Loads whose unit the file did not state; coefficients have none."""
-    about = imported.provenance
     if is_run(imported):
-        return frozenset(k for k in _KIND if k.split("_")[0] in about.get("units_given", ()))
-    told = about.get("headings", {})
+        return frozenset(k for k in _KIND if k.split("_")[0] in imported.units_given)
+    told = imported.headings
     return frozenset(k for k in _KIND if k in imported.values and not re.search(r"[\[(].+[\])]", told.get(k, "")))
 
 

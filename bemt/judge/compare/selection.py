@@ -38,7 +38,7 @@ _ROTOR_WORDS = ("left", "right", "upper", "lower", "front", "rear", "A", "B", "C
 
 def _kept(imported: Dataset, column: str, wanted: str, where: str) -> NDArray[np.bool_]:
     """Rows of one condition: a text, a number, or a range of numbers."""
-    names = {h: k for k, h in imported.provenance.get("headings", {}).items()}
+    names = {h: k for k, h in imported.headings.items()}
     name = column if column in imported or column in imported.texts else names.get(column, column)
     if name in imported.texts:
         found = np.array([cell.strip() == wanted for cell in imported.texts[name]])
@@ -176,7 +176,7 @@ def with_air(imported: Dataset, told: str | None, where: str) -> Dataset:
     if wind is not None:
         left["airspeed_m_s"] = np.full(len(imported), wind)
     u = {k: v for k, v in imported.u.items() if k in left}
-    constants = {k: v for k, v in imported.provenance.get("constants", {}).items() if k not in gone}
+    constants = {k: v for k, v in imported.constants.items() if k not in gone}
     return replace(imported, values=left, u=u, provenance={**imported.provenance, "constants": constants | known})
 
 
@@ -209,7 +209,7 @@ def one_rotor(imported: Dataset, name: str, how: str = "Choose it with --rows-a 
 
 def with_headings(imported: Dataset, name: str) -> None:
     """Refuse a table without headings: which column is which quantity is not known."""
-    headings = imported.provenance.get("headings", {})
+    headings = imported.headings
     if not imported.values or any(headings.get(k) or not NUMBERED.fullmatch(k) for k in imported.values):
         return
     path = Path(name)
@@ -228,7 +228,7 @@ def speed_in_doubt(imported: Dataset, path: str) -> None:
     told = named(imported).values
     if "rpm" in told:
         return
-    headings = imported.provenance.get("headings", {})
+    headings = imported.headings
     heading = {name: headings.get(name) or name for name in (*imported.values, *imported.texts)}
     faults = []
     for name, v in imported.values.items():

@@ -153,8 +153,8 @@ def compare_along(model: Model, loads: BladeLoads, rpm: float, V: float, air: Ai
     def ratio(effects: Sequence[Effect]) -> Array:
         prep = model.prepared([e for e in effects if not acts_on_points(e)])
         s = solver.solve(prep, rpm, V, air, radial=True)
-        found = np.stack([s.radial[k][0] / prep.st[:, 1] for k in ("dT", "dQ")])
-        return _banded(np.broadcast_to(s.radial["r"], (1, prep.st.shape[0]))[0] / model.rotor.R, found) / recorded
+        found = np.stack([getattr(s.radial, k)[0] / prep.st[:, 1] for k in ("dT", "dQ")])
+        return _banded(np.broadcast_to(s.radial.r, (1, prep.st.shape[0]))[0] / model.rotor.R, found) / recorded
 
     base = ratio(model.effects)
     whole = _misfit(base, fine)

@@ -68,8 +68,8 @@ def blade_loads(answer: Diagnosis) -> tuple[int, Array, Array, Array] | None:
         s = solver.solve(prep, met.rpm[point], met.V[point], air, radial=True)
         if not s.converged.all():
             return None
-        curves.append([s.radial[k][0] / prep.stations.dr for k in ("dT", "dQ")])
-    return reading, s.radial["r"][0], prep.stations.dr, np.array(curves)
+        curves.append([getattr(s.radial, k)[0] / prep.stations.dr for k in ("dT", "dQ")])
+    return reading, s.radial.r[0], prep.stations.dr, np.array(curves)
 
 
 def radius(answer: Diagnosis) -> Figure | None:

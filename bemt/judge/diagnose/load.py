@@ -90,14 +90,14 @@ def load(
     imported = _without_misread(imported, findings)
     rows = named(imported)
     # in the log of a stand the sign is the hand of the rotor; in somebody's own table it may be a slip
-    log = imported.provenance["format"] != "table"
+    log = imported.format != "table"
     hand = log and any(f.id == "sign_flipped" and f.severity == "note" for f in findings)
     if {"CT", "CP", "CQ"} & set(imported.values):
         made = records.from_series(_points(imported, rows, path), case)
     else:
         points = reduce(imported, diameter_m=case.diameter_m)
         correlated = reduction(points).correlated
-        if reduction(points).mode == "points" and imported.provenance["format"] == "table":
+        if reduction(points).mode == "points" and imported.format == "table":
             # somebody's own table of points: every row counts, a jump from row to row may be what it shows
             points = _scattered(_points(imported, rows, path), points)
         elif _step_responses(imported, rows, points):
@@ -150,13 +150,11 @@ def _filled(imported: Dataset, rpm: float | None, airspeed_m_s: float | None) ->
     if rpm is not None and "rpm" not in known:
         for name, v in imported.values.items():
             varies = not imported.unit(name) and np.unique(v[np.isfinite(v)]).size > 1
-            heading = imported.provenance.get("headings", {}).get(name) or name
+            heading = imported.headings.get(name) or name
             if varies and surely_shaft_speed(heading):
                 got = f"--rpm {rpm:g}, and a column of {np.unique(v).size} speeds without a unit"
                 hint = f"Head it {heading} (rev/min) or {heading} (rad/s), and leave out --rpm"
-                raise InputError(
-                    Fault(str(imported.provenance.get("file", "")), heading, got, "one source of the speed", hint)
-                )
+                raise InputError(Fault(imported.file, heading, got, "one source of the speed", hint))
     for name, value, same in (("rpm", rpm, ("rpm",)), ("airspeed_m_s", airspeed_m_s, ("airspeed_m_s", "J"))):
         if value is None:
             continue
@@ -174,7 +172,7 @@ def _step_responses(imported: Dataset, rows: Dataset, points: Dataset) -> bool:
     from bemt.data.recordings.reduce import reduction
 
     found, rpm = reduction(points), rows.values.get("rpm", np.zeros(1))
-    log = found.mode == "samples" and imported.provenance["format"] == "table" and len(imported) <= _SHORT
+    log = found.mode == "samples" and imported.format == "table" and len(imported) <= _SHORT
     return log and bool(np.all(rpm > 0.0)) and sum(map(len, found.rows)) < _STEADY * len(imported)
 
 
@@ -195,7 +193,7 @@ def _scattered(series: Dataset, reduced: Dataset) -> Dataset:
 def _same_rotor(imported: Dataset, case: Case, path: str) -> None:
     """Refuse a recording that says itself that it is of another rotor, or contradicts itself."""
     faults = []
-    told = imported.provenance.get("constants", {}).get("diameter_m")
+    told = imported.constants.get("diameter_m")
     if told and abs(told / case.diameter_m - 1.0) > _SAME:
         faults.append(Fault(path, "diameter_m", f"{told:.4g}", f"{case.diameter_m:.4g} as in the case {case.name}",
                             "Case of a different rotor?"))  # fmt: skip
@@ -303,7 +301,7 @@ def _on_grids(files: Sequence[_File]) -> list[tuple[Any, Case, float | None, flo
 def _read(given: Any, case: Case, run: Dataset | None, rpm: float | None, airspeed_m_s: float | None) -> Record:
     if isinstance(given, str):
         return load(given, case, run, rpm, airspeed_m_s)
-    if isinstance(given, Dataset) and given.provenance.get("format") == "cfd_run":
+    if isinstance(given, Dataset) and given.format == "cfd_run":
         return load(given.name, case, given)
     return records.from_series(given if isinstance(given, Dataset) else from_pandas(given), case)
 
@@ -370,5 +368,5 @@ def _one_setup(imported: Dataset, path: str) -> None:
     for name, kinds in setups(imported.texts, imported.values).items():
         got = f"{len(kinds)} set-ups: {', '.join(kinds[:4])}" + (", ..." if len(kinds) > 4 else "")
         hint = "Put the rows of each into a separate file"
-        heading = imported.provenance.get("headings", {}).get(name, name)
+        heading = imported.headings.get(name, name)
         raise InputError(Fault(path, heading, got, "one propeller with one motor", hint))

@@ -141,7 +141,7 @@ def _inside(effects: Sequence[Effect]) -> tuple[Effect, ...]:
 def elements(
     prep: Prepared, rpm: ArrayLike, V: ArrayLike, rho: ArrayLike, air: Air, names: Sequence[str] = ("dT", "dQ")
 ) -> Array:
-    """Columns of :data:`bemt.physics.bem.solver.RADIAL` at points, (K, P, N); thrust and torque are those of all
+    """Columns of :class:`bemt.physics.bem.solver.Radial` at points, (K, P, N); thrust and torque are those of all
     blades.
 
     rpm [rev/min], V [m/s], rho [kg/m3]. InputError where a point does not converge.
@@ -153,7 +153,7 @@ def elements(
     radial = np.empty((points.shape[0], prep.st.shape[0], K.N_RADIAL))
     entry, *constant = prep.kernel
     entry(points, *constant, out, radial)
-    loads = np.stack([radial[:, :, solver.RADIAL.index(name)] for name in names])
+    loads = np.stack([radial[:, :, solver.Radial._fields.index(name)] for name in names])
     if np.any(out[:, K.O_STATUS] != K.OK) or not np.all(np.isfinite(loads)):
         s = solver.solve(prep, np.asarray(rpm), np.asarray(V), air)
         where = f"{np.ravel(rpm)[0]:g} rev/min, {np.ravel(V)[0]:g} m/s"

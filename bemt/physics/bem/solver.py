@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,14 +40,11 @@ REASONS = {
 }
 """Words for the kernel's states of failure."""
 
-RADIAL = ("phi", "alpha", "cl", "cd", "W", "w", "v_t", "F", "dT", "dQ")
-"""First columns of the kernel's radial results."""
-
 THICKNESS = 0.12
 """Thickness over chord of blades whose sections are not known [1]."""
 
 _RAD_PER_RPM = math.pi / 30.0
-_NO_RADIAL = np.empty((1, 0, K.N_RADIAL))
+_NO_COLUMNS = np.empty((1, 0, K.N_RADIAL))
 # Fewer points than this are not worth a thread.
 _THREAD_MIN = 64
 
@@ -107,6 +104,29 @@ class Prepared:
         return entry, st, tab, np.concatenate([self.num, self.grid])
 
 
+class Radial(NamedTuple):
+    """Distributions along the blade, (P, N) each; the first ten are the columns of the kernel."""
+
+    phi: Array  # Inflow angle [rad]
+    alpha: Array  # Angle of attack [rad]
+    cl: Array
+    cd: Array
+    W: Array  # Speed at the section [m/s]
+    w: Array  # Axial and tangential speed through the disk [m/s]
+    v_t: Array
+    F: Array  # Loss factor [1]
+    dT: Array  # Thrust [N] and torque [N m] of an element of all blades
+    dQ: Array
+    r: Array  # [m]
+    a: Array  # Induction factors [1]
+    ap: Array
+    Re: Array
+    M: Array
+
+
+_NO_RADIAL = Radial(*np.empty((len(Radial._fields), 1, 0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Results over P operating points, NaN where not converged."""
@@ -133,8 +153,7 @@ class Solution:
     converged: NDArray[np.bool_]  # (P,) False where any blade element failed
     # Words per point: reasons of failure, turbulent states, Mach number above the tables
     flags: tuple[tuple[str, ...], ...]
-    # (P, N) r, phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, a, ap, Re, M
-    radial: dict[str, Array] = field(default_factory=dict)
+    radial: Radial = _NO_RADIAL  # Distributions along the blade, if asked for
     side: Array | None = None  # (P,) In-plane onset speed [m/s], if any was given
     # (P, 4) In-plane forces H (downstream), Y (to the advancing side) [N], roll moment (lifts the advancing side) and
     # pitch moment (lifts the upstream side) [N m]; given with `side`
@@ -264,7 +283,7 @@ def solve_point(prep: Prepared, rpm: float, V: float, air: Air) -> tuple[float, 
     entry, *constant = prep.kernel
     point = np.array([[rpm * _RAD_PER_RPM, V, air.rho, air.mu, air.a_sound]])
     out = np.empty((1, K.N_OUT))
-    entry(point, *constant, out, _NO_RADIAL)
+    entry(point, *constant, out, _NO_COLUMNS)
     T, Q = float(out[0, K.O_T]), float(out[0, K.O_Q])
     if out[0, K.O_STATUS] != K.OK or not math.isfinite(T + Q):
         return math.nan, math.nan, False
@@ -400,7 +419,7 @@ def _collect(prep: Prepared, rpm: Array, points: Array, out: Array, rad: Array) 
             V_exit = np.where(mass > 0.0, V + T / mass, V * nan)
     CT = T / (rho * n**2 * D**4)
     CQ = Q / (rho * n**2 * D**5)
-    radial = _radial(prep, points, rad) if rad.shape[1] else {}
+    radial = _radial(prep, points, rad) if rad.shape[1] else _NO_RADIAL
     return Solution(
         rpm, V, T, Q, Q * points[:, K.P_OMEGA], CT, CQ, 2.0 * np.pi * CQ, V / (n * D), T_rotor, T_duct, T_stator,
         V_exit, mass, ok, _flags(prep, points, out, ok), radial,
@@ -457,18 +476,16 @@ def _words(
     return tuple(words)
 
 
-def _radial(prep: Prepared, points: Array, rad: Array) -> dict[str, Array]:
-    res: dict[str, Array] = {name: rad[:, :, i].copy() for i, name in enumerate(RADIAL)}
-    res["alpha"] = np.remainder(res["alpha"] + np.pi, 2.0 * np.pi) - np.pi
+def _radial(prep: Prepared, points: Array, rad: Array) -> Radial:
+    phi, alpha, cl, cd, W, w, v_t, F, dT, dQ = (rad[:, :, i].copy() for i in range(10))
+    alpha = np.remainder(alpha + np.pi, 2.0 * np.pi) - np.pi
     r = prep.st[:, K.S_R]
-    res["r"] = np.broadcast_to(r, res["phi"].shape).copy()
     Omega, V, rho, mu, a_sound = (points[:, i, None] for i in range(K.N_POINT))
     UT = Omega * r * prep.st[:, K.S_TANG_FACTOR] + prep.st[:, K.S_TANG]
     UP = V * prep.st[:, K.S_AXIAL_FACTOR] + prep.st[:, K.S_AXIAL]
     with np.errstate(divide="ignore", invalid="ignore"):
         # induction factors relative to the onset speed; a is infinite at rest and reported as NaN
-        res["a"] = np.where(UP != 0.0, res["w"] / UP - 1.0, np.nan)
-        res["ap"] = res["v_t"] / UT
-    res["Re"] = rho * np.abs(res["W"]) * prep.st[:, K.S_CHORD] / mu
-    res["M"] = np.abs(res["W"]) / a_sound
-    return res
+        a, ap = np.where(UP != 0.0, w / UP - 1.0, np.nan), v_t / UT
+    Re = rho * np.abs(W) * prep.st[:, K.S_CHORD] / mu
+    r = np.broadcast_to(r, phi.shape).copy()
+    return Radial(phi, alpha, cl, cd, W, w, v_t, F, dT, dQ, r, a, ap, Re, np.abs(W) / a_sound)

@@ -14,9 +14,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,6 +61,10 @@ _UNKNOWN = _frozen(np.nan)
 
 def _root_sums(parts: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
     return {key: _frozen(np.sqrt(np.sum(np.square(each), axis=0))) for key, each in parts.items() if each}
+
+
+def _plain(value: Any) -> Any:
+    return {key: _plain(item) for key, item in value.items()} if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +151,7 @@ class Dataset:
             found.append((f"u_by.{origin}", "an unknown origin", f"one of {', '.join(ORIGINS)}", ""))
         u |= _root_sums({key: [part[key] for part in u_by.values() if key in part] for key in values.keys() - u.keys()})
         if found:
-            file = str(self.provenance.get("file", "")) or self.name
+            file = self.file or self.name
             raise InputError([Fault(file, *fault) for fault in found])
         unknown = np.broadcast_to(_UNKNOWN, (n,))
         object.__setattr__(self, "values", MappingProxyType(values))
@@ -203,12 +208,42 @@ class Dataset:
 
         return tables.to_html(self)
 
+    @property
+    def file(self) -> str:
+        """File that it was read from; empty: none."""
+        return str(self.provenance.get("file", ""))
+
+    @property
+    def format(self) -> str:
+        """Id of the reader that read it; empty: none."""
+        return str(self.provenance.get("format", ""))
+
+    @property
+    def clock(self) -> str:
+        """What its rows are counted by, ``time``, ``iteration`` or ``none``; empty: not stated."""
+        return str(self.provenance.get("clock", ""))
+
+    @property
+    def headings(self) -> Mapping[str, str]:
+        """Headings of the file by channel, as far as kept."""
+        found: Mapping[str, str] = self.provenance.get("headings", {})
+        return found
+
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Numbers that hold for all rows, such as ``diameter_m``."""
+        found: Mapping[str, float] = self.provenance.get("constants", {})
+        return found
+
+    @property
+    def means(self) -> Mapping[str, Any]:
+        """What stands for a channel of a history, by channel (`bemt.data.readers.samples.Mean`)."""
+        found: Mapping[str, Any] = self.provenance.get("means", {})
+        return found
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as plain dictionaries (worker processes send series back)."""
-        by = {origin: dict(parts) for origin, parts in self.u_by.items()}
-        plain = (dict(self.values), dict(self.u), self.flags, dict(self.provenance), self.labels, by, self.notes,
-                 dict(self.units), self.lines, dict(self.texts))  # fmt: skip
-        return (Dataset, (self.kind, self.name, *plain))
+        return partial(type(self), **{f.name: _plain(getattr(self, f.name)) for f in fields(self)}), ()
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -349,13 +384,14 @@ class Dataset:
                 inverse = np.divide(1.0, factor, out=np.full(factor.shape, np.nan), where=factor > 0)
                 add(other, one, inverse)
         if "eta" not in values and {"J", "CT", "CP"} <= values.keys():
-            values["eta"] = np.asarray(co.eta(values["J"], values["CT"], values["CP"]), dtype=float)
+            J, CT, CP = (values[name] for name in ("J", "CT", "CP"))
+            values["eta"] = eta = np.asarray(co.eta(J, CT, CP), dtype=float)
             with np.errstate(divide="ignore", invalid="ignore"):
-                u_eta = np.hypot(values["J"] * u["CT"], values["eta"] * u["CP"]) / np.abs(values["CP"])
+                u_eta = np.hypot(J * u["CT"], eta * u["CP"]) / np.abs(CP)
             u["eta"] = np.where(np.isfinite(u_eta), u_eta, np.nan)
         return replace(self, values=values, u=u)
 
-    def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Dataset:
+    def select(self, where: ArrayLike | slice | Callable[[Dataset], ArrayLike]) -> Self:
         """Select points.
 
         Parameters

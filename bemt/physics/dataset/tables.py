@@ -89,10 +89,10 @@ def plot(d: Dataset, x: str | None = None, y: Sequence[str] = (), ax: Any = None
         ax.set_prop_cycle(color=CYCLE)
     drawn = [line.get_gid() for line in ax.lines]
     colours = {line.get_gid(): line.get_color() for line in ax.lines if drawn.count(line.get_gid()) == 1}
-    speeds = np.unique(d["rpm"]) if "rpm" in d and x != "rpm" else np.array([np.nan])
+    speeds = np.unique(d.rpm) if "rpm" in d and x != "rpm" else np.array([np.nan])
     for channel in wanted:
         for speed in speeds:
-            rows = np.flatnonzero(d["rpm"] == speed) if np.isfinite(speed) else np.arange(len(d))
+            rows = np.flatnonzero(d.rpm == speed) if np.isfinite(speed) else np.arange(len(d))
             rows = rows[np.argsort(d[x][rows], kind="stable")]
             name = f"{channel}, {speed:.0f} rev/min" if len(speeds) > 1 else channel
             name = f"{name}, {d.name}" if beside else name
@@ -130,7 +130,7 @@ def _top(d: Dataset, channel: str, rows: NDArray[np.int_]) -> Array:
     top: Array = value + d.u[channel][rows]
     if channel != "eta" or not {"J", "CT"} <= d.values.keys():
         return top
-    ducted = "duct_share" in d and np.any(d["duct_share"] != 0.0)
-    least = 0.0 if ducted else d["CT"][rows] - np.nan_to_num(d.u["CT"][rows])
-    limited: Array = np.fmax(value, np.minimum(top, co.eta_limit(d["J"][rows], least)))
+    ducted = "duct_share" in d and np.any(d.duct_share != 0.0)
+    least = 0.0 if ducted else d.CT[rows] - np.nan_to_num(d.u["CT"][rows])
+    limited: Array = np.fmax(value, np.minimum(top, co.eta_limit(d.J[rows], least)))
     return limited

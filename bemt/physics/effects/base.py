@@ -348,11 +348,16 @@ class Flow:
         return math.pi * self.R**2
 
     @property
+    def time_s(self) -> Array:
+        """Time of each point, (P,), where it is recorded [s]."""
+        return self.extra["time_s"]
+
+    @property
     def runs(self) -> list[NDArray[np.intp]]:
         """Points of each run (one run if runs are not recorded) in order of time; [] without time_s."""
         if "time_s" not in self.extra:
             return []
-        t = self.extra["time_s"]
+        t = self.time_s
         label = self.extra.get("run", np.zeros_like(t))
         members = (np.flatnonzero((label == name) & np.isfinite(t)) for name in np.unique(label[np.isfinite(label)]))
         return [m[np.argsort(t[m], kind="stable")] for m in members if m.size]
@@ -360,14 +365,14 @@ class Flow:
     @property
     def transients(self) -> list[NDArray[np.intp]]:
         """Those of the runs whose points mostly follow each other closely enough to show how loads follow the speed."""
-        return [run for run in self.runs if 2 * np.sum(follows(self.extra["time_s"][run])) >= run.size]
+        return [run for run in self.runs if 2 * np.sum(follows(self.time_s[run])) >= run.size]
 
     @property
     def clock(self) -> Array:
         """Time since the first point of the run, (P,), zero if not recorded [s]."""
         t = np.zeros_like(self.rpm)
         for run in self.runs:
-            t[run] = self.extra["time_s"][run] - self.extra["time_s"][run[0]]
+            t[run] = self.time_s[run] - self.time_s[run[0]]
         return t
 
     @property

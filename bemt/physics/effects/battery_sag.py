@@ -64,7 +64,7 @@ class BatterySag(Effect):
         power = power / max(float(np.max(power)), 1e-30)
         charge = np.zeros_like(power)
         for run in flow.runs:
-            t = flow.extra["time_s"][run]
+            t = flow.time_s[run]
             drawn = np.r_[0.0, np.cumsum(np.diff(t) * 0.5 * (power[run][1:] + power[run][:-1]))]
             charge[run] = drawn / max(float(drawn[-1]), 1e-30)
         if "voltage_V" not in flow.extra:

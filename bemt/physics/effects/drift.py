@@ -57,7 +57,7 @@ class Drift(Effect):
         """Time since the cell was set to zero, (P,) [s]."""
         if self.tared == "run" or "time_s" not in flow.extra:
             return flow.clock
-        t = flow.extra["time_s"]
+        t = flow.time_s
         return np.asarray(np.nan_to_num(t - np.nanmin(t)))
 
     def variants(self) -> tuple[dict[str, float | str], ...]:

@@ -53,7 +53,7 @@ class InflowLag(Effect):
         if self.tau_s <= 0.0:
             return out
         for run in flow.transients:
-            time = flow.extra["time_s"][run]
+            time = flow.time_s[run]
             step, dense = np.diff(time), follows(time)
             late = 0.0
             for i, (dt, good, dv) in enumerate(zip(step, dense, np.diff(v[run]), strict=True)):

@@ -60,7 +60,7 @@ class MotorHeating(Effect):
         out = np.zeros_like(heat)
         warm, last = 0.0, np.inf
         for run in flow.runs:
-            t = flow.extra["time_s"][run]
+            t = flow.time_s[run]
             warm = warm * float(np.exp(-(t[0] - last) / self.tau_s)) if t[0] > last else 0.0
             out[run[0]] = warm
             for i in range(1, run.size):

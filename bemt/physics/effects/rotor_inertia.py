@@ -50,7 +50,7 @@ def slope(flow: Flow) -> Array:
     """Angular acceleration, zero where the points are too far apart to show one, (P,) [rad/s2]."""
     out = np.zeros_like(flow.rpm)
     for run in flow.transients:
-        t, omega = flow.extra["time_s"][run], flow.omega[run]
+        t, omega = flow.time_s[run], flow.omega[run]
         step = np.diff(t)
         good = follows(t)
         rate = np.where(good, np.diff(omega) / np.where(good, step, 1.0), 0.0)

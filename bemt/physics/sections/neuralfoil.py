@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from bemt.base import cache
 from bemt.base.arrays import Array
 from bemt.base.cache import Kept, shipped_arrays
+from bemt.base.document import Documented
 from bemt.base.errors import needs
 from bemt.physics.sections import rule
 from bemt.physics.sections.polars import ALPHA_GRID, DEFAULT_RE, METHODS, Polar, extend, first_stall, viterna_cd_max
@@ -187,6 +188,18 @@ def _by_rule(airfoil: Airfoil, n_crit: float, drag_level: float) -> Polar:
     )
 
 
+class _Settings(Documented):
+    """What decides a polar besides the section and the Reynolds numbers."""
+
+    n_crit: float
+    xtr: tuple[float, float]
+    model: str
+    cd_max: float
+    method: str
+    past_stall: float
+    lift_floor: float
+
+
 def tunnel_polar(
     airfoil: Airfoil, *, re: Array = DEFAULT_RE, n_crit: float = 9.0, xtr_upper: float = 1.0, xtr_lower: float = 1.0,
     model: str = "xlarge", ar: float = 10.0, cd_max: float | None = None, method: str = "viterna",
@@ -211,12 +224,11 @@ def tunnel_polar(
     if re.ndim != 1 or re.size == 0 or not np.all(re > 0.0) or np.any(np.diff(re) <= 0.0):
         raise ValueError(f"re: got {re}; expected ascending Reynolds numbers above 0.")
     top = viterna_cd_max(ar) if cd_max is None else float(cd_max)
-    settings: dict[str, Any] = {"n_crit": float(n_crit), "xtr": [float(xtr_upper), float(xtr_lower)], "model": model,
-                                "cd_max": top, "method": method, "past_stall": float(past_stall),
-                                "lift_floor": float(lift_floor)}  # fmt: skip
+    xtr = (float(xtr_upper), float(xtr_lower))
+    settings = _Settings(float(n_crit), xtr, model, top, method, float(past_stall), float(lift_floor))
     shape = airfoil.four_digit if _tabulated(airfoil, re, settings) else None
     asked = table().made_with if shape else f"NeuralFoil {_version()} {model}"
-    key = cache.content_key(TABLE_VERSION, asked, shape, airfoil.key(), settings, re, ALPHA_GRID)
+    key = cache.content_key(TABLE_VERSION, asked, shape, airfoil.key(), settings.document(), re, ALPHA_GRID)
     made = cache.cached_arrays("polar", key, lambda: _make(airfoil, re, settings))
     source = f"{asked}{', tabulated' if shape else ''}, n_crit {n_crit:g}, xtr {xtr_upper:g}/{xtr_lower:g}"
     return Polar(ALPHA_GRID, re, np.zeros(1), made["cl"][:, :, None], made["cd"][:, :, None], made["confidence"],
@@ -233,10 +245,10 @@ def _version() -> str:
     return cache.installed_version("neuralfoil")
 
 
-def _tabulated(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> bool:
+def _tabulated(airfoil: Airfoil, re: Array, settings: _Settings) -> bool:
     """Whether the shipped table answers."""
-    ordinary = settings["xtr"] == [1.0, 1.0] and settings["model"] == "xlarge"
-    if not ordinary or not covers(airfoil.four_digit, settings["n_crit"]):
+    ordinary = settings.xtr == (1.0, 1.0) and settings.model == "xlarge"
+    if not ordinary or not covers(airfoil.four_digit, settings.n_crit):
         return False
     return bool(np.all(np.isin(_asked(re), table().Re)))
 
@@ -258,42 +270,42 @@ def ask(
     return RawPolar(*(np.asarray(aero[k], dtype=float).reshape(a.shape) for k in ("CL", "CD", "analysis_confidence")))
 
 
-def _raw(airfoil: Airfoil, re: Array, settings: dict[str, Any]) -> RawPolar:
+def _raw(airfoil: Airfoil, re: Array, settings: _Settings) -> RawPolar:
     """The network's answers, from the shipped table where it has them; the last column is at RE_REFERENCE."""
     if not _tabulated(airfoil, re, settings):
-        return ask(airfoil, np.append(re, RE_REFERENCE), settings["n_crit"], settings["xtr"], settings["model"])
+        return ask(airfoil, np.append(re, RE_REFERENCE), settings.n_crit, settings.xtr, settings.model)
     assert airfoil.four_digit is not None  # the table covers it
-    held = raw_polar(airfoil.four_digit, settings["n_crit"])
+    held = raw_polar(airfoil.four_digit, settings.n_crit)
     columns = np.argmax(table().Re == re[:, None], axis=1)
     return RawPolar(*(np.column_stack([v[:, columns], v[:, -1]]) for v in held))
 
 
-def _make(airfoil: Airfoil, wanted: Array, settings: dict[str, Any]) -> dict[str, Array]:
+def _make(airfoil: Airfoil, wanted: Array, settings: _Settings) -> dict[str, Array]:
     """Tables (Na, Nr) from one set of the network's answers."""
     re = _asked(wanted)
     cl, cd, conf = _raw(airfoil, re, settings)
-    if settings["lift_floor"] > 0.0:
-        up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings["lift_floor"]
+    if settings.lift_floor > 0.0:
+        up, down, keep = np.maximum(cl[:, -1:], 0.0), np.minimum(cl[:, -1:], 0.0), settings.lift_floor
         sane = np.clip(cl, keep * up + down / keep - LIFT_SLACK, keep * down + up / keep + LIFT_SLACK)
         cl = np.where(np.append(re, np.inf) < RE_REFERENCE, sane, cl)
     cl, cd, conf = cl[:, :-1], cd[:, :-1], conf[:, :-1]
     cd = np.maximum(cd, 2.656 / np.sqrt(re))
     alpha = np.deg2rad(RAW_DEG)
-    out = {name: np.zeros((ALPHA_GRID.size, re.size)) for name in ("cl", "cd", "confidence")}
+    full_cl, full_cd, confidence = np.zeros((3, ALPHA_GRID.size, re.size))
     half = np.deg2rad(BLEND_DEG)
     for j in range(re.size):
-        lo, hi = _confident_range(alpha, cl[:, j], conf[:, j], settings["past_stall"])
-        out["cl"][:, j], out["cd"][:, j] = extend(
-            alpha, cl[:, j], cd[:, j], lo=lo, hi=hi, cd_max=settings["cd_max"], half=half, method=settings["method"]
+        lo, hi = _confident_range(alpha, cl[:, j], conf[:, j], settings.past_stall)
+        full_cl[:, j], full_cd[:, j] = extend(
+            alpha, cl[:, j], cd[:, j], lo=lo, hi=hi, cd_max=settings.cd_max, half=half, method=settings.method
         )
         inside = (ALPHA_GRID > lo - half) & (ALPHA_GRID < hi + half)
-        out["confidence"][:, j] = np.where(inside, np.interp(ALPHA_GRID, alpha, conf[:, j]), 0.0)
+        confidence[:, j] = np.where(inside, np.interp(ALPHA_GRID, alpha, conf[:, j]), 0.0)
     below = wanted < RE_LOWEST
     if np.any(below):
         of = np.searchsorted(re, np.maximum(wanted, RE_LOWEST))
-        out = {name: table[:, of] for name, table in out.items()}
+        full_cl, full_cd = full_cl[:, of], full_cd[:, of]
         friction = np.sqrt(RE_LOWEST / np.minimum(wanted, RE_LOWEST)) - 1.0
         along = np.cos(ALPHA_GRID[:, None]) ** 2  # friction acts along the chord
-        out["cd"] = out["cd"] + friction * np.min(out["cd"], axis=0) * along
-        out["confidence"] = np.where(below, 0.0, out["confidence"])
-    return out
+        full_cd = full_cd + friction * np.min(full_cd, axis=0) * along
+        confidence = np.where(below, 0.0, confidence[:, of])
+    return {"cl": full_cl, "cd": full_cd, "confidence": confidence}

@@ -9,7 +9,7 @@ import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from bemt.base.arrays import Array
 from bemt.base.document import Documented
@@ -23,6 +23,14 @@ from geometry.mesh import Surface
 Part = tuple[str, Any]
 """What it is, and its value: words, command, verdict, table, list, figures, more (see `templates/report.html`)."""
 Section = tuple[str, list[Part]]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Parts beside a figure."""
+
+    parts: list[Part]
+    kind: ClassVar[str] = "block"
 
 
 @dataclass(frozen=True)
@@ -65,10 +73,20 @@ def uri(data: bytes, kind: str = "png") -> str:
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
 
 
-def picture(name: str, data: bytes) -> dict[str, Any]:
-    """Show a file with its name in words."""
+@dataclass(frozen=True)
+class Picture:
+    """A picture with its words."""
+
+    alt: str
+    src: str
+    narrow: bool = False
+    kind: ClassVar[str] = "picture"
+
+
+def picture(name: str, data: bytes, alt: str = "", narrow: bool = False) -> Picture:
+    """Show a file, with its name in words if there are no others."""
     kind = "png" if name.endswith(".png") else "svg+xml"
-    return {"kind": "picture", "alt": name.rpartition(".")[0].replace("_", " "), "src": uri(data, kind)}
+    return Picture(alt or name.rpartition(".")[0].replace("_", " "), uri(data, kind), narrow)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from bemt.base.page import Cell, num, table
+from bemt.base.page import Cell, Table, num, table
 from bemt.base.tables import number_text
 from bemt.physics import coefficients as co
-from bemt.results.report.book import CasePage, Reproduced, Section, sections, uri
+from bemt.results.report.book import Block, CasePage, Reproduced, Section, sections, uri
 from bemt.results.report.diagnosis_block import (
     audit_parts,
     diagnosis_parts,
@@ -20,7 +20,7 @@ from bemt.results.report.diagnosis_block import (
     stand,
     study_parts,
 )
-from bemt.results.report.plot import COLOURS, Plot, Trace, figure, points, viewer
+from bemt.results.report.plot import COLOURS, Figure, Plot, RotorView, Trace, figure, points, viewer
 from bemt.results.sweep.rows import Comparison, Fan, Result, Row
 
 LOOK = {"cfd": "diamond", "bench": "cross", "vendor": "triangle", "openfoam": "star",
@@ -55,10 +55,9 @@ def _points(page: CasePage, x: str, y: str, keep: Callable[[Row], bool]) -> list
 
 def _geometry(page: CasePage) -> Section:
     g = page.blade
-    plots: list[dict[str, Any] | None] = []
+    plots: list[Figure | RotorView | None] = []
     if page.surfaces:
-        alt = f"{headline(page.result)}: rotor"
-        plots.append({"kind": "rotor", "alt": alt, "src": uri(page.picture), **viewer(page.surfaces)})
+        plots.append(viewer(page.surfaces, f"{headline(page.result)}: rotor", uri(page.picture)))
     if g is not None:
         r = g.r_over_R
         beta = [Trace("β", r, g.beta_deg, colour=COLOURS["bench"])]
@@ -220,7 +219,7 @@ def _verification(page: CasePage) -> Section:
     if study and study.flags:
         words.append("Remarks: " + "; ".join(study.flags) + ".")
     found = table(["elements", "thrust [N]", "torque [N m]"], rows) if plot else None
-    side = {"kind": "block", "parts": [("table", found), ("words", " ".join(words))]} if plot or words else None
+    side = Block([("table", found), ("words", " ".join(words))]) if plot or words else None
     return "Verification", [("figures", [plot, side])]
 
 
@@ -250,7 +249,7 @@ def _quantity(c: Comparison) -> str:
     return f"{name.replace('_', ' ')} [{c.unit}]"
 
 
-def reproduction_table(items: Sequence[Reproduced]) -> dict[str, Any] | None:
+def reproduction_table(items: Sequence[Reproduced]) -> Table | None:
     """Make the table of numbers of the thesis beside ours."""
     rows = []
     for item in items:

@@ -11,7 +11,7 @@ from bemt.base.page import FIRST, Cell, num, table
 from bemt.base.tables import number_text
 from bemt.data.recordings.audit import Audit
 from bemt.data.recordings.grid_study import LOADS, LoadStudy
-from bemt.results.report.book import CasePage, Diagnosed, Part, ShownParameter, picture
+from bemt.results.report.book import CasePage, Diagnosed, Part, Picture, ShownParameter, picture
 from bemt.results.report.plot import COLOURS, DASHES, Plot, Trace, figure
 from bemt.results.sweep.rows import Comparison, Result, Row, State
 
@@ -298,10 +298,10 @@ def page_verdict(page: CasePage) -> tuple[str, str, str]:
     return kind, word, f"{own[2].partition('. ')[0]}. {re.split(r'(?<=[.]) (?=[A-Z])', why)[0]}"
 
 
-def first_pictures(item: Diagnosed) -> list[dict[str, Any]]:
+def first_pictures(item: Diagnosed) -> list[Picture]:
     """Pictures of the recordings inside the prediction band."""
     own = [(name, data) for name, data in item.figures if name.startswith(FIRST)]
-    return [picture(name, data) | {"alt": "Recording and prediction", "narrow": True} for name, data in own]
+    return [picture(name, data, "Recording and prediction", narrow=True) for name, data in own]
 
 
 def diagnosis_parts(item: Diagnosed, first: bool = True) -> list[Part]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from bemt.base.page import Cell, num, table
+from bemt.base.page import Cell, Table, num, table
 from bemt.base.tables import number_text
 from bemt.results.report.book import Book, CasePage, Part, ShownAnswer, uri
 from bemt.results.report.diagnosis_block import (
@@ -19,7 +19,7 @@ from bemt.results.report.diagnosis_block import (
     page_verdict,
     verdict,
 )
-from bemt.results.report.plot import Mark, Plot, figure, points
+from bemt.results.report.plot import Figure, Mark, Plot, figure, points
 
 SOURCES = {
     "bemt": ("BEMT", "circle", 0.28), "cfd": ("CFD, recorded", "diamond", 0.06), "bench": ("bench", "cross", 0.06),
@@ -70,7 +70,7 @@ def _values(page: CasePage) -> dict[str, list[tuple[str, float, float]]]:
     return out
 
 
-def _comparison_plot(book: Book) -> dict[str, Any] | None:
+def _comparison_plot(book: Book) -> Figure | None:
     """Thrust of every case and source over that of the first recording."""
     names: list[str] = []
     found: dict[str, list[tuple[float, float, float, str]]] = {source: [] for source in SOURCES}
@@ -92,7 +92,7 @@ COLUMNS = ("case", "rev/min", "tip Mach", "BEMT [N]", "u [N]", "BEMT torque [N m
            "own CFD [N]", "bench [N]", "vendor [N]", "BEMT − CFD [%]", "K1/K2 − CFD [%]", "agreement")  # fmt: skip
 
 
-def _comparison_table(book: Book, ids: Sequence[str]) -> dict[str, Any] | None:
+def _comparison_table(book: Book, ids: Sequence[str]) -> Table | None:
     rows = []
     for page, key in zip(book.cases, ids, strict=True):
         kind, word, _ = page_verdict(page)

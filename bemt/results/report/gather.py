@@ -134,7 +134,7 @@ def radial_curves(case: Case) -> RadialCurves:
     answer = solver.solve(prep, case.rpm, case.airspeed_m_s, case.air(), radial=True)
     stations = prep.stations
     ok = np.where(answer.converged[0], 1.0, np.nan)
-    dT, dQ, alpha, M = (answer.radial[name][0] for name in ("dT", "dQ", "alpha", "M"))
+    dT, dQ, alpha, M = (getattr(answer.radial, name)[0] for name in ("dT", "dQ", "alpha", "M"))
     r_over_R = stations.r / prep.rotor.R
     return RadialCurves(r_over_R, dT / stations.dr * ok, dQ / stations.dr * ok, np.degrees(alpha) * ok, M * ok)
 
@@ -262,7 +262,7 @@ def diagnose_into(
     found, records = load_all(list(recordings), [str(cases[0])])
     target = (out / found[0].name / "diagnosis").as_posix()
     folder.check(target, found)
-    about: dict[str, Any] = {"recordings": list(recordings), "cases": [c.name for c in found]}
+    about = {"recordings": list(recordings), "cases": [c.name for c in found]}
     try:
         answer = diagnose(records, found, None, progress)
     except InputError as error:

@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 from urllib.parse import quote
 
 import numpy as np
@@ -33,7 +33,18 @@ def _view(surfaces: Sequence[Surface]) -> tuple[float, float, float]:
     return CUT_OPEN if any(s.name == "duct" for s in surfaces) else OPEN
 
 
-def viewer(surfaces: Sequence[Surface]) -> dict[str, str]:
+@dataclass(frozen=True)
+class RotorView:
+    """A rotor that a reader turns: a still picture with its words, grids and first view as JSON."""
+
+    alt: str
+    src: str
+    mesh: str
+    view: str
+    kind: ClassVar[str] = "rotor"
+
+
+def viewer(surfaces: Sequence[Surface], alt: str = "", src: str = "") -> RotorView:
     """Pack the grids for the viewer: 16-bit integers round their middle, which keeps 1/32767 of the farthest point."""
     everything = np.concatenate([s.points.reshape(-1, 3) for s in surfaces])
     middle = np.array([0.0, 0.0, 0.5 * (everything[:, 2].max() + everything[:, 2].min())])
@@ -43,7 +54,7 @@ def viewer(surfaces: Sequence[Surface]) -> dict[str, str]:
         data = np.round((s.points - middle) / size * 32767).astype("<i2").tobytes()
         mesh.append({"rows": s.points.shape[0], "columns": s.points.shape[1], "copies": s.copies,
                      "colour": PART_COLOURS[s.name], "data": base64.b64encode(data).decode()})  # fmt: skip
-    return {"mesh": json.dumps(mesh), "view": json.dumps(_view(surfaces))}
+    return RotorView(alt, src, json.dumps(mesh), json.dumps(_view(surfaces)))
 
 
 def _turned(points: Array, angle: float, axis: int) -> Array:
@@ -400,11 +411,45 @@ def _csv(plot: Plot, traces: Sequence[_Numbers]) -> str:
     return "data:text/csv;charset=utf-8," + quote(text.encode("utf-8", "replace"), safe=",.-_ ()[]:/")
 
 
-def figure(plot: Plot) -> dict[str, Any] | None:
-    """Make the values of a plot for its template; None where nothing is finite.
+@dataclass(frozen=True)
+class DrawnTrace:
+    """A trace as its template writes it."""
+
+    name: str
+    colour: str
+    dash: str
+    paths: list[tuple[str, str]]
+    words: list[_Label]
+    key: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A plot as its template writes it."""
+
+    title: str
+    note: str
+    wide: bool
+    width: int
+    height: int
+    frame: list[tuple[str, str]]
+    words: list[_Label]
+    traces: list[DrawnTrace]
+    at: str  # Trace and place of every point [px]
+    csv: str
+    kind: ClassVar[str] = "plot"
+
+    @property
+    def slug(self) -> str:
+        """Its title as the name of a file."""
+        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")[:60]
+
+
+def figure(plot: Plot) -> Figure | None:
+    """Draw a plot; None where nothing is finite.
 
     >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0], [float("nan")])]))
-    >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0, 2.0], [3.0, 4.0])]))["traces"][0]["paths"][0][0]
+    >>> figure(Plot("t", "x [m]", "y [N]", [Trace("a", [1.0, 2.0], [3.0, 4.0])])).traces[0].paths[0][0]
     'line'
     """
     traces = [t for t in map(_numbers, plot.traces) if t.points]
@@ -421,11 +466,7 @@ def figure(plot: Plot) -> dict[str, Any] | None:
         look = t.trace
         paths, beyond = (_points if look.points else _curves)(t, f)
         key = _marker(look.shape, 12, 9) if look.points else ("line", "M1 9H23")
-        drawn.append({"name": look.name[:60], "colour": look.colour, "dash": look.dash, "paths": paths,
-                      "words": beyond, "key": key})  # fmt: skip
+        drawn.append(DrawnTrace(look.name[:60], look.colour, look.dash, paths, beyond, key))
     at = " ".join(f"{i},{f.inside(f.x(x)):.0f},{f.y(y):.0f}" for i, t in enumerate(traces) for x, y, _ in t.points)
-    return {
-        "kind": "plot", "title": plot.title, "note": plot.note, "wide": plot.wide, "width": width, "height": height,
-        "frame": [*lines, *more], "words": [*words, *notes], "traces": drawn, "at": at, "csv": _csv(plot, traces),
-        "slug": re.sub(r"[^a-z0-9]+", "-", plot.title.lower()).strip("-")[:60],
-    }  # fmt: skip
+    return Figure(plot.title, plot.note, plot.wide, width, height, [*lines, *more], [*words, *notes], drawn, at,
+                  _csv(plot, traces))  # fmt: skip

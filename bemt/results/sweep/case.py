@@ -60,7 +60,15 @@ def _runs(case: Case) -> list[tuple[str, Dataset]]:
     from bemt.data.recordings.grid_study import merged
     from bemt.data.recordings.load import import_file
 
-    return [(str(d.provenance["file"]), d) for d in merged([import_file(path) for path in case.run_paths])]
+    return [(d.file, d) for d in merged([import_file(path) for path in case.run_paths])]
+
+
+def _studies(runs: Sequence[tuple[str, Dataset]]) -> tuple[dict[str, Any], ...]:
+    if not runs:
+        return ()
+    from bemt.data.recordings.cfd_run import is_run
+
+    return tuple(s.document() for _, d in runs if is_run(d) for s in d.studies)
 
 
 def _references(case: Case, runs: Sequence[tuple[str, Dataset]]) -> list[Reference]:
@@ -152,9 +160,9 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
             u_model=_part(nominal, "model", "thrust_N", i), thrust_N_range=(np.fmin.reduce(runs), np.fmax.reduce(runs)),
             exhaust_speed_m_s=nominal.exhaust_speed_m_s[i] if case.ducted else nan,
             duct_share=nominal.duct_share[i] if case.ducted else nan, converged=bool(nominal.converged[i]),
-            H_force_N=nominal["H_force_N"][i] if "H_force_N" in nominal else nan,
-            upper_thrust_N=nominal["upper_thrust_N"][i] if case.paired else nan,
-            lower_thrust_N=nominal["lower_thrust_N"][i] if case.paired else nan,
+            H_force_N=nominal.H_force_N[i] if "H_force_N" in nominal else nan,
+            upper_thrust_N=nominal.upper_thrust_N[i] if case.paired else nan,
+            lower_thrust_N=nominal.lower_thrust_N[i] if case.paired else nan,
             J=nominal.J[i], flags=tuple(nominal.flags[i]), **state,
         ))  # fmt: skip
         rows.append(_row(
@@ -180,7 +188,7 @@ def solve_case(case: Case, threads: int = 1, progress: Callable[[int, int, str],
         rows=(*rows, *(r for r in beside if r.source in ROW_SOURCES)), variants=tuple(variants),
         other_rows=tuple(r for r in beside if r.source not in ROW_SOURCES), comparisons=tuple(comparisons),
         audit=tuple(_audit(r, ready, case.ducted) for r in beside if r.source == "cfd"),
-        grid_studies=tuple(s.document() for _, d in computed for s in d.provenance.get("studies", ())),
+        grid_studies=_studies(computed),
         conditions=_description(case, ready, case.file.model.stations),
         assumptions=tuple(map(_assumption, found.moved)),
         references=tuple(Stated(r.quantity, r.kind, r.printed, r.value, r.u, r.channel, r.source, r.remark)
@@ -212,7 +220,7 @@ def _recorded_rows(
         full = group.derive(diameter)
         for i in range(len(full)):
             get = {k: float(full[k][i]) for k in full.values}
-            at = points.index((get["rpm"], get["airspeed_m_s"], get["density_kg_m3"]))
+            at = points.index((full.rpm[i], full.airspeed_m_s[i], full.density_kg_m3[i]))
             u = {k: float(full.u[k][i]) for k in full.values}
             name = f"{group.kind} {printed[full.labels[i]]}" if full.labels else group.kind
             known = {k: get.get(k, math.nan) for k in (*COMPARED, "rpm", "airspeed_m_s", "density_kg_m3")}

@@ -12,6 +12,7 @@ import numpy as np
 
 from bemt.base.action import in_words
 from bemt.base.arrays import Array
+from bemt.base.document import Documented
 from bemt.base.errors import Fault, InputError, gathered
 from bemt.base.given import numbers
 from bemt.base.tables import number_text, or_null, speed_text, text_table
@@ -154,15 +155,14 @@ def _of_label(
         "M_tip": points.M_tip, "Re75": points.Re75, "k1k2_thrust_N": simple.thrust_N,
         "H_force_N": points.values.get("H_force_N", np.where(points.converged, 0.0, np.nan)),
     }  # fmt: skip
-    given = {"label": label, "diameter_in": told.diameter_in, "pitch_in": told.pitch_in, "blades": told.blades,
-             "class": told.blade_class, "chord_mm": chord_mm, "measured_pitch_in": measured_pitch_in,
-             "series": case.file.blade.family, "density_kg_m3": float(case.air().rho), "reading": reading,
-             "known_from": case.as_built().prior.known_from, "source": measured_source(case)}  # fmt: skip
+    given = Given(label, told.diameter_in, told.pitch_in, told.blades, told.blade_class, chord_mm, measured_pitch_in,
+                  case.file.blade.family, float(case.air().rho), reading, case.as_built().prior.known_from,
+                  measured_source(case))  # fmt: skip
     u = {"thrust_N": columns["u_thrust_N"], "power_W": columns["u_power_W"]}
     values = {k: v for k, v in columns.items() if k.startswith("u_reading") or not k.startswith(("u_", "u95_"))}
     if (sideslip := np.radians(values.pop("angle_deg"))).any():
         values["sideslip_rad"] = sideslip
-    return RotorEstimate("bemt", case.name, values, u, flags=points.flags, given=given, columns=columns)
+    return RotorEstimate("bemt", case.name, values, u, flags=points.flags, columns=columns, given=given)
 
 
 def measured_source(case: Case) -> str | None:
@@ -178,7 +178,24 @@ def _label(label: str, blades: int | None) -> tuple[Designation | None, list[Fau
         return None, list(error.faults)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+class Given(Documented):
+    """What an estimate was asked for, and what its label says; ``class`` in the document is `blade_class`."""
+
+    label: str
+    diameter_in: float
+    pitch_in: float
+    blades: int | None
+    blade_class: str | None
+    chord_mm: float | None
+    measured_pitch_in: float | None
+    series: str | None
+    density_kg_m3: float
+    reading: str | None
+    known_from: str
+    source: str | None
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RotorEstimate(Dataset):
     """Estimate from a label: a Dataset of kind ``bemt``, with its table and its document.
 
@@ -189,7 +206,7 @@ class RotorEstimate(Dataset):
     for narrower bands give --chord-mm (at 0.75 R) or --reading rpm=...,thrust_g=...
     """
 
-    given: Mapping[str, Any] = field(default_factory=dict)
+    given: Given
     columns: Mapping[str, Array] = field(default_factory=dict)
 
     @property
@@ -210,16 +227,16 @@ class RotorEstimate(Dataset):
         for row, thrust in zip(cells, self.columns["thrust_N"], strict=True):
             row.insert(at, number_text(1e3 * thrust / KGF, 3))
         g = self.given
-        kind = f", {g['class'].replace('_', ' ')}" if g["class"] else ""
-        read = f"{g['label']}: diameter {g['diameter_in']:g} in, pitch {g['pitch_in']:g} in, {g['blades']} blades{kind}"
+        kind = f", {g.blade_class.replace('_', ' ')}" if g.blade_class else ""
+        read = f"{g.label}: diameter {g.diameter_in:g} in, pitch {g.pitch_in:g} in, {g.blades} blades{kind}"
         notes = ["± 68 and 95 %: the rotor itself; on a stand: what yours may show, ± 68 %"]
-        if self.given["source"]:
-            notes.append(f"as measured: {self.given['source']}")
+        if g.source:
+            notes.append(f"as measured: {g.source}")
         notes += [f"! {flag}" for flag in counted([list(flags) for flags in self.flags])]
-        more = ["--chord-mm (at 0.75 R)"] if self.given["chord_mm"] is None else []
-        if self.given["reading"] is None:
+        more = ["--chord-mm (at 0.75 R)"] if g.chord_mm is None else []
+        if g.reading is None:
             more.append("--reading rpm=...,thrust_g=...")
-        if more and self.given["known_from"] == "label":
+        if more and g.known_from == "label":
             notes.append(f"for narrower bands give {' or '.join(more)}")
         return "\n".join([read, text_table(head, cells, left=()), *notes]) + "\n"
 
@@ -230,4 +247,5 @@ class RotorEstimate(Dataset):
         """Plain values of schema ``bemt.estimate/2``; unknown numbers are None."""
         rows = [{name: or_null(column[i]) for name, column in self.columns.items()} | {"flags": list(self.flags[i])}
                 for i in range(len(self))]  # fmt: skip
-        return {"schema": SCHEMA, "case": self.name, "given": dict(self.given), "rows": rows}
+        given = {"class" if key == "blade_class" else key: value for key, value in self.given.document().items()}
+        return {"schema": SCHEMA, "case": self.name, "given": given, "rows": rows}

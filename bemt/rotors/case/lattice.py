@@ -41,10 +41,11 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
             continue
         with gathered(faults):
             found[name] = numbers(name, value)
-    if "rpm" in found and np.any(found["rpm"] <= 0.0):
-        faults.append(Fault("", "rpm", f"{np.min(found['rpm']):g}", "speeds above 0 rev/min", "Drop the sign?"))
-    elif "rpm" in found and np.any(found["rpm"] > RPM_MAX):
-        faults.append(Fault("", "rpm", f"{np.max(found['rpm']):g}", f"up to {RPM_MAX:g} rev/min"))
+    n = found.get("rpm", np.asarray(case.rpm, dtype=float))
+    if np.any(n <= 0.0):
+        faults.append(Fault("", "rpm", f"{np.min(n):g}", "speeds above 0 rev/min", "Drop the sign?"))
+    elif np.any(n > RPM_MAX):
+        faults.append(Fault("", "rpm", f"{np.max(n):g}", f"up to {RPM_MAX:g} rev/min"))
     shapes = {name: value.shape for name, value in found.items()}
     try:
         np.broadcast_shapes(*shapes.values())
@@ -52,7 +53,6 @@ def conditions(case: Case, rpm: Any, airspeed_m_s: Any, J: Any) -> tuple[Array, 
         got = ", ".join(f"{value.size} of {name}" for name, value in found.items())
         faults.append(Fault("", ", ".join(shapes), got, "as many of each, or one", "curve() takes every pair"))
         refuse(faults)
-    n = found.get("rpm", np.asarray(case.rpm, dtype=float))
     V = found.get("airspeed_m_s", np.asarray(case.airspeed_m_s, dtype=float))
     if "J" in found:
         V = found["J"] * n / 60.0 * case.diameter_m

@@ -81,7 +81,7 @@ class PairError:
         step = 1e-3 * np.maximum(met.rpm / 60.0 * self.model.lower.diameter_m, 1.0)
         up, down = (self.model.lower.solve(met.rpm, met.airspeed_m_s + s, self.air) for s in (step, -step))
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = 0.5 * np.abs(upper["thrust_N"] / found["upper_thrust_N"])
+            share = 0.5 * np.abs(upper["thrust_N"] / found.upper_thrust_N)
         gust = np.where(np.isfinite(share), share, 0.0) * np.abs(met.airspeed_m_s - found.airspeed_m_s)
         T = [upper["thrust_N"], np.hypot(lower["thrust_N"], gust * np.abs(up.thrust_N - down.thrust_N) / (2.0 * step))]
         Q = [

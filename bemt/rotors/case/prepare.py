@@ -62,9 +62,8 @@ def _effects(case: Case) -> tuple[effects.Effect, ...]:
                     got, _, expected = str(error).partition("; expected ")
                     faults.append(Fault(case.path.as_posix(), where, got, expected))
     refuse(faults)
-    gap_loss = case.get("duct.gap_loss") if case.ducted else None
-    if gap_loss is not None:
-        on.setdefault("tip_gap", TipGap(loss=float(gap_loss)))
+    if (duct := case.file.duct) is not None and duct.gap_loss is not None:
+        on.setdefault("tip_gap", TipGap(loss=duct.gap_loss))
     off = set(case.file.model.effects_off)
     standard = {effect.id for effect in effects.standard()}
     return tuple(on.get(name) or cls() for name, cls in known.items() if name in (standard | set(on)) - off)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def with_reading(case: Case, reading: str | Mapping[str, float] | Sequence[Mappi
     blade = case.file.blade
     if blade.as_built is not None and blade.as_built.file is not None:
         raise InputError(Fault("--reading", "", repr(text), "a case that no recording calibrated"))
-    changes: dict[str, Any] = {"blade.as_built.reading": text}
+    changes = {"blade.as_built.reading": text}
     if blade.known_from != "measured":
         changes["blade.known_from"] = "reference"
     return with_changes(case, changes)

@@ -14,7 +14,7 @@ from bemt.base.given import inside
 from bemt.base.toml import Table, check_field, shown, validated
 from bemt.base.toml_text import Collector
 from bemt.rotors.case.reading import parse_reading
-from bemt.rotors.case.schema import GROUPS, INCH, AsBuiltTable, BladeTable, CaseFile, SectionTable
+from bemt.rotors.case.schema import GROUPS, INCH, AsBuiltTable, AssumptionTable, BladeTable, CaseFile, SectionTable
 from bemt.rotors.measured import records
 
 A_SOUND = 340.3  # only to refuse impossible tip speeds
@@ -317,33 +317,33 @@ def _check_assumptions(out: Collector, case: CaseFile) -> None:
         if key in seen:
             out.add(f"{where}.key", f"{key!r} again", "each key once")
         seen.add(key)
-        stated = {k: list(v) if isinstance(v, tuple) else v for k, v in item.model_dump(exclude_unset=True).items()}
-        _check_assumption(out, where, stated, nominal, type(table), name)
+        _check_assumption(out, where, item, nominal, type(table), name)
 
 
 def _check_assumption(
-    out: Collector, where: str, item: Mapping[str, Any], nominal: Any, table: type[Table], name: str
+    out: Collector, where: str, item: AssumptionTable, nominal: Any, table: type[Table], name: str
 ) -> None:
-    if "values" in item:
-        if "low" in item or "high" in item:
+    low, high = item.low, item.high
+    if item.values is not None:
+        if low is not None or high is not None:
             out.add(where, "values together with low or high", "values, or low and high")
-        if not isinstance(item["values"], list) or len(item["values"]) < 2 or nominal not in item["values"]:
-            out.add(f"{where}.values", shown(item["values"]), f"two or more values, one of them {shown(nominal)}")
+        if len(item.values) < 2 or nominal not in item.values:
+            out.add(f"{where}.values", shown(item.values), f"two or more values, one of them {shown(nominal)}")
             return
-        for i, value in enumerate(item["values"]):
+        for i, value in enumerate(item.values):
             check_field(out, f"{where}.values[{i}]", table, name, value)
         return
-    lacking = [end for end in ("low", "high") if end not in item]
-    if lacking:
-        out.add(where, f"no {' and no '.join(lacking)}", "low and high, or values")
+    if low is None or high is None:
+        lacking = " and no ".join(end for end, value in (("low", low), ("high", high)) if value is None)
+        out.add(where, f"no {lacking}", "low and high, or values")
         return
-    ends = [check_field(out, f"{where}.{end}", table, name, item[end]) for end in ("low", "high")]
+    ends = [check_field(out, f"{where}.{end}", table, name, value) for end, value in (("low", low), ("high", high))]
     if not all(ends):
         return
     if isinstance(nominal, (str, list)):
         out.add(where, "low and high for a value that is not a number", "values")
-    elif not item["low"] < item["high"]:
-        out.add(where, f"low {shown(item['low'])} and high {shown(item['high'])}", "low below high")
-    elif not item["low"] <= nominal <= item["high"]:
-        got = f"low {shown(item['low'])} and high {shown(item['high'])}"
+    elif not low < high:
+        out.add(where, f"low {shown(low)} and high {shown(high)}", "low below high")
+    elif not low <= nominal <= high:
+        got = f"low {shown(low)} and high {shown(high)}"
         out.add(where, got, f"a range that holds the nominal value, {shown(nominal)}")

@@ -144,8 +144,8 @@ def _data(case: Case) -> list[Source]:
 
 
 _WORK = re.compile(
-    r"(?P<who>[A-Z]\w+(?:,? (?:and |van |von )*[A-Z][\w.'-]*)*(?: et al\.)?)(?:,)? \(?(?P<year>1[89]\d\d|20[0-4]\d)\)?"
-    r"(?P<what>(?:(?!(?:(?<=[a-z]{4})|(?<=\d))\. [A-Z`]|,(?: and)? [A-Z]\w+ \(?(?:1[89]|20)\d\d)[^;()])*)"
+    r"([A-Z]\w+(?:,? (?:and |van |von )*[A-Z][\w.'-]*)*(?: et al\.)?)(?:,)? \(?(1[89]\d\d|20[0-4]\d)\)?"
+    r"((?:(?!(?:(?<=[a-z]{4})|(?<=\d))\. [A-Z`]|,(?: and)? [A-Z]\w+ \(?(?:1[89]|20)\d\d)[^;()])*)"
 )
 """Authors, year and what follows in a source, up to the next semicolon, bracket or sentence."""
 _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {"~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": "/"}
@@ -174,12 +174,13 @@ def bibtex(found: Sources) -> str:
     for source in found[1:]:
         works = list(_WORK.finditer(source.source))
         for work in works:
-            plain = unicodedata.normalize("NFKD", work["who"]).encode("ascii", "ignore").decode()
-            key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + work["year"]
-            what = " ".join(work["what"].split()).strip(" ,.:").removeprefix("not checked")
+            who, year, rest = work.groups()
+            plain = unicodedata.normalize("NFKD", who).encode("ascii", "ignore").decode()
+            key = re.sub(r"\W", "", plain.split(",")[0].split(" ")[0].lower()) + year
+            what = " ".join(rest.split()).strip(" ,.:").removeprefix("not checked")
             if re.match(r"[ (,;]*(?:\w+ ){0,2}not checked", source.source[work.end() :]):
                 what = f"{what} (not checked)".strip()
-            known = entries.get(key, (work["who"], work["year"], "", []))
+            known = entries.get(key, (who, year, "", []))
             entries[key] = (*known[:2], known[2] or what, [*known[3], source.name])
         if not works:
             bare.append(f"% {source.name}: {' '.join(source.source.split())}")

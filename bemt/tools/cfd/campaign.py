@@ -52,7 +52,7 @@ class _Bemt:
 
     def solve(self, campaign: Campaign, row: RunRow) -> solver.Solution:
         case = _case_of(campaign, row)
-        overrides: dict[str, Any] = {}
+        overrides: dict[str, object] = {}
         if row.solver == "incompressible":
             overrides["model.effects_off"] = sorted({*case.file.model.effects_off, *MACH_EFFECTS})
         vanes = case.get("duct.stator.blades")
@@ -144,15 +144,15 @@ def _radial(campaign: Campaign, run: str, found: solver.Solution) -> Bands | Non
     names = ("r_m", "thrust_per_radius_N_m", "torque_per_radius_Nm_m")
     r, dT, dQ = (np.array([float(row[name]) for row in rows]) for name in names)
     R = 0.5 * campaign.case.diameter_m
-    s, edges = found.radial, _edges(found.radial["r"][0])
+    at = solver.Radial(*(v[0] for v in found.radial))
+    edges = _edges(at.r)
     a, b, c, d = (
-        tuple(_bands(R, at, load).tolist())
-        for ours, theirs in ((dT, "dT"), (dQ, "dQ"))
-        for at, load in ((_edges(r), ours * np.diff(_edges(r))), (edges, s[theirs][0]))
+        tuple(_bands(R, ends, load).tolist())
+        for recorded, solved in ((dT, at.dT), (dQ, at.dQ))
+        for ends, load in ((_edges(r), recorded * np.diff(_edges(r))), (edges, solved))
     )
     alpha = (
-        float(np.degrees(np.interp((a + b) * R / 2, s["r"][0], s["alpha"][0])))
-        for a, b in zip(BANDS, BANDS[1:], strict=False)
+        float(np.degrees(np.interp((a + b) * R / 2, at.r, at.alpha))) for a, b in zip(BANDS, BANDS[1:], strict=False)
     )
     return Bands(BANDS, a, b, c, d, tuple(alpha))
 

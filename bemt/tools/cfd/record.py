@@ -103,7 +103,7 @@ def grid_studies(rows: Sequence[RunRow]) -> list[Study]:
                 each[f"{row.level:g}"] = u / abs(value)
             studies.append(StudyResult(tuple(values), found.order, found.extrapolated, found.gci_fine, found.gci_coarse,
                                      spread / abs(values[0]), found.flags, each))  # fmt: skip
-        point: dict[str, Any] = {k: getattr(fine[0], k) for k in SAME}
+        point = {k: getattr(fine[0], k) for k in SAME}
         T, Q = studies
         out.append(Study(**point, levels=tuple(r.level for r in fine), cells=cells, ratios=steps,
                          by_cells=tuple(ratios(cells)), thrust_N=T, torque_Nm=Q))  # fmt: skip
@@ -171,7 +171,7 @@ class CampaignRecord:
         path = self.folder / "radial.csv"
         kept = [row for row in csv_rows(path) if row["run"] not in names]
         if table is None:
-            rows: list[dict[str, Any]] = [dict(row) for row in csv_rows(source) if row["run"] in names]
+            rows: Sequence[Mapping[str, object]] = [row for row in csv_rows(source) if row["run"] in names]
         else:
             rows = _short([dict(zip(RADIAL, (*names, *map(float, row)), strict=True)) for row in table])
         if rows:
@@ -244,7 +244,7 @@ def _with_u(row: RunRow, studies: Sequence[Study]) -> RunRow:
 
 def _balances(rows: Sequence[RunRow]) -> dict[str, Any]:
     """Balance of every run, or why there is none; only runs that balance count as evidence."""
-    each: dict[str, Any] = {}
+    each: dict[str, dict[str, float] | str] = {}
     for row in rows:
         if not math.isnan(row.balance_mass):
             each[row.run] = {name.removeprefix("balance_"): getattr(row, name) for name in RESIDUALS}
@@ -269,7 +269,7 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def _short(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _short(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, object]]:
     """Rows with seven digits, more are noise; whole numbers without a point, so that reading changes nothing."""
 
     def short(value: Any) -> Any:

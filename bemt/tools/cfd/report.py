@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any
 
 from bemt.base.document import Documented
-from bemt.base.page import num, table
+from bemt.base.page import Table, num, table
 from bemt.data.readers import number
 from bemt.data.recordings.audit import Audit, CfdFacts
 from bemt.results.report.book import Book, CasePage, Page, Section, picture, sections
 from bemt.results.report.diagnosis_block import audit_parts
 from bemt.results.report.gather import read_json, safe_files
-from bemt.results.report.plot import DASHES, SERIES, SHAPES, Plot, Trace, figure
+from bemt.results.report.plot import DASHES, SERIES, SHAPES, Figure, Plot, Trace, figure
 from bemt.results.sweep.rows import CaseConditions, Comparison, Result, Row
 from bemt.rotors.validity import serious
 from bemt.tools.cfd.schema import RunRow, run_of
@@ -321,7 +321,7 @@ SHOWN = (("rpm", "rpm", 6), ("airspeed_m_s", "V [m/s]", 4), ("J", "J", 3), ("thr
            ("cells", "cells", 6), ("yplus_avg", "y+", 3), ("drift_thrust", "drift", 2))  # fmt: skip
 
 
-def _plots(item: Runs) -> list[dict[str, Any] | None]:
+def _plots(item: Runs) -> list[Figure | None]:
     """Thrust and torque over the quantity that was varied most, one line per group of the others."""
     runs = [r for r in item.runs if r.settled]
 
@@ -354,7 +354,7 @@ def _plots(item: Runs) -> list[dict[str, Any] | None]:
     return plots
 
 
-def _runs(item: Runs) -> dict[str, Any] | None:
+def _runs(item: Runs) -> Table | None:
     def told(key: str) -> bool:
         values = [getattr(r, key) for r in item.runs]
         return any(math.isfinite(v) and (v != 0 or key in ("J", "airspeed_m_s")) for v in values)

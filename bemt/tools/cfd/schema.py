@@ -140,7 +140,7 @@ def _rows(out: Collector, file: CampaignFile) -> list[tuple[str, dict[str, Any]]
 def _point(
     out: Collector, where: str, row: dict[str, Any], case: Case, duct: CampaignDuct | None
 ) -> list[CampaignPoint]:
-    overrides: dict[str, Any] = {}
+    overrides: dict[str, object] = {}
     if "pitch_offset_deg" in row:
         overrides["blade.beta_offset_deg"] = case.file.blade.beta_offset_deg + row["pitch_offset_deg"]
     if "tip_gap_pct_R" in row:

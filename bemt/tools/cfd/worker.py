@@ -12,7 +12,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ import numpy as np
 
 from bemt.base.arrays import Array
 from bemt.base.averaging import steady_average
+from bemt.base.document import Documented
 from bemt.base.errors import InputError
 from bemt.base.tables import write_atomic
 from bemt.tools.cfd.balance import balance_of
@@ -38,8 +39,7 @@ _UNIFORM = re.compile(rb"internalField\s+uniform[^;]*;")
 POWERS = {"U": 1, "p": 2, "k": 2, "omega": 1, "epsilon": 3, "nut": 1}
 
 
-@dataclass(frozen=True)
-class StartField:
+class StartField(Documented):
     """What a flow was computed for."""
 
     rpm: float  # Speed [rev/min]
@@ -102,9 +102,7 @@ def point_key(point: CampaignPoint) -> tuple[str, str, Settings]:
     """
     settings, parts = settings_of(point.case, point.run)
     files = case_files(settings) | {"system/controlDict": control(settings, balance=False)}
-    shape = (
-        f"{parts['rotor'].key()}|{parts['duct']!r}|{None if parts['tail'] is None else parts['tail'].round(9).tolist()}"
-    )
+    shape = f"{parts.rotor.key()}|{parts.duct!r}|{None if parts.tail is None else parts.tail.round(9).tolist()}"
     body = [f"{name}\n{text}" for name, text in sorted(files.items()) if name != "Allrun"]
     grid = _digest(shape, *(files[name] for name in GRID_FILES))
     return _digest(shape, *body, str(settings.average), str(point.warm))[:12], grid[:12], settings
@@ -274,7 +272,7 @@ class Worker:
         for path in sorted(self.work.glob("run-*/state.json")):
             about = json.loads(path.read_text(encoding="utf-8"))
             if about.pop("grid") == grid and about.pop("ranks") == self.ranks:
-                old = StartField(about["rpm"], tuple(about["wind"]), about["pressure"], about["compressible"])
+                old = StartField.from_document(about)
                 gap = np.array(new.wind) / new.rpm - np.array(old.wind) / old.rpm
                 away = 1e3 * float(np.linalg.norm(gap)) + 2.0 * (old.compressible != new.compressible)
                 found.append((away + abs(math.log(new.rpm / old.rpm)), path.parent.name, old))
@@ -325,7 +323,7 @@ class Worker:
             row = replace(row, yplus_avg=_y_plus(folder))
             radial = radial_of(folder, settings, settings.average)
             if code == 0:
-                about = {"grid": grid, "ranks": self.ranks, **asdict(_state(settings))}
+                about = {"grid": grid, "ranks": self.ranks, **_state(settings).document()}
                 write_atomic(folder / "state.json", json.dumps(about) + "\n")
         except (RuntimeError, InputError, OSError) as error:
             failed = failed or str(error)[: NOTE_LENGTH + 100]

@@ -206,21 +206,34 @@ def full_document(case: Case) -> dict[str, Any]:
             **{k: {"value": b.value, "u": b.u} for k, b in full.items()}}  # fmt: skip
 
 
-def circuit(case: Case) -> dict[str, Any] | None:
-    """Numbers of battery, ESC and motor for a program that runs them itself, SI; None for a case without a motor."""
+@dataclasses.dataclass(frozen=True)
+class Circuit:
+    """Battery, ESC and motor for a program that runs them itself, SI; None: not stated."""
+
+    kv_rpm_V: float
+    volts: float
+    ohm: float
+    battery_ohm: float
+    no_load_A: float
+    exponent: float
+    limit_A: float | None
+    motor_inertia_kg_m2: float
+    rotor_inertia_kg_m2: float | None
+
+
+def circuit(case: Case) -> Circuit | None:
+    """Circuit of a case; None without a motor."""
     if case.file.drive is None:
         return None
     drive, t = _carried(case, 0.0, (), lambda _c, _d: {}, bands=False)[0], drive_model.drive_table(case)
     idle, limit = drive.esc.idle_A, drive.esc.current_limit_A
     stated = t.rotor_inertia_kg_mm2
-    return {
-        "kv_rpm_V": drive.motor.kv_rpm_V, "volts": float(drive.battery.voc(t.soc)) - drive.battery_ohm * idle,
-        "ohm": float(drive.motor.resistance(drive.motor.ambient_C)) + drive.esc.resistance_ohm,
-        "battery_ohm": drive.battery_ohm, "no_load_A": drive.motor.no_load_A, "exponent": drive.esc.exponent,
-        "limit_A": limit - idle if math.isfinite(limit) else None,
-        "motor_inertia_kg_m2": drive.motor.inertia_kg_m2,
-        "rotor_inertia_kg_m2": None if stated is None else 1e-6 * stated,
-    }  # fmt: skip
+    return Circuit(
+        drive.motor.kv_rpm_V, float(drive.battery.voc(t.soc)) - drive.battery_ohm * idle,
+        float(drive.motor.resistance(drive.motor.ambient_C)) + drive.esc.resistance_ohm, drive.battery_ohm,
+        drive.motor.no_load_A, drive.esc.exponent, limit - idle if math.isfinite(limit) else None,
+        drive.motor.inertia_kg_m2, None if stated is None else 1e-6 * stated,
+    )  # fmt: skip
 
 
 def _line(case: Case, full: Mapping[str, DriveBand]) -> str:

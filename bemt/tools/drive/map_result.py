@@ -290,7 +290,7 @@ def _option_faults(thrust: float | None, voltage: float | None, nodes: int, name
 
 def _sources(path: Path, got: object) -> set[Path]:
     """The file itself and the tables beside it that it names."""
-    names = str(got.provenance.get("file", "")).split("+") if isinstance(got, Dataset) else []
+    names = got.file.split("+") if isinstance(got, Dataset) else []
     beside = [path.parent / Path(name).name for name in names if name]
     return {path.resolve(), *(p.resolve() for p in beside if p.is_file())}
 

@@ -180,12 +180,14 @@ class ArdupilotExport(LoadsExport):
         f = json.loads("\n".join(line for line in text.splitlines() if not line.startswith("#")))
         rho = float(text.split("density ")[1].split()[0])
         top = float(text.split(" to ")[1].split()[0])
-        weight = f["mass"] * G0
-        v_hover = 2.0 * f["refVoltage"] * f["refCurrent"] / weight
-        area = weight / (0.5 * rho * v_hover**2) / f["num_motors"]
-        v_max = v_hover / np.sqrt(f["hoverThrOut"])
-        c = rpm / top
-        T = 0.5 * rho * area * (v_max**2 * (f["propExpo"] * c**2 + (1.0 - f["propExpo"]) * c) - airspeed_m_s**2)
+        mass, volts, amps, motors, hover, e = (
+            f[key] for key in ("mass", "refVoltage", "refCurrent", "num_motors", "hoverThrOut", "propExpo")
+        )
+        weight, c = mass * G0, rpm / top
+        v_hover = 2.0 * volts * amps / weight
+        area = weight / (0.5 * rho * v_hover**2) / motors
+        v_max = v_hover / np.sqrt(hover)
+        T = 0.5 * rho * area * (v_max**2 * (e * c**2 + (1.0 - e) * c) - airspeed_m_s**2)
         return T, np.full(rpm.shape, np.nan)
 
 

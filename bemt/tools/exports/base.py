@@ -359,7 +359,7 @@ class LoadsExport(Export):
         top: dict[float, tuple[float, float]] = {
             n: (float(np.max(truth.thrust_N[rpm == n])), float(np.max(truth.torque_Nm[rpm == n]))) for n in set(rpm)
         }
-        errors: dict[str, Any] = {}
+        errors: dict[str, object] = {}
         for i, (name, value, exact) in enumerate(
             (("thrust", got[0], truth.thrust_N), ("torque", got[1], truth.torque_Nm))
         ):
@@ -438,7 +438,7 @@ class SolidExport(Export):
             for s in job.shapes:
                 made = export(s.rotor, s.duct, out, [self.id], name=job.case.name + s.end, unit=job.unit,
                               options=s.options, model=s.model)  # fmt: skip
-                told = {} if s.printed is None else {"printed": dict(s.printed)}
+                told = {} if s.printed is None else {"printed": s.printed.document()}
                 found = joined(found, made | {"name": job.case.name} | told)
         except GeometryError as error:
             raise InputError([Fault(job.file, *fault) for fault in error.faults]) from error

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from bemt.base.action import as_html, did_you_mean
-from bemt.base.document import Documented, rows_of
+from bemt.base.document import Documented
 from bemt.base.errors import EXIT_INPUT, EXIT_OK, Fault, InputError, gathered, refuse
 from bemt.base.plugins import missing, tool_of
 from bemt.base.tables import file_hash, number_text, text_table, write_atomic
@@ -19,10 +20,16 @@ from bemt.rotors.case import Case, find_cases, load_case, repeated_names
 from bemt.tools.exports import exports
 from bemt.tools.exports.base import FEATURES, Job, Manifest
 from bemt.tools.exports.parts import joined
-from bemt.tools.exports.printing import Print, faults_of, printed_text
+from bemt.tools.exports.printing import AsPrinted, Print, Widened, faults_of, printed_text
 from geometry.common import GeometryError
 from geometry.export import MANIFEST, SCHEMA
 from geometry.mesh import Options
+
+
+class Surface(Documented):
+    """Named part of a solid."""
+
+    name: str
 
 
 class Listed(Documented):
@@ -33,7 +40,7 @@ class Listed(Documented):
     format: str = ""
     unit: str = ""
     bytes: int = 0
-    surfaces: tuple[Mapping[str, Any], ...] = ()
+    surfaces: tuple[Surface, ...] = ()
 
 
 class ShownBand(Documented):
@@ -66,8 +73,56 @@ class TargetPart(Documented):
     band: ShownBand | None = None
 
 
-def _targets(manifest: Mapping[str, Any]) -> tuple[TargetPart, ...]:
-    return rows_of(TargetPart, manifest.get("targets", []))
+class Volumes(Documented):
+    """Volume of a rotor as a mesh, by its sections, and of the solid of CAD [m^3]."""
+
+    volume_rotor_mesh: float
+    volume_rotor_sections: float
+    volume_rotor_cad: float | None = None
+
+
+class Checks(Documented):
+    """Sizes that were checked; those of the blade as a whole where it was made for a printer [m]."""
+
+    gap: float | None = None
+    min_thickness: float | None = None
+    trailing_edge: float = math.nan
+    min_section_thickness: float = math.nan
+
+
+class Told(Documented):
+    """What a manifest says, of it what is read again; `parts` has the files of formats that list their own."""
+
+    schema: str = ""
+    name: str = ""
+    files: tuple[Listed, ...] = ()
+    targets: tuple[TargetPart, ...] = ()
+    parts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    blades: int = 0
+    volumes_m3: Volumes | None = None
+    checks_m: Checks = Checks()
+    printed: Widened | AsPrinted | None = None
+    kept: tuple[str, ...] = ()
+    stale: tuple[str, ...] = ()
+    case_sha256: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def formats(self) -> list[str]:
+        """Formats that it speaks of."""
+        out = [file.format for file in self.files if file.format not in self.parts]
+        return list(dict.fromkeys([*out, *self.parts, *(one.target for one in self.targets)]))
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """Files that it lists, and what was in them."""
+        files = {file.path: file.sha256 for file in self.files}
+        files |= {f"{one.target}/{file.path}": file.sha256 for one in self.targets for file in one.files}
+        return files | {path: digest for part in self.parts.values() for path, digest in part.items()}
+
+
+def _told(manifest: Mapping[str, Any]) -> Told:
+    own = {key: v["files"] for key, v in manifest.items() if isinstance(v, dict) and isinstance(v.get("files"), dict)}
+    return Told.from_document({**manifest, "parts": own})
 
 
 class PartlyRefused(InputError):
@@ -85,9 +140,9 @@ def export_case(job: Job, out: Path, formats: Sequence[str], progress: Callable[
     ``kept``, and in ``stale`` the ones written from another state of the case. If some targets were refused, the others
     are written (`PartlyRefused`); if all were, or the folder holds another case, nothing is.
     """
-    case, before = job.case, _manifest(out)
-    if before.get("name", case.name) != case.name:
-        got, wanted = f"the export of {before['name']!r}", f"a folder without an export, or with one of {case.name!r}"
+    case, (before, old) = job.case, _manifest(out)
+    if old.name not in ("", case.name):
+        got, wanted = f"the export of {old.name!r}", f"a folder without an export, or with one of {case.name!r}"
         raise InputError(Fault((out / MANIFEST).as_posix(), "name", got, wanted, "Give each case an --out of its own"))
     manifest: Manifest = {}
     faults: list[Fault] = []
@@ -98,13 +153,17 @@ def export_case(job: Job, out: Path, formats: Sequence[str], progress: Callable[
             manifest = joined(manifest, target.put(job, out))
     if manifest:
         content = case.content_hash()
-        kept = _kept(before, manifest, out)
-        stale = sorted(word for word, digest in kept["case_sha256"].items() if digest != content)
-        manifest["case_sha256"] = dict.fromkeys(_formats(manifest), content)
-        write_atomic(out / MANIFEST, json.dumps(joined(kept, manifest), indent=1) + "\n")
-        now = _hashes(joined(kept, manifest))
-        _remove(out, {path: digest for path, digest in _listed(before).items() if path not in now})
-        manifest |= {"kept": sorted(kept["case_sha256"]), "stale": stale}
+        formats = _told(manifest).formats
+        kept = _kept(before, old, set(formats), out)
+        stays = {word: old.case_sha256.get(word, "") for word in _told(kept).formats}
+        manifest["case_sha256"] = dict.fromkeys(formats, content)
+        whole = joined(kept | {"case_sha256": stays}, manifest)
+        write_atomic(out / MANIFEST, json.dumps(whole, indent=1) + "\n")
+        listed = {Path(path).as_posix(): digest for path, digest in old.hashes.items() if "\0" not in path}
+        now = _told(whole).hashes
+        _remove(out, {path: digest for path, digest in listed.items() if path not in now})
+        stale = sorted(word for word, digest in stays.items() if digest != content)
+        manifest |= {"kept": sorted(stays), "stale": stale}
     told = list(dict.fromkeys(faults))
     if told and not manifest:
         raise InputError(told)
@@ -113,72 +172,35 @@ def export_case(job: Job, out: Path, formats: Sequence[str], progress: Callable[
     return manifest
 
 
-def _parts(manifest: Mapping[str, Any]) -> Manifest:
-    """Targets that have a part of the manifest to themselves, with the files that they list there."""
-    return {key: v for key, v in manifest.items() if isinstance(v, dict) and isinstance(v.get("files"), dict)}
-
-
-def _formats(manifest: Mapping[str, Any]) -> list[str]:
-    """Formats that a manifest speaks of."""
-    parts = _parts(manifest)
-    out = [file.format for file in rows_of(Listed, manifest["files"]) if file.format not in parts]
-    return list(dict.fromkeys([*out, *parts, *(one.target for one in _targets(manifest))]))
-
-
-def _kept(before: Manifest, manifest: Manifest, out: Path) -> Manifest:
+def _kept(before: Manifest, old: Told, gone: set[str], out: Path) -> Manifest:
     """What stays of the manifest before: formats that were not asked for again and whose files are as they were."""
-    gone, digests = set(_formats(manifest)), before.get("case_sha256", {})
 
     def there(files: Mapping[str, str], folder: str = "") -> bool:
         return all(_unchanged(out, folder + path, digest) for path, digest in files.items())
 
     def stays(file: Listed) -> bool:
-        own = bool(file.format) and file.format not in gone and (file.format not in parts or file.format in kept)
+        own = bool(file.format) and file.format not in gone and (file.format not in old.parts or file.format in kept)
         return own and there({file.path: file.sha256})
 
-    parts = _parts(before)
-    kept = {key: value for key, value in before.items() if key not in ("files", "targets", "case_sha256", *parts)}
-    kept |= {word: part for word, part in parts.items() if word not in gone and there(part["files"])}
-    kept["files"] = [item for item in before.get("files", []) if stays(Listed.from_document(item))]
+    kept = {key: value for key, value in before.items() if key not in ("files", "targets", "case_sha256", *old.parts)}
+    kept |= {word: before[word] for word, files in old.parts.items() if word not in gone and there(files)}
+    kept["files"] = [item for item, file in zip(before.get("files", []), old.files, strict=True) if stays(file)]
     targets = [
         item
-        for item, one in zip(before.get("targets", []), _targets(before), strict=True)
+        for item, one in zip(before.get("targets", []), old.targets, strict=True)
         if one.target not in gone and there({f.path: f.sha256 for f in one.files}, f"{one.target}/")
     ]
-    if targets:
-        kept["targets"] = targets
-    return kept | {"case_sha256": {word: digests.get(word, "") for word in _formats(kept)}}
+    return kept | ({"targets": targets} if targets else {})
 
 
-def _hashes(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Files that a manifest lists, and what was in them."""
-    files = {file.path: file.sha256 for file in rows_of(Listed, manifest["files"])}
-    files |= {f"{one.target}/{file.path}": file.sha256 for one in _targets(manifest) for file in one.files}
-    return files | {path: digest for part in _parts(manifest).values() for path, digest in part["files"].items()}
-
-
-def listed(manifest: Mapping[str, Any]) -> list[str]:
-    """Names of the files that a manifest lists, below its folder."""
-    return sorted(_hashes(manifest))
-
-
-def _manifest(out: Path) -> Manifest:
+def _manifest(out: Path) -> tuple[Manifest, Told]:
     """Manifest of the export that is in a folder; empty when it is not one of ours."""
     try:
         manifest = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
-        _hashes(manifest)
-        known = manifest["schema"] == SCHEMA and all(
-            isinstance(manifest.get(key, {}), dict) for key in ("volumes_m3", "case_sha256")
-        )
-        return dict(manifest) if known else {}
+        told = _told(manifest)
+        return (manifest, told) if told.schema == SCHEMA else ({}, Told())
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return {}
-
-
-def _listed(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Files of an earlier export, and what was in them."""
-    found = _hashes(manifest) if manifest else {}
-    return {Path(path).as_posix(): digest for path, digest in found.items() if "\0" not in path}
+        return {}, Told()
 
 
 def _unchanged(out: Path, name: str, digest: str) -> bool:
@@ -318,12 +340,12 @@ def _errors_text(error: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _targets_text(manifest: Manifest, out: Path) -> list[str]:
+def _targets_text(told: Told, out: Path) -> list[str]:
     """What each target holds, and how well."""
     lines = []
-    for one in _targets(manifest):
+    for one in told.targets:
         files = ", ".join(f.path for f in one.files)
-        lines += [f"{manifest['name']} as {one.title}, in {out / one.target}: {files}", f"  holds {one.holds}"]
+        lines += [f"{told.name} as {one.title}, in {out / one.target}: {files}", f"  holds {one.holds}"]
         lines += _errors_text(one.fit_error_pct)
         if one.section_error:
             cl, cd = (number_text(e, 2) for e in (one.section_error.cl, one.section_error.cd_pct))
@@ -337,43 +359,43 @@ def _targets_text(manifest: Manifest, out: Path) -> list[str]:
             lines.append(f"  standard uncertainty of the prediction: {words} ({band.origin})")
             lines += [f"  ! {flag}" for flag in band.flags]
         lines += [f"  note: {note}" for note in one.notes]
-    if manifest.get("kept"):
-        lines.append(f"kept from an earlier export into {out}: {', '.join(manifest['kept'])}")
-    if manifest.get("stale"):
-        lines.append(f"  of another state of the case, export them again: {', '.join(manifest['stale'])}")
+    if told.kept:
+        lines.append(f"kept from an earlier export into {out}: {', '.join(told.kept)}")
+    if told.stale:
+        lines.append(f"  of another state of the case, export them again: {', '.join(told.stale)}")
     return lines
 
 
 def text(manifest: Manifest, out: Path) -> str:
     """Lay a manifest out for a terminal."""
-    targets = _targets_text(manifest, out)
-    if not manifest["files"] and targets:
+    told = _told(manifest)
+    targets, volumes, checks = _targets_text(told, out), told.volumes_m3, told.checks_m
+    if volumes is None:  # no solid was made
         return "\n".join(targets)
     rows = [
-        [f.path, f.format, f.unit, f"{f.bytes / 1e6:.2f}", ", ".join(s["name"] for s in f.surfaces), f.sha256[:12]]
-        for f in rows_of(Listed, manifest["files"])
+        [f.path, f.format, f.unit, f"{f.bytes / 1e6:.2f}", ", ".join(s.name for s in f.surfaces), f.sha256[:12]]
+        for f in told.files
     ]
-    volumes, checks = manifest["volumes_m3"], manifest["checks_m"]
     lines = [
-        f"{manifest['name']}: {manifest['blades']} blades, in {out}",
+        f"{told.name}: {told.blades} blades, in {out}",
         text_table(["file", "format", "unit", "MB", "surfaces", "sha256"], rows, left=(0, 1, 2, 4, 5)).rstrip(),
     ]
-    meshed, exact = volumes["volume_rotor_mesh"], volumes["volume_rotor_sections"]
-    words = [f"rotor {meshed * 1e6:.4f} cm3, sections {100 * (exact / meshed - 1):+.3f} %"]
-    if "volume_rotor_cad" in volumes:
-        words.append(f"CAD {100 * (volumes['volume_rotor_cad'] / meshed - 1):+.3f} %")
-    if "gap" in checks:
-        words.append(f"gap {number_text(checks['gap'] * 1e3)} mm")
-    if "min_thickness" in checks:
-        words.append(f"thinnest place of the blade {number_text(checks['min_thickness'] * 1e3)} mm")
-        words.append(f"trailing edge {number_text(checks['trailing_edge'] * 1e3, 3)} mm")
+    meshed = volumes.volume_rotor_mesh
+    words = [f"rotor {meshed * 1e6:.4f} cm3, sections {100 * (volumes.volume_rotor_sections / meshed - 1):+.3f} %"]
+    if volumes.volume_rotor_cad is not None:
+        words.append(f"CAD {100 * (volumes.volume_rotor_cad / meshed - 1):+.3f} %")
+    if checks.gap is not None:
+        words.append(f"gap {number_text(checks.gap * 1e3)} mm")
+    if checks.min_thickness is not None:
+        words.append(f"thinnest place of the blade {number_text(checks.min_thickness * 1e3)} mm")
+        words.append(f"trailing edge {number_text(checks.trailing_edge * 1e3, 3)} mm")
     else:
-        words.append(f"thinnest section {number_text(checks['min_section_thickness'] * 1e3)} mm")
+        words.append(f"thinnest section {number_text(checks.min_section_thickness * 1e3)} mm")
     lines.append(", ".join(words))
-    lines += printed_text(manifest["printed"]) if "printed" in manifest else []
-    for word, part in _parts(manifest).items():
+    lines += printed_text(told.printed) if told.printed is not None else []
+    for word in told.parts:
         if word in exports():
-            lines += exports()[word].text(part)
+            lines += exports()[word].text(manifest[word])
     return "\n".join(lines + targets)
 
 
@@ -403,9 +425,8 @@ class Exported:
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that the manifests list."""
-        return tuple(
-            home / name for one, home in zip(self.manifests, self.folders, strict=True) for name in listed(one)
-        )
+        both = zip(self.manifests, self.folders, strict=True)
+        return tuple(home / name for one, home in both for name in sorted(_told(one).hashes))
 
     @property
     def text(self) -> str:

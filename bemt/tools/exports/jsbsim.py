@@ -86,11 +86,11 @@ class JsbsimMotor:
 def motor_of(job: Job) -> JsbsimMotor:
     """Motor of the case's drive; without one, a motor that turns the rotor at the greatest speed of the tables."""
     t, blades = job.performance, inertia_estimate(job)
-    c: dict[str, Any] | None = plugins.part("circuit", job.case)
+    c: Any = plugins.part("circuit", job.case)
     if c is not None:
-        rotor = blades if c["rotor_inertia_kg_m2"] is None else c["rotor_inertia_kg_m2"]
-        return JsbsimMotor(c["kv_rpm_V"], c["volts"], c["ohm"], c["battery_ohm"], c["no_load_A"], c["exponent"],
-                     c["limit_A"], rotor + c["motor_inertia_kg_m2"], True)  # fmt: skip
+        rotor = blades if c.rotor_inertia_kg_m2 is None else c.rotor_inertia_kg_m2
+        return JsbsimMotor(c.kv_rpm_V, c.volts, c.ohm, c.battery_ohm, c.no_load_A, c.exponent, c.limit_A,
+                           rotor + c.motor_inertia_kg_m2, True)  # fmt: skip
     kv = float(t.rpm[-1]) / (STAND_IN_V * (1.0 - DROP))
     amps = float(t.torque_Nm[-1, t.at_rest]) * math.pi * kv / 30.0 / (1.0 - IDLE)
     return JsbsimMotor(kv, STAND_IN_V, DROP * STAND_IN_V / amps, 0.0, IDLE * amps, 1.0, None,

@@ -391,17 +391,16 @@ def loading_of(case: Case, rpm: float, airspeed_m_s: float) -> Loading:
             )
         )  # fmt: skip
     rotor = prep.rotor
-    rad = {k: v[0] for k, v in s.radial.items()}
-    W, chord = rad["W"], prep.st[:, K.S_CHORD]
+    at = solver.Radial(*(v[0] for v in s.radial))
+    W, chord = at.W, prep.st[:, K.S_CHORD]
     if prep.duct is None:  # an open rotor looks its tables up at the speed without the share of drag, see bem.residual
-        W = rpm * np.pi / 30.0 * rad["r"] * np.cos(rad["phi"]) + airspeed_m_s * np.sin(rad["phi"])
+        W = rpm * np.pi / 30.0 * at.r * np.cos(at.phi) + airspeed_m_s * np.sin(at.phi)
     Re, M = air.rho * np.abs(W) * chord / air.mu, np.abs(W) / air.a_sound
-    dT, dQ = rad["dT"], rad["dQ"]
-    scale = float(s.T_rotor[0]) / float(dT.sum()), float(s.Q[0]) / float(dQ.sum())
+    scale = float(s.T_rotor[0]) / float(at.dT.sum()), float(s.Q[0]) / float(at.dQ.sum())
     if abs(scale[0] - 1.0) > 1e-9 or abs(scale[1] - 1.0) > 1e-9:  # pragma: no cover - a bug
         raise AssertionError(f"radial loads do not sum to the totals: {scale}")
     return Loading(
-        float(rpm), float(airspeed_m_s), float(air.rho), float(air.mu), float(air.a_sound), rad["r"],
-        prep.stations.dr, chord, prep.st[:, K.S_BETA], dT, dQ, rad["alpha"], Re, M, rotor.R, rotor.Rhub, int(rotor.B),
-        int(rotor.rotation), float(dT.sum()), float(dQ.sum()), float(s.T_duct[0] + s.T_stator[0]),
+        float(rpm), float(airspeed_m_s), float(air.rho), float(air.mu), float(air.a_sound), at.r,
+        prep.stations.dr, chord, prep.st[:, K.S_BETA], at.dT, at.dQ, at.alpha, Re, M, rotor.R, rotor.Rhub, int(rotor.B),
+        int(rotor.rotation), float(at.dT.sum()), float(at.dQ.sum()), float(s.T_duct[0] + s.T_stator[0]),
     )  # fmt: skip

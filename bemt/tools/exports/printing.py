@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from bemt.base.document import Documented
 from bemt.base.errors import Fault
 from bemt.rotors.case import Case
 from bemt.tools.exports.base import SolidExport
@@ -97,6 +98,21 @@ def _printed(request: Print, ducted: bool) -> Printed:
     )
 
 
+class AsPrinted(Documented):
+    """How a blade was made for a printer."""
+
+    least_thickness_mm: float
+
+
+class Widened(AsPrinted):
+    """The same with a wider tip: chord there before and after, and what it costs in thrust and torque."""
+
+    tip_chord_mm: tuple[float, float]
+    wider_from_r_over_R: float
+    thrust_pct: float
+    torque_pct: float
+
+
 @dataclass(frozen=True)
 class Shape:
     """A solid to write: what its file name ends in, the rotor and its duct, how it is made, its mesh."""
@@ -106,7 +122,7 @@ class Shape:
     duct: Duct | None
     options: Options | None
     model: MeshModel
-    printed: Mapping[str, Any] | None = None  # least thickness, and what a wider tip changes
+    printed: AsPrinted | None = None
 
 
 def shapes(case: Case, options: Options | None, request: Print | None) -> list[Shape]:
@@ -125,7 +141,7 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
     rotors = [("", rotor)] if request.hand is None else [made[h] for h in made if request.hand in (h, "both")]
     options, out = Options(printed=_printed(request, duct is not None)), []
     for end, rotor in rotors:
-        told: dict[str, Any] = {"least_thickness_mm": thickness_mm(request)}
+        told = AsPrinted(thickness_mm(request))
         try:
             model = build(rotor, None, options)
         except GeometryError as error:
@@ -136,7 +152,7 @@ def shapes(case: Case, options: Options | None, request: Print | None) -> list[S
                 model = build(wider, None, options)
             except GeometryError as still:
                 raise GeometryError([(*f[:3], _fine(rotor, case, request)) for f in still.faults]) from None
-            told |= _changes(case, rotor, wider)
+            told = _changes(case, rotor, wider, told.least_thickness_mm)
             rotor = wider
         # A slicer takes each named solid for a part, and blade and hub alone are open.
         whole = replace(model.rotor, group=np.zeros_like(model.rotor.group), names=("rotor",))
@@ -166,7 +182,7 @@ def _fine(rotor: Rotor, case: Case, request: Print) -> str:
     return "A wider blade, or a larger rotor"
 
 
-def _changes(case: Case, before: Rotor, after: Rotor) -> dict[str, Any]:
+def _changes(case: Case, before: Rotor, after: Rotor, least_mm: float) -> Widened:
     """What the wider tip is, and what it costs at the case's point, in per cent of thrust and torque."""
     from bemt.rotors.case.prepare import prepare_case
 
@@ -180,20 +196,19 @@ def _changes(case: Case, before: Rotor, after: Rotor) -> dict[str, Any]:
         found = replace(model, rotor=rotor).solve(case.rpm, case.airspeed_m_s, case.air())
         loads.append((float(found.thrust_N[0]), float(found.torque_Nm[0])))
     thrust, torque = (100.0 * (b / a - 1.0) for a, b in zip(*loads, strict=True))
-    return {"tip_chord_mm": [1e3 * float(old[-1]), 1e3 * float(new[-1])], "wider_from_r_over_R": where,
-            "thrust_pct": thrust, "torque_pct": torque}  # fmt: skip
+    return Widened(least_mm, (1e3 * float(old[-1]), 1e3 * float(new[-1])), where, thrust, torque)
 
 
-def printed_text(printed: Mapping[str, Any]) -> list[str]:
+def printed_text(printed: AsPrinted) -> list[str]:
     """Lines for the terminal."""
-    lines = [f"printed with a least thickness of {printed['least_thickness_mm']:g} mm"]
-    if "tip_chord_mm" in printed:
-        old, new = printed["tip_chord_mm"]
+    lines = [f"printed with a least thickness of {printed.least_thickness_mm:g} mm"]
+    if isinstance(printed, Widened):
+        old, new = printed.tip_chord_mm
         finer = f". A finer nozzle keeps it: --nozzle-mm {FINE_MM:g}" if old >= TIP_CHORD * LINES * FINE_MM else ""
         lines.append(
             f"the tip was too narrow for that: its chord is {new:.2g} mm instead of {old:.2g}, wider from r/R "
-            f"{printed['wider_from_r_over_R']:.2f}; thrust {printed['thrust_pct']:+.1f} %, torque "
-            f"{printed['torque_pct']:+.1f} %{finer}"
+            f"{printed.wider_from_r_over_R:.2f}; thrust {printed.thrust_pct:+.1f} %, torque "
+            f"{printed.torque_pct:+.1f} %{finer}"
         )
     return lines
 

@@ -126,8 +126,9 @@ def source(p: Loading) -> dict[str, Any]:
     inside = p.Rhub * (1.0 - 1e-6)
     rows = ["(none (0 0 1))", f"(none ({inside:.9g} 0 1))"]
     rows += [f"(s{i} ({x:.12g} 0 1))" for i, x in enumerate(r)]
-    profiles: dict[str, Any] = {"none": _constant(0.0, 0.0)}
-    profiles |= {f"s{i}": _constant(a, b) for i, (a, b) in enumerate(zip(cl, cd, strict=True))}
+    profiles = {"none": _constant(0.0, 0.0)} | {
+        f"s{i}": _constant(a, b) for i, (a, b) in enumerate(zip(cl, cd, strict=True))
+    }
     return {
         "type": "rotorDisk", "selectionMode": "cellZone", "cellZone": "rotorDisk", "fields": "(U)",
         "nBlades": p.blades, "tipEffect": 1.01, "inletFlowType": "fixed",

@@ -118,11 +118,11 @@ def _fit_hub(job: Job) -> tuple[float, float]:
 # RotorPy: the rotor's entries of a vehicle's parameters.
 
 
-def _rotor_params(files: Files) -> dict[str, float]:
-    """Parameters that a written file sets."""
+def _rotor_params(files: Files) -> list[float]:
+    """k_eta, k_z, k_m, k_d, k_h and k_flap that a written file sets."""
     space: dict[str, dict[str, float]] = {}
     exec(str(next(iter(files.values()))), {}, space)
-    return space["rotor_params"]
+    return [space["rotor_params"][key] for key in ("k_eta", "k_z", "k_m", "k_d", "k_h", "k_flap")]
 
 
 class RotorpyExport(LoadsExport):
@@ -179,16 +179,15 @@ rotor_direction = {-t.sense}
 
     def loads(self, files: Files, rpm: Array, airspeed_m_s: Array) -> tuple[Array, Array]:
         """Compute_body_wrench of one rotor along its axis."""
-        k, W = _rotor_params(files), rpm * np.pi / 30.0
-        return k["k_eta"] * W**2 - k["k_z"] * W * airspeed_m_s, k["k_m"] * W**2
+        (k_eta, k_z, k_m, *_), W = _rotor_params(files), rpm * np.pi / 30.0
+        return k_eta * W**2 - k_z * W * airspeed_m_s, k_m * W**2
 
     def hub_loads(self, files: Files, rpm: Array, airspeed_m_s: Array, side_m_s: Array) -> Array:
         """Compute_body_wrench of one rotor; without side force and roll moment."""
-        k, W = _rotor_params(files), rpm * np.pi / 30.0
+        (*_, k_d, k_h, k_flap), W = _rotor_params(files), rpm * np.pi / 30.0
         T, Q = self.loads(files, rpm, airspeed_m_s)
         none = np.full(W.shape, np.nan)
-        return np.array([T + k["k_h"] * side_m_s**2, Q, k["k_d"] * W * side_m_s, none, none,
-                         -k["k_flap"] * W * side_m_s])  # fmt: skip
+        return np.array([T + k_h * side_m_s**2, Q, k_d * W * side_m_s, none, none, -k_flap * W * side_m_s])
 
 
 def _rotorpy_hub(job: Job) -> tuple[float, float, float]:

@@ -17,7 +17,7 @@ import signal
 import sys
 import threading
 import time
-from typing import Any
+from collections.abc import Mapping
 
 from bemt.base.document import Documented
 from bemt.base.errors import InputError
@@ -59,6 +59,33 @@ class Limits(Documented):
         return ""
 
 
+class Start(Documented):
+    """First line to the guard: the wire, and what the stand may do."""
+
+    driver: str
+    address: str
+    line: str
+    limits: Limits
+
+
+class Order(Documented):
+    """A line to the guard: a pulse width to go to [us], a sign of life, a reason to stop, the end."""
+
+    go: float | None = None
+    beat: int | None = None
+    stop: str | None = None
+    end: int | None = None
+
+
+class Word(Documented):
+    """A line from the guard: its pulse width [us] with a row, why it stopped, or the faults of the wire."""
+
+    us: float | None = None
+    row: Mapping[str, float] | None = None
+    stopped: str | None = None
+    refused: tuple[Mapping[str, str], ...] | None = None
+
+
 class Guard:
     """State of the guard: the command, where it goes, and why it was stopped."""
 
@@ -70,13 +97,13 @@ class Guard:
         self.beat = self.fresh = self.then = time.monotonic()
         self.row: dict[str, float] = {}
 
-    def order(self, said: dict[str, Any]) -> None:
+    def order(self, said: Order) -> None:
         """Take an order."""
         self.beat = time.monotonic()
-        if "stop" in said:
-            self.stop(str(said["stop"]))
-        if "go" in said and not self.stopped:
-            self.target = min(max(float(said["go"]), self.limits.stop_us), self.limits.largest_us)
+        if said.stop is not None:
+            self.stop(said.stop)
+        if said.go is not None and not self.stopped:
+            self.target = min(max(said.go, self.limits.stop_us), self.limits.largest_us)
 
     def stop(self, why: str) -> None:
         """Stop for good, at once."""
@@ -117,19 +144,19 @@ class Guard:
             self.write()
 
 
-def _orders(into: queue.SimpleQueue[dict[str, Any]]) -> None:
+def _orders(into: queue.SimpleQueue[Order]) -> None:
     for line in sys.stdin:
         try:
-            into.put(json.loads(line))
-        except ValueError:
-            into.put({"stop": "an order that cannot be read"})
-    into.put({"end": 1, "stop": "the orders ended"})
+            into.put(Order.from_document(json.loads(line)))
+        except (ValueError, TypeError):
+            into.put(Order(stop="an order that cannot be read"))
+    into.put(Order(stop="the orders ended", end=1))
 
 
-def _tell(**said: Any) -> None:
+def _tell(said: Word) -> None:
     """Write a line without ever waiting for a reader."""
     try:
-        os.write(1, (json.dumps(said) + "\n").encode())
+        os.write(1, (json.dumps(said.document()) + "\n").encode())
     except (BlockingIOError, BrokenPipeError):
         pass
 
@@ -137,18 +164,17 @@ def _tell(**said: Any) -> None:
 def main() -> None:
     """Guard a wire until the orders end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the one that gives orders
-    given = json.loads(sys.stdin.readline())
+    given = Start.from_document(json.loads(sys.stdin.readline()))
     os.set_blocking(1, False)
-    limits = Limits.from_document(given["limits"])
-    drivers.PATIENCE_S = limits.patience_s
+    drivers.PATIENCE_S = given.limits.patience_s
     try:
-        wire = connect(given["driver"], given["address"], given["line"])
+        wire = connect(given.driver, given.address, given.line)
     except InputError as error:
-        _tell(refused=[vars(f) for f in error.faults])
+        _tell(Word(refused=tuple(vars(f) for f in error.faults)))
         return
-    guard = Guard(wire, limits)
+    guard = Guard(wire, given.limits)
     signal.signal(signal.SIGTERM, lambda *_: guard.stop("terminated"))
-    orders: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
     threading.Thread(target=_orders, args=(orders,), daemon=True).start()
     told, end = "", math.inf
     try:
@@ -156,12 +182,12 @@ def main() -> None:
             while not orders.empty():
                 said = orders.get()
                 guard.order(said)
-                end = time.monotonic() + _LINGER_S if "end" in said else end
+                end = time.monotonic() + _LINGER_S if said.end else end
             guard.tick()
-            _tell(us=guard.us, row=guard.row)
+            _tell(Word(us=guard.us, row=guard.row))
             if guard.stopped != told:
                 told = guard.stopped
-                _tell(stopped=told)
+                _tell(Word(stopped=told))
             if told == "terminated":
                 end = min(end, time.monotonic() + _LINGER_S)
             time.sleep(guard.limits.tick_s)

@@ -14,6 +14,7 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from concurrent import futures
 from pathlib import Path
 from typing import Any
@@ -142,21 +143,21 @@ def _serial(truth: Truth) -> str:
 _WIRES = {"flightstand": _flightstand, "rcbenchmark": _rcbenchmark, "serial": _serial}
 
 
-def _by_hand(truth: Truth, said: dict[str, Any]) -> Any:
+def _by_hand(truth: Truth, do: str, name: str = "", names: Sequence[str] = (), what: str = "", **said: Any) -> Any:
     """What a person does at the stand."""
-    match said["do"]:
+    match do:
         case "set up":
-            return truth.set_up(said["kind"], said["runs"], said["mended"], said["day"])
+            return truth.set_up(**said)
         case "place":
-            return truth.place(said["k"])
+            return truth.place(**said)
         case "look":
-            return said["name"] in truth.entry.causes
+            return name in truth.entry.causes
         case "mend":
-            return [n for n in said["names"] if n in truth.entry.causes]
+            return [n for n in names if n in truth.entry.causes]
         case "output":
             return {"us": truth.us, "since": truth.changed, "now": time.monotonic()}
         case "break":
-            truth.broken = said["what"]
+            truth.broken = what
 
 
 def _say(**said: Any) -> None:
@@ -177,7 +178,7 @@ def main() -> None:
 
     threading.Thread(target=watch, daemon=True).start()
     for line in sys.stdin:
-        _say(done=_by_hand(truth, json.loads(line)))
+        _say(done=_by_hand(truth, **json.loads(line)))
     os._exit(0)  # threads of servers
 
 

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from bemt.base.errors import Fault, InputError
 from bemt.tools.stand.drivers import connect
-from bemt.tools.stand.guard import Limits
+from bemt.tools.stand.guard import Limits, Word
 
 T = TypeVar("T")
 _POLL_S, _START_S = 0.02, 10.0
@@ -64,8 +64,8 @@ class Stand:
         self.wire, self.limits, self.settle_s, self.samples = (driver, address, line), limits, settle_s, samples
         self.began, self.stopped, self.us = time.monotonic(), "", limits.stop_us
         self.known: dict[float, float] = {}  # Speed by pulse width, as it was read
-        self._rows: deque[tuple[float, float, dict[str, float]]] = deque(maxlen=2000)
-        self._refused: list[dict[str, str]] = []
+        self._rows: deque[tuple[float, float, Mapping[str, float]]] = deque(maxlen=2000)
+        self._refused: list[Mapping[str, str]] = []
         self._new = threading.Condition()
         command = [sys.executable, "-m", "bemt.tools.stand.guard"]
         self.guard = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -105,13 +105,13 @@ class Stand:
         for text in self.guard.stdout:
             if not text.startswith("{"):  # words of a client
                 continue
-            said = json.loads(text)
+            said = Word.from_document(json.loads(text))
             with self._new:
-                if "us" in said:
-                    self.us = said["us"]
-                    self._rows.append((time.monotonic(), said["us"], said["row"]))
-                self._refused = said.get("refused", self._refused)
-                self.stopped = said.get("stopped", "") or self.stopped
+                if said.us is not None and said.row is not None:
+                    self.us = said.us
+                    self._rows.append((time.monotonic(), said.us, said.row))
+                self._refused += said.refused or ()
+                self.stopped = said.stopped or self.stopped
                 self._new.notify_all()
         self.stopped = self.stopped or "the guard is gone"
         if self.guard.stdin is not None and not self.guard.stdin.closed and not self._refused:
@@ -162,7 +162,7 @@ class Stand:
 
     def row(self) -> SettledRow:
         """Read a row: the mean of the next samples."""
-        rows: dict[float, dict[str, float]] = {}
+        rows: dict[float, Mapping[str, float]] = {}
         since = time.monotonic()
         while len(rows) < self.samples:
             if time.monotonic() - since > self.settle_s + _START_S:

@@ -30,5 +30,8 @@ class OpenfoamExport(SolidExport):
 
     def text(self, part: Mapping[str, Any]) -> list[str]:
         """How the case is run."""
-        words = f"{part['solver']}, {part['turbulence']}, {part['domain']}, {part['sector']}, level {part['level']:g}"
-        return [f"OpenFOAM case: {words}; run it with ./Allrun", *part["notes"]]
+        solver, turbulence, domain, sector, level, notes = (
+            part[key] for key in ("solver", "turbulence", "domain", "sector", "level", "notes")
+        )
+        words = f"{solver}, {turbulence}, {domain}, {sector}, level {level:g}"
+        return [f"OpenFOAM case: {words}; run it with ./Allrun", *notes]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs, refuse
 from bemt.base.foam_text import Entries, dictionary, vector
 from bemt.base.tables import write_atomic
@@ -338,7 +339,18 @@ def _notes(s: Settings, mach: float, left_out: bool) -> list[str]:
     return [note for note, holds in said.items() if holds]
 
 
-def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, dict[str, Any]]:
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Shapes of a run, the outline of the centre body behind the rotor, and what a reader has to know."""
+
+    rotor: Rotor
+    duct: Duct | None
+    tail: Array | None
+    notes: list[str]
+    model: MeshModel
+
+
+def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[Settings, Parts]:
     """Work out the settings of a run."""
     file = case.path.as_posix()
     faults = check_run(run, file=file)
@@ -378,20 +390,17 @@ def settings_of(case: Case, run: Run, options: Options | None = None) -> tuple[S
         )  # fmt: skip
     except InputError as error:
         raise InputError([replace(fault, file=fault.file or file) for fault in error.faults]) from error
-    notes = _notes(settings, mach, left_out)
-    return settings, {"rotor": rotor, "duct": duct, "tail": tail, "notes": notes, "model": model}
+    return settings, Parts(rotor, duct, tail, _notes(settings, mach, left_out), model)
 
 
 def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = None) -> dict[str, Any]:
     """Write a whole case: ``cd OUT && ./Allrun`` runs it."""
     settings, parts = settings_of(case, run, options)
-    manifest = export(
-        parts["rotor"], parts["duct"], out, ["openfoam"], name=case.name, options=options, model=parts["model"]
-    )
-    if parts["tail"] is not None:
+    manifest = export(parts.rotor, parts.duct, out, ["openfoam"], name=case.name, options=options, model=parts.model)
+    if parts.tail is not None:
         trimesh = needs("trimesh", "cad")
 
-        solid = trimesh.Trimesh(*revolve(parts["tail"], FACETS), process=False)
+        solid = trimesh.Trimesh(*revolve(parts.tail, FACETS), process=False)
         data = str(solid.export(file_type="stl_ascii")).encode()
         path = "constant/triSurface/centrebody.stl"
         write_atomic(out / path, data)
@@ -409,7 +418,7 @@ def write_openfoam(case: Case, out: Path, run: Run, options: Options | None = No
         "sector": settings.sector, "sectors": settings.sectors, "domain": settings.domain, "level": settings.level,
         "rpm": settings.rpm, "airspeed_m_s": settings.V, "sideslip_deg": run.sideslip_deg,
         "density_kg_m3": settings.rho, "iterations": settings.iterations, "averaged": settings.average,
-        "notes": parts["notes"],
+        "notes": parts.notes,
         "files": {name: hashlib.sha256(text.encode()).hexdigest() for name, text in sorted(files.items())},
     }  # fmt: skip
     write_atomic(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
