@@ -27,6 +27,7 @@ from bemt.tools.flight.layout import LAYOUTS, effect_matrix, layout_of, mass_fau
 from bemt.tools.flight.log import FlightLog
 from bemt.tools.flight.picture import flight_picture
 from bemt.tools.flight.read import read_log
+from bemt.tools.flight.speed_sensor import checked
 from bemt.tools.flight.text import text
 from bemt.tools.flight.thrust_curve import inflow, motor_lag, simulator_constants
 from bemt.tools.flight.wind import wind
@@ -313,11 +314,12 @@ def test_every_recording_is_read(shared_data: Path) -> None:
 
 
 def test_recorded_thrust_constants_repeat(shared_data: Path) -> None:
-    """Within 1 % of their mean; the payload within 4 %; the brushed one within the bench's band."""
+    """Standard deviation 0.5 % or less; the payload within 4 %; the brushed one within the bench's band."""
     folder = shared_data / "flight_logs"
-    for stem in ("cf21_brushed_34.7g_*.usdlog", "cf21_brushless_37g_*.usdlog"):
-        k = [identify(read_log(p)).constants["thrust constant"].value for p in folder.glob(stem)]
-        assert np.max(np.abs(np.array(k) / np.mean(k) - 1.0)) < 0.01
+    for stem in ("brushed_34.7g", "brushless_37g", "payload_44.4g"):
+        logs = [checked(read_log(p)) for p in folder.rglob(f"*{stem}*.usdlog")]
+        k = [identify(log).constants["thrust constant"].value for log in logs if not log.sensors]
+        assert len(k) > 2 and np.std(k, ddof=1) <= 0.005 * np.mean(k), stem
     calm = [read_log(p) for p in folder.glob("cf21_brushless_37g_*.usdlog")]
     got = answered(folder, "cf21_brushless_payload_44.4g_eckart07.usdlog", healthy=calm, healthy_mass_kg=0.037)
     assert got.mass is not None and abs(got.mass.value - 0.0444) < min(got.mass.half, 0.04 * 0.0444)

@@ -30,9 +30,10 @@ _BREEZE = 2.0  # wind, or speed over ground beyond that of healthy flights, that
 _FULL = 0.98  # share of full drive that is a limit [1]
 _NEAR_LIMIT = 0.5  # demand in yaw that few mixers can give in full [1]
 
-SPEED_POWER = 0.1
-"""Bound (95 %) on the power of the speed with which a thrust constant changes as the speed does: -0.02 to 0.10 above
-8,000 or 15,000 rev/min on three benches of a Crazyflie (IMRCLab/crazyflie-data-collection @ 4d777a5a) [1]."""
+SPEED_POWER, SPEED_POWER_HALF = 0.05, 0.1
+"""Power of the speed with which a thrust constant grows as the Reynolds number does, and the half width of its 95 %
+band: -0.02 to 0.10 above 8,000 or 15,000 rev/min on benches of a Crazyflie (IMRCLab/crazyflie-data-collection @
+4d777a5a) [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,8 +260,11 @@ def _mass(log: FlightLog, mine: Constant, known: Sequence[tuple[FlightLog, Const
     """Mass at which this flight's thrust constant is that of the healthy ones, with what flights differ by."""
     values = np.array([k.value for _, k in known])
     m = healthy_mass * float(values.mean()) / mine.value
-    sd, factor = flight_scatter(values)
+    # Not narrowed by the healthy flights: another load is what they cannot show (a payload weighs 2 % too little).
+    sd, factor = flight_scatter([])
     between = factor * sd * np.sqrt(1.0 + 1.0 / values.size)
     speeds = [float(h.rpm[h.flying].mean()) for h, _ in known if h.rpm is not None]
-    slope = 0.0 if log.rpm is None else SPEED_POWER * float(np.log(log.rpm[log.flying].mean() / np.mean(speeds)))
-    return Constant(m, m * float(np.hypot(np.hypot(mine.half / mine.value, between), slope)), "kg")
+    faster = 0.0 if log.rpm is None else float(np.log(log.rpm[log.flying].mean() / np.mean(speeds)))
+    m *= float(np.exp(SPEED_POWER * faster))
+    parts = (mine.half / mine.value, between, SPEED_POWER_HALF * faster)
+    return Constant(m, m * float(np.linalg.norm(parts)), "kg")

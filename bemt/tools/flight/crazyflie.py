@@ -32,16 +32,17 @@ def read(path: Path) -> FlightLog:
     """Read a log, as far as it is whole."""
     data, name = path.read_bytes(), str(path)
     whole = len(data) > 8 and zlib.crc32(data[:-4]) == struct.unpack("<I", data[-4:])[0]
-    body = data[:-4] if whole else data
+    body, size = memoryview(data)[: -4 if whole else None], len(data)
     try:
         tables, end = crazyflie.log_tables(body, partly=True)
     except (struct.error, KeyError, ValueError, IndexError, MemoryError) as error:
         got = f"a header that cannot be read ({error})"
         raise InputError(Fault(name, "header", got, "a whole header", "Copy the file again")) from error
+    del body, data
     columns = {k: (v["time_s"], v[k]) for v in tables.values() for k in v if k != "time_s"}
     ends = ""
     if not whole:
-        where = f"records end at byte {end} of {len(data)}" if end < len(data) - 4 else "all records can be read"
+        where = f"records end at byte {end} of {size}" if end < size - 4 else "all records can be read"
         ends = f"wrong checksum; {where}"
     return from_columns(name, KIND, columns, ends)
 

@@ -164,25 +164,22 @@ def joined(
     The times of `main` are kept; of more than 200,000 as many, evenly spread. `raw` keeps its own. InputError when
     fewer than 20 whole samples remain.
     """
-    clean = {}
-    for key, source in sources.items():
-        if source is None:
-            continue
-        t, v = np.asarray(source[0], dtype=float), np.asarray(source[1], dtype=float)
-        whole = _whole(t, v)
-        if whole[0].size > 1:
-            clean[key] = whole
-    if main not in clean or clean[main][0].size < 20:
+
+    def clean(source: Source | None) -> Source:
+        return (np.zeros(0), np.zeros(0)) if source is None else _whole(source[0], source[1])
+
+    t = clean(sources.get(main))[0]
+    if t.size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
-    t = clean[main][0]
     if t.size > _MOST:
         t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], _MOST)))]
     columns, halves = {}, {}
-    for key, (at, v) in clean.items():
-        flat = v.reshape(at.size, -1)
-        put = np.stack([np.interp(t, at, c) for c in flat.T], axis=1)
-        columns[key] = put[:, 0] if v.ndim == 1 else put
-        halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
+    for key, source in sources.items():
+        at, v = clean(source)  # one at a time: fast sources are most of the memory
+        if at.size > 1:
+            put = np.stack([np.interp(t, at, c) for c in v.reshape(at.size, -1).T], axis=1)
+            columns[key] = put[:, 0] if v.ndim == 1 else put
+            halves[key] = 0.0 if key == main else 0.5 * float(np.median(np.diff(at)))
     fast = None
     if raw is not None and raw[0].size > 1:
         at, v = _whole(raw[0], raw[1])
@@ -192,6 +189,7 @@ def joined(
 
 def _whole(t: Array, v: Array) -> Source:
     """Samples that can be, in order of time. A damaged clock jumps: back, or by hours; there the usable part ends."""
+    t, v = np.asarray(t, dtype=float), np.asarray(v, dtype=float)
     good = np.isfinite(t) & (np.abs(v.reshape(t.size, -1)) < _LARGEST).all(axis=1)  # not so of NaN
     t, v = t[good], v[good]
     jump = np.flatnonzero((np.diff(t) < -1.0) | (np.diff(t) > 3600.0))
