@@ -18,7 +18,7 @@ from bemt.base.errors import Fault, InputError
 from bemt.base.units import G0
 from bemt.data.readers import crazyflie
 from bemt.tools.flight.layout import layout_of, mixed
-from bemt.tools.flight.log import FlightLog, joined, thrust_axis
+from bemt.tools.flight.log import MOST, FlightLog, joined, thrust_axis
 
 KIND = "Crazyflie usdlog"
 
@@ -53,14 +53,16 @@ _STATES = (("stateEstimate", 1.0), ("stateEstimateZ", 1e-3))
 def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], ends: str = "") -> FlightLog:
     """Log from the firmware's variables, each with its times [s]."""
 
-    def many(*keys: str, factor: float = 1.0) -> tuple[Array, Array] | None:
+    def many(*keys: str, factor: float = 1.0, whole: bool = False) -> tuple[Array, Array] | None:
         if not all(k in columns for k in keys):
             return None
         t = columns[keys[0]][0]
-        return t, factor * np.stack([columns[k][1] for k in keys], axis=1)
+        step = 1 if whole else max(t.size // MOST, 1)  # what is thinned later need not be copied
+        return t[::step], factor * np.stack([columns[k][1][::step] for k in keys], axis=1, dtype=float)
 
     def one(key: str, factor: float) -> tuple[Array, Array] | None:
-        return (columns[key][0], factor * columns[key][1]) if key in columns else None
+        found = many(key, factor=factor)
+        return None if found is None else (found[0], found[1][:, 0])
 
     def first(*choices: tuple[Sequence[str], float]) -> tuple[Array, Array] | None:
         return next((found for keys, factor in choices if (found := many(*keys, factor=factor))), None)
@@ -81,10 +83,11 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
     roll = first(*(([f"{group}.roll", f"{group}.pitch"], np.pi / 180.0) for group in groups))
     axis = (q[0], thrust_axis(q[1])) if q else None
     upright = (axis[0], axis[1][:, 2]) if axis else (roll[0], np.prod(np.cos(roll[1]), axis=1)) if roll else None
+    acc = [f"acc.{a}" for a in "xyz"]
     sources = {
         "command": command,
         "rpm": many(*(f"rpm.m{i}" for i in "1234")),
-        "acceleration": many(*(f"acc.{a}" for a in "xyz"), factor=G0),
+        "acceleration": many(*acc, factor=G0),
         "rates": many(*(f"gyro.{a}" for a in "xyz"), factor=np.pi / 180.0),
         "upright": upright,
         "axis": axis,
@@ -98,5 +101,5 @@ def from_columns(name: str, kind: str, columns: dict[str, tuple[Array, Array]], 
         "torque": demand,
     }
     main = "command" if command else "rpm"
-    raw = sources["acceleration"]
+    raw = many(*acc, factor=G0, whole=True)
     return joined(name, kind, sources, main, raw=raw, layout="crazyflie", ends=ends, mixed=said)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError
 
-__all__ = ["DENSE", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
+__all__ = ["DENSE", "MOST", "SPARSE", "FlightLog", "SpeedSensor", "Stretches", "joined", "thrust_axis"]
 
 Source = tuple[Array, Array]
 T = TypeVar("T", bound=Sized)
 
 _ON, _LOW_M, _TRIM_S = 0.3, 0.15, 0.5  # share of the usual largest command; height; time after the start [m, s]
-_MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 _LARGEST = 1e9  # value above which a number is damage: no unit here comes near
+MOST = 200_000  # samples on the common time base; longer logs are thinned (an hour at 50 Hz is 180,000)
 DENSE, SPARSE = 1_000_000, 20  # samples of a fast sensor that are kept whole; of stretches beyond, every 20th
 
 
@@ -133,15 +133,15 @@ class Stretches(Generic[T]):
     the slow motion is there throughout, and the fast one in stretches that spread over the log.
     """
 
-    def __init__(self, thin: Callable[[T], T]) -> None:
-        """Begin empty; `thin` takes every 20th sample of a stretch."""
-        self._thin, self.parts, self._whole = thin, cast(list[T], []), cast(list[bool], [])
+    def __init__(self, thin: Callable[[T], T], each: int = 1) -> None:
+        """Begin empty; `thin` takes every 20th sample of a stretch, whose rows hold `each` samples."""
+        self._thin, self._each, self.parts, self._whole = thin, each, cast(list[T], []), cast(list[bool], [])
 
     def add(self, part: T) -> None:
         """Keep a stretch."""
         self.parts.append(part)
         self._whole.append(True)
-        while sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
+        while self._each * sum(len(p) for p in self.parts) > DENSE and sum(self._whole) > 2:
             for i in [k for k, whole in enumerate(self._whole) if whole][1::2]:
                 self.parts[i], self._whole[i] = self._thin(self.parts[i]), False
 
@@ -171,8 +171,8 @@ def joined(
     t = clean(sources.get(main))[0]
     if t.size < 20:
         raise InputError(Fault(file, main, "fewer than 20 whole samples", "a flight", "Log commands of the motors"))
-    if t.size > _MOST:
-        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], _MOST)))]
+    if t.size > MOST:
+        t = t[np.unique(np.searchsorted(t, np.linspace(t[0], t[-1], MOST)))]
     columns, halves = {}, {}
     for key, source in sources.items():
         at, v = clean(source)  # one at a time: fast sources are most of the memory

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bemt.base.arrays import Array
 from bemt.base.errors import Fault, InputError, needs
@@ -60,8 +61,7 @@ def read(path: Path) -> FlightLog:
 
 def _reduced(file: BinaryIO) -> io.BytesIO:
     """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
-    head, data = bytearray(file.read(16)), dict[int, Stretches[list[bytes]]]()
-    begun, each = dict[int, list[bytes]](), dict[int, int]()
+    head, data = bytearray(file.read(16)), dict[int, _Messages]()
     while len(start := file.read(3)) == 3:
         size, kind = struct.unpack("<Hc", start)
         body = file.read(size)
@@ -71,25 +71,36 @@ def _reduced(file: BinaryIO) -> io.BytesIO:
             name = body[3:].decode("latin-1")
             if name in _TOPICS:
                 number = struct.unpack_from("<H", body, 1)[0]
-                each[number] = 32 if name == "sensor_accel_fifo" else 1
-                # Single bursts are too short for a spectrum; of the others every 20th message stays.
-                step = SPARSE if each[number] == 1 else _STRETCH
-                data[number], begun[number] = Stretches(lambda part, step=step: part[::step]), []  # type: ignore[misc]
+                data[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
                 head += start + body
         elif kind == b"D" and size > 2:
-            number = struct.unpack_from("<H", body)[0]
-            if number in begun:
-                # A message of a burst holds 32 samples, so it weighs as 32.
-                begun[number] += [start + body, *[b""] * (each[number] - 1)]
-                if len(begun[number]) >= _STRETCH:
-                    data[number].add(begun[number])
-                    begun[number] = []
+            messages = data.get(struct.unpack_from("<H", body)[0])
+            if messages is not None:
+                messages.add(start + body)
         elif kind == b"B":
             head += start + bytes(size)  # without the places of appended data, which are other ones now
         elif kind in b"FPQ":
             head += start + body
-    parts = [m for number, kept in data.items() for p in (*kept.parts, begun[number]) for m in p]
-    return io.BytesIO(bytes(head) + b"".join(parts))
+    return io.BytesIO(b"".join([head, *(part for m in data.values() for part in (*m.kept.parts, m.begun))]))
+
+
+class _Messages:
+    """Messages of one topic, in stretches; `each` of them holds so many samples."""
+
+    def __init__(self, each: int) -> None:
+        # Single bursts are too short for a spectrum; of the others every 20th message stays.
+        step = SPARSE if each == 1 else _STRETCH // each
+        self.kept = Stretches[NDArray[Any]](lambda part: part[::step].copy(), each)
+        self.begun, self.size, self._full = bytearray(), 0, _STRETCH // each
+
+    def add(self, message: bytes) -> None:
+        """Keep a message; all of a topic have one length, else it is damaged."""
+        self.size = self.size or len(message)
+        if len(message) == self.size:
+            self.begun += message
+            if len(self.begun) >= self._full * self.size:
+                self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size}"))
+                self.begun.clear()
 
 
 def _made(name: str, found: Any) -> FlightLog:
