@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import mmap
 import re
 import struct
 from collections.abc import Callable
@@ -61,27 +62,30 @@ def read(path: Path) -> FlightLog:
 
 def _reduced(file: BinaryIO) -> io.BytesIO:
     """A log with the messages of the used topics alone, fast topics in stretches (ULog file format, PX4 user guide)."""
-    head, data = bytearray(file.read(16)), dict[int, _Messages]()
-    while len(start := file.read(3)) == 3:
-        size, kind = struct.unpack("<Hc", start)
-        body = file.read(size)
-        if len(body) < size or kind not in b"BFIMPQADLSOCR":
-            break
-        if kind == b"A":
-            name = body[3:].decode("latin-1")
-            if name in _TOPICS:
-                number = struct.unpack_from("<H", body, 1)[0]
-                data[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
-                head += start + body
-        elif kind == b"D" and size > 2:
-            messages = data.get(struct.unpack_from("<H", body)[0])
-            if messages is not None:
-                messages.add(start + body)
-        elif kind == b"B":
-            head += start + bytes(size)  # without the places of appended data, which are other ones now
-        elif kind in b"FPQ":
-            head += start + body
-    return io.BytesIO(b"".join([head, *(part for m in data.values() for part in (*m.kept.parts, m.begun))]))
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        head, topics, at, end = bytearray(data[:16]), dict[int, _Messages](), 16, len(data)
+        start = struct.Struct("<HcH").unpack_from  # size, kind and, of data, the number of the topic
+        while at + 5 <= end:
+            size, kind, number = start(data, at)
+            after = at + 3 + size
+            if after > end or kind not in b"BFIMPQADLSOCR":
+                break
+            if kind == b"D":
+                if number in topics and size > 2:
+                    topics[number].add(data[at:after])
+            elif kind == b"A":
+                name = data[at + 6 : after].decode("latin-1")
+                if name in _TOPICS:
+                    number = struct.unpack_from("<H", data, at + 4)[0]
+                    topics[number] = _Messages(32 if name == "sensor_accel_fifo" else 1)
+                    head += data[at:after]
+            elif kind == b"B":
+                # without the places of appended data, which are other ones now
+                head += data[at : at + 3] + bytes(size)
+            elif kind in b"FPQ":
+                head += data[at:after]
+            at = after
+    return io.BytesIO(b"".join([head, *(part for m in topics.values() for part in (*m.kept.parts, m.begun))]))
 
 
 class _Messages:
@@ -95,12 +99,14 @@ class _Messages:
 
     def add(self, message: bytes) -> None:
         """Keep a message; all of a topic have one length, else it is damaged."""
-        self.size = self.size or len(message)
-        if len(message) == self.size:
-            self.begun += message
-            if len(self.begun) >= self._full * self.size:
-                self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size}"))
-                self.begun.clear()
+        if len(message) != self.size:
+            if self.size:
+                return
+            self.size = len(message)
+        self.begun += message
+        if len(self.begun) >= self._full * self.size:
+            self.kept.add(np.frombuffer(bytes(self.begun), dtype=f"V{self.size}"))
+            self.begun.clear()
 
 
 def _made(name: str, found: Any) -> FlightLog:
