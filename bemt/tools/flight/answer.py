@@ -14,7 +14,7 @@ from bemt.base.errors import Fault, InputError, refuse
 from bemt.judge.diagnose.suggest import Suggestion
 from bemt.judge.explanation import NONE
 from bemt.judge.loss import Decision
-from bemt.tools.flight.balance import axes_of, features
+from bemt.tools.flight.balance import at_equal_voltage, axes_of, features
 from bemt.tools.flight.change import FlightChange, change_in
 from bemt.tools.flight.identify import Constant, Identified, identify
 from bemt.tools.flight.judge import BesideBalance, FlightVerdict, judge
@@ -168,7 +168,8 @@ def answer_on(
             tuple(k + 1 for k, part in turned if part > 0.0), tuple(k + 1 for k, part in turned if part < 0.0),
             tuple(k + 1 for k, _, known in moved if known), changed, tuple(upset),
         )  # fmt: skip
-        judged = judge(mine, [x for _, x in flown], placed, _windy(log, healthy, air), beside,
+        mine, *others = at_equal_voltage([log, *(healthy[k] for k, _ in flown)], [mine, *(x for _, x in flown)])
+        judged = judge(mine, others, placed, _windy(log, healthy, air), beside,
                        [days.days[k] for k, _ in flown], days.day)  # fmt: skip
         if placed is not None:
             balance = tuple(2.0 * float(r) for r in axes_of(placed, log.rotors) @ _usual(log))

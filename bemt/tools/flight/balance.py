@@ -39,7 +39,7 @@ from bemt.tools.flight.log import FlightLog
 
 __all__ = [
     "ALARM", "BLADE", "BUILD", "DAY", "IMBALANCE", "LARGEST", "WEAK", "WEIGHT", "WIDE", "WIND", "HealthyFlight",
-    "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
+    "at_equal_voltage", "axes_of", "blade", "differ", "directions", "features", "healthy_flight",
 ]  # fmt: skip
 
 ALARM = 0.01
@@ -81,6 +81,26 @@ def features(log: FlightLog) -> Array | None:
         return None
     mean = log.drive[on].mean(axis=0)
     return np.log(mean) if np.all(mean > 0.0) else None
+
+
+def at_equal_voltage(flights: Sequence[FlightLog], x: Sequence[Array]) -> list[Array]:
+    """Features x, (B,) each, of flights of one vehicle, as at the battery voltage of the first; healthy but for that.
+
+    A command that is the share of the battery's voltage at a motor grows as that sags; one that the autopilot
+    scales by it (Crazyflie's `motor.m` beside `pwm`, MOT_BAT_VOLT_MAX) does not. Which it is, the totals of the healthy
+    flights say (their scatter pooled with :data:`TOTAL`); each is as likely beforehand. Unchanged where a voltage is
+    missing.
+    """
+    read = [np.zeros(0) if f.voltage is None or f.command is None else f.voltage[f.flying] for f in flights]
+    # A voltage that never moves in flight was not measured.
+    if len(x) < 2 or any(v.size == 0 or np.ptp(v) < 1e-9 or v.mean() <= 0.0 for v in read):
+        return list(x)
+    volts = np.array([v.mean() for v in read])
+    lower = np.log(volts / volts[0])
+    totals = np.array([v.mean() for v in x[1:]])
+    by = [(len(totals) - 1) * float(np.var(totals + share * lower[1:])) for share in (0.0, 1.0)]
+    odds = 0.5 * (len(totals) - 1 + TOTAL_FREE) * np.diff(np.log1p(np.array(by) / (TOTAL_FREE * TOTAL**2)))[0]
+    return [v + u / (1.0 + np.exp(odds)) for v, u in zip(x, lower, strict=True)]
 
 
 def axes_of(layout: Array | None, rotors: int) -> Array:

@@ -208,8 +208,9 @@ def _drive(log: FlightLog) -> Array:
 
 def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unseen: list[str]) -> None:
     speeds = log.rpm is not None and log.sound
-    if speeds and log.command is not None and log.voltage is not None and log.command_unit == "1":
-        assert log.rpm is not None
+    measured = log.voltage is not None and np.ptp(log.voltage[on]) > 1e-9
+    if speeds and log.command is not None and measured and log.command_unit == "1":
+        assert log.rpm is not None and log.voltage is not None
         volts = (log.command[on] * log.voltage[on, None])[:, log.sound].mean(axis=1)
         k, half = _regress(np.column_stack([volts, np.ones(volts.size)]), log.rpm[on][:, log.sound].mean(axis=1))
         if half[0] < abs(k[0]):
@@ -217,6 +218,9 @@ def _motor(log: FlightLog, on: NDArray[np.bool_], out: dict[str, Constant], unse
             out["motor line, offset"] = Constant(float(k[1]), float(half[1]), "rpm")
     if log.voltage is None:
         unseen.append("battery: log its voltage")
+        return
+    if not measured:
+        unseen.append(f"battery: its voltage reads {log.voltage[on][0]:.3g} V throughout, so it was hardly measured")
         return
     out["battery voltage"] = _blocks(log.voltage[on], np.mean, "V")
     if log.battery_current is not None and np.std(log.battery_current[on]) > 0.0:

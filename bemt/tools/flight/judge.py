@@ -114,9 +114,7 @@ def judge(
     label = np.array(days if len(days) == n else [0] * n, dtype=int)
     sure = posterior(flight, calm, layout, windy, beside, label, day)
     change = flight - (calm.mean(axis=0) if n else flight.mean())
-    totals, half = calm.mean(axis=1), float("nan")
-    if n > 1:
-        half = float(stats.t.ppf(0.975, n - 1) * totals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))
+    half = float(stats.t.ppf(0.975, n - 1 + TOTAL_FREE)) * _total_sd(calm) if n > 1 else float("nan")
     cause = beside.change.causes if beside.change is not None else ()
     out = FlightVerdict(
         sure.said, change - change.mean(), next_flight(sure.said, layout, n), sure.found, sure.P, sure.scatter,
@@ -206,11 +204,15 @@ def _worlds(calm: Array, axes: Array, known: bool, days: Array, day: int | None 
 
 def _totals(w: _World, calm: Array) -> list[_World]:
     """The same where the total drive repeats as between flights, and where mass, battery or air are others."""
+    return [replace(w, log=w.log + float(np.log(share)), total=float(np.hypot(_total_sd(calm), more)))
+            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
+
+
+def _total_sd(calm: Array) -> float:
+    """Standard deviation of the total drive of the next flight about the mean of the healthy ones, pooled [1]."""
     n, totals = len(calm), calm.mean(axis=1)
     square = (float(np.sum((totals - totals.mean()) ** 2)) + TOTAL_FREE * TOTAL**2) / (n - 1 + TOTAL_FREE)
-    square *= 1.0 + 1.0 / n
-    return [replace(w, log=w.log + float(np.log(share)), total=float(np.sqrt(square + more**2)))
-            for share, more in ((1.0 - _LOADED, 0.0), (_LOADED, LOADED))]  # fmt: skip
+    return float(np.sqrt(square * (1.0 + 1.0 / n)))
 
 
 def posterior(
