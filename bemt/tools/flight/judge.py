@@ -130,9 +130,10 @@ def judge(
         return out
     bad, several = [], np.unique(label).size > 1
     for k, h in enumerate(calm):
-        # Of several sessions each is left out; of one, each flight.
+        # Of several sessions each is left out; of one, each flight, and its day is as open as that of this one.
         keep = label != label[k] if several else np.arange(n) != k
-        other = posterior(h, calm[keep], layout, days=label[keep], day=None if several else label[k]).said
+        left_out = None if several else "" if isinstance(day, str) else int(label[k])
+        other = posterior(h, calm[keep], layout, days=label[keep], day=left_out).said
         bad.append(any(beside.healthy[k : k + 1]) or other.verdict in (*CLAIMS, "unknown"))
     interval = stats.binomtest(sum(bad), len(bad)).proportion_ci(method="exact")
     return replace(out, accused=sum(bad), healthy=len(bad), rate95=(float(interval.low), float(interval.high)),
